@@ -48,11 +48,14 @@ class Frames:
 
     def iterate_rows(self, rows: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the displacement (M, 3) m or heights (H, W) m of each of some frames."""
-        for row in rows:
-            if self.heights is not None:
-                yield self.heights[row]
-            else:
-                yield self.displacement[row] * self.scale
+        if self.heights is not None:
+            yield from self.heights[rows]
+        elif self.displacement is not None:
+            yield from (self.displacement[row] * self.scale for row in rows)
+
+
+def _untold() -> AbstractContextManager[Callable[[int, int], None]]:
+    return nullcontext(lambda done, total: None)
 
 
 def is_scene(path: Path) -> bool:
@@ -61,7 +64,7 @@ def is_scene(path: Path) -> bool:
 
 
 def read_frames(
-    path: str | os.PathLike, progress: Progress = nullcontext, tier: Tier = "fast", gel: str = TARGET
+    path: str | os.PathLike, progress: Progress = _untold, tier: Tier = "fast", gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 

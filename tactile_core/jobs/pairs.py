@@ -12,6 +12,7 @@ import pathlib
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -30,10 +31,11 @@ from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import result_parts, scene_input
 from .engine import run as runs
+from .engine.inputs import Input
 from .engine.job import Job
 from .engine.kinds import InputFacts
 from .engine.local import InProcess, Local
-from .engine.recipes import Pairs
+from .engine.recipes import Law, Pairs
 from .engine.run import Place
 from .engine.scene_input import load
 
@@ -86,7 +88,7 @@ def plan(
     electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
-) -> tuple[jobs.Job, list[str], str]:
+) -> tuple[Job[Pairs], list[str], str]:
     """Return the job, the names of the indenters and the scene's text; raises as ``make_pairs``."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, Gel)
@@ -99,17 +101,19 @@ def plan(
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)
     surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
-    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, electrodes, source, target, list(keep)), None)
+    job = jobs.make(
+        inputs, Pairs(count, seed, surfaces, files, cast(Law, electrodes), source, target, list(keep)), None
+    )
     return job, [spec.name for spec in scene.indenters], text
 
 
-def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:
     """Return the number of blocks that the job needs, by the contacts made so far; nothing is prepared (False)."""
     _scene(job.inputs[index], tuple(job.recipe.files))
     return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
 
 
-def make(folder: Path, job: Job, index: int, number: int) -> bool:
+def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
     """Solve the contacts of one block of presses and write them; returns false if the block was there already."""
     from ..simulation.pair_sampling import press_rows
 
@@ -124,11 +128,11 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     way = recipe.electrodes, pair, recipe.keep
     rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, *way)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
-    array_pack.write(file, columns | {COUNT: np.int64(len(rows))})
+    array_pack.write(file, columns | {COUNT: np.array(len(rows))})
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
+def inspect_input(folder: Path, job: Job[Pairs], index: int) -> InputFacts | None:
     """Return the number of blocks needed in all, by the counts of those made so far; None before the first."""
     counts = _counts(folder, job, index)
     if not counts:
@@ -136,7 +140,7 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     return InputFacts(wanted(counts, job.recipe.count, job.inputs[index].path))
 
 
-def blocks(folder: Path, job: Job) -> list[Path]:
+def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
     """Return the files of the blocks that hold the contacts of a finished job, in order."""
     count = wanted(_counts(folder, job, 0), job.recipe.count, job.inputs[0].path)
     return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(count)]
@@ -162,7 +166,7 @@ def wanted(counts: dict[int, int], count: int, where: str) -> int:
     return max(number + 1, min(estimate, most))
 
 
-def _counts(folder: Path, job: Job, index: int) -> dict[int, int]:
+def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
     """Contacts of each block that is there."""
     name, found = job.inputs[index].name, {}
     for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
@@ -181,5 +185,5 @@ def _count(file: Path) -> int:
 
 
 @functools.lru_cache(maxsize=2)
-def _scene(one: jobs.Input, files: tuple[str, ...]) -> Scene:
+def _scene(one: Input, files: tuple[str, ...]) -> Scene:
     return load(one, files)[0]

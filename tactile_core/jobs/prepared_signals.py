@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import h5py
 
     from .engine.job import Job
+    from .engine.recipes import Translate
 
 CHUNK = 1024  # rows a chunk: 160 kB of changes
 COLUMNS = {
@@ -62,7 +63,7 @@ class About(TypedDict):
     labels: NotRequired[Runs]
 
 
-def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
     """Prepare recording `index` of the job, unless it is; returns its frames, and whether anything was made.
 
     Raises TactileError for a recording that cannot be read or has changed since the job was made.
@@ -81,7 +82,7 @@ def make(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     return count, True
 
 
-def _write(file: Path, job: Job, path: str, digest: str) -> int:
+def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
     import h5py
 
     disk = Disk(file)
@@ -100,7 +101,7 @@ def _write(file: Path, job: Job, path: str, digest: str) -> int:
     return writer.count
 
 
-def _signals(path: str, job: Job) -> Iterator[tuple[Recording, Signals, int]]:
+def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signals, int]]:
     """Prepare each part of a recording; also yields the number of its frames that the part before had."""
     options, source = job.recipe.prepare.options(), job.recipe.source
     sensor = job.recipe.sensor

@@ -53,7 +53,7 @@ def render_in_parts(
     return out
 
 
-def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job:
+def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job[Render]:
     """Plan the job. Raises TactileError for what can be refused before any work."""
     preset = claimed(Path(out), options)
     file = Path(path).resolve()
@@ -67,7 +67,7 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
     return jobs.make(inputs.hashed([file], lambda done, total: None), recipe, None, calibration)
 
 
-def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
+def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -> None:
     words, heights, frames = input_kind(folder, job, 0)
     name, recipe = job.inputs[0].name, job.recipe
     shape = None
@@ -85,7 +85,7 @@ def _put_together(folder: Path, job: Job, out: Path, options: Options) -> None:
         atomic.write_json(partial / results.NOTE, note)
 
 
-def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
     """Read the input, simulating a scene; keep the values to be rendered."""
     from .frame_range import parse_frames, select
     from .gel_frames import read_frames
@@ -105,7 +105,7 @@ def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
     return count(folder, job, index), made
 
 
-def make(folder: Path, job: Job, index: int, number: int) -> bool:
+def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
     """Render the frames of a shard, unless they are there."""
     one, recipe = job.inputs[index], job.recipe
     file = jobs.shard_file(folder, one.name, number)
@@ -125,7 +125,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
+def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | None:
     """Return how many frames an inspected input has."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
@@ -133,18 +133,18 @@ def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
     return InputFacts(count(folder, job, index), frames)
 
 
-def count(folder: Path, job: Job, index: int) -> int:
+def count(folder: Path, job: Job[Render], index: int) -> int:
     """Return how many shards an inspected input has."""
     return -(-_frames(folder, job, index) // job.recipe.shard_frames)
 
 
-def input_kind(folder: Path, job: Job, index: int) -> tuple[str, bool, int]:
+def input_kind(folder: Path, job: Job[Render], index: int) -> tuple[str, bool, int]:
     """Describe an inspected input: its kind in words, true if it holds height maps, its frames."""
     found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
     return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)
 
 
-def _frames(folder: Path, job: Job, index: int) -> int:
+def _frames(folder: Path, job: Job[Render], index: int) -> int:
     return len(array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(NUMBERS,))[NUMBERS])
 
 

@@ -216,7 +216,9 @@ class SheetFigure:
         width, height = opposite - corner
         border = {"facecolor": "none", "edgecolor": "black", "linewidth": BORDER, "zorder": 2.5, "clip_on": False}
         axes.add_patch(Rectangle(corner, width, height, **border))
-        return axes.add_patch(Rectangle(corner, width, height, facecolor="0.93", edgecolor="none", zorder=-1))
+        ground = Rectangle(corner, width, height, facecolor="0.93", edgecolor="none", zorder=-1)
+        axes.add_patch(ground)
+        return ground
 
     def _color_bar(self, colors: Any, height: float) -> None:
         last = LEFT + self.columns * (self.column_width + GAP) - GAP

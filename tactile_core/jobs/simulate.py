@@ -10,6 +10,7 @@ import os
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import cast
 
 import msgspec
 
@@ -26,7 +27,7 @@ from .engine import run as runs
 from .engine.job import Job
 from .engine.kinds import InputFacts
 from .engine.local import InProcess
-from .engine.recipes import Simulate
+from .engine.recipes import Law, Simulate
 from .engine.run import Place
 from .engine.scene_input import load
 
@@ -36,7 +37,7 @@ GROWS = False
 
 
 def simulate_grid(
-    job: Job,
+    job: Job[Simulate],
     out: str | os.PathLike,
     progress: Callable[[int, int], None] | None = None,
     place: Callable[[Path], Place] | None = None,
@@ -61,7 +62,7 @@ def plan(
     seed: int = 0,
     keep: Sequence[str] = DEFAULT,
     electrodes: str = SHEET,
-) -> Job:
+) -> Job[Simulate]:
     """Return the job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
 
     seed : of the first recording, each has one more than that before it; keep : words of ``scene_recording.outputs``
@@ -73,10 +74,10 @@ def plan(
     for one in values:
         check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
     atomic.claim(out)
-    return jobs.make(inputs, Simulate(seed, values, files, list(keep), electrodes), None)
+    return jobs.make(inputs, Simulate(seed, values, files, list(keep), cast(Law, electrodes)), None)
 
 
-def _put_together(folder: Path, job: Job, out: Path) -> None:
+def _put_together(folder: Path, job: Job[Simulate], out: Path) -> None:
     rows = []
     advice = "Make room, then give the command again"
     with atomic.writing(out, "room for it", advice), atomic.new_folder(out) as partial:
@@ -89,12 +90,12 @@ def _put_together(folder: Path, job: Job, out: Path) -> None:
         atomic.write_json(partial / GRID, content)
 
 
-def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job[Simulate], index: int) -> tuple[int, bool]:
     """Return one shard; nothing needs to be prepared."""
     return 1, False
 
 
-def make(folder: Path, job: Job, index: int, number: int) -> bool:
+def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
     """Simulate a recording."""
     from ..simulation.scene_recording import simulate_recording
 
@@ -114,6 +115,6 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
+def inspect_input(folder: Path, job: Job[Simulate], index: int) -> InputFacts | None:
     """Return one shard: a recording is not split."""
     return InputFacts(1)

@@ -27,6 +27,7 @@ from .prepared_signals import Prepared
 if TYPE_CHECKING:
     from ..translation.answer import Answer
     from .engine.job import Job
+    from .engine.recipes import Translate
     from .results import Gel
 
 GROWS = False
@@ -35,18 +36,18 @@ ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
 
 
-def count(frames: int, job: Job) -> int:
+def count(frames: int, job: Job[Translate]) -> int:
     """Return the number of shards of a recording of so many frames."""
     return -(-frames // job.recipe.shard_frames)
 
 
-def prepare_input(folder: Path, job: Job, index: int) -> tuple[int, bool]:
+def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
     """Prepare a recording."""
     frames, made = prepared_signals.make(folder, job, index)
     return count(frames, job), made
 
 
-def make(folder: Path, job: Job, index: int, number: int) -> bool:
+def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
     """Translate the frames of a shard unless it is there and whole; returns whether it was made.
 
     Raises TactileError for a damaged prepared file, OSError where the disk cannot be written.
@@ -71,7 +72,7 @@ def make(folder: Path, job: Job, index: int, number: int) -> bool:
     return True
 
 
-def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
+def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int) -> bool:
     """Return true if a whole shard is shard `number` of recording `index`, alone under its name, with these frames."""
     try:
         with open_plain(file) as found:
@@ -80,14 +81,14 @@ def is_of(file: Path, job: Job, index: int, number: int, frames: int) -> bool:
         return False
 
 
-def _identity(job: Job, index: int, number: int, frames: int) -> dict[str, str | int]:
+def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict[str, str | int]:
     """The attributes that distinguish a shard from others."""
     return {
         "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
     }  # fmt: skip
 
 
-def inspect_input(folder: Path, job: Job, index: int) -> InputFacts | None:
+def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts | None:
     """Return the shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     try:

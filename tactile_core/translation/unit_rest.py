@@ -46,17 +46,17 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     if len(recordings) < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
-    by_pressure = all(one.pdc is not None and np.isfinite(one.pdc).all() for one in recordings)
-    if not by_pressure:
+    pressures = [one.pdc for one in recordings if one.pdc is not None and np.isfinite(one.pdc).all()]
+    if len(pressures) < len(recordings):
         levels = np.array([level(_raw(one)) for one in recordings])
         low, middle, high = np.percentile(levels, [25, 50, 75], axis=0)
         return UnitRest(middle, (high - low) / 2, None, len(levels))
-    levels, pressed = zip(*map(_least_pressed, recordings), strict=True)
+    levels, pressed = zip(*map(_least_pressed, recordings, pressures), strict=True)
     order = np.argsort(pressed, kind="stable")
     levels, pressed = np.array(levels)[order], np.array(pressed)[order]
     few = max(1, round(LEAST_PRESSED * len(levels)))
     half = levels[: max(2, round(SPREAD_OVER * len(levels)))]
-    tared = any(np.median(one.pdc) < TARED_PDC for one in recordings)  # each to a zero of its own
+    tared = any(np.median(pdc) < TARED_PDC for pdc in pressures)  # each to a zero of its own
     pdc = None if tared else float(pressed[:few].mean())
     return UnitRest(levels[:few].mean(axis=0), np.ptp(half, axis=0) / 2, pdc, few)
 
@@ -77,11 +77,11 @@ def find_rest_sp(recordings: Sequence[Recording]) -> UnitRest:
     return UnitRest(middle, (high - low) / 2, None, contacts)
 
 
-def _least_pressed(recording: Recording) -> tuple[np.ndarray, float]:
+def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:
     """Level (19,) counts of the window of the lowest pressure, and that pressure, counts of PDC."""
     electrodes = _raw(recording)
     n = min(window_frames(recording.rate), len(electrodes))
-    windows = np.convolve(recording.pdc, np.full(n, 1 / n), mode="valid")
+    windows = np.convolve(pdc, np.full(n, 1 / n), mode="valid")
     start = int(np.argmin(windows))
     return level(electrodes[start : start + n]), float(windows[start])
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import msgspec
 
@@ -26,15 +26,18 @@ ADVICE = "Use an empty --out folder"
 MOST = 2**30  # bytes of a job file; one of 10,000 inputs has 2.5 MB
 
 
-class Job(msgspec.Struct, forbid_unknown_fields=True, frozen=True, dict=True):
-    """A job: `inputs` by `recipe`.
+R = TypeVar("R")
+
+
+class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
+    """A job: `inputs` by `recipe`, of the kind that `kinds` does it by.
 
     weights, calibration : folder of the networks, file of the unit, None for the shipped ones; versions : a note
     """
 
     format: str
     inputs: list[Input]
-    recipe: Recipe
+    recipe: R
     weights: str | None
     calibration: str | None
     versions: dict[str, str]
@@ -50,7 +53,7 @@ def _hash(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def make(inputs: list[Input], recipe: Recipe, weights: str | None, calibration: str | None = None) -> Job:
+def make(inputs: list[Input], recipe: R, weights: str | None, calibration: str | None = None) -> Job[R]:
     """Create a new job."""
     networks, unit = (None if path is None else os.path.abspath(path) for path in (weights, calibration))
     return Job(FORMAT, inputs, recipe, networks, unit, provenance.versions())
@@ -79,7 +82,7 @@ def read(folder: Path) -> Job:
     """Read the job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
     file = folder / FILE
     try:
-        job = msgspec.convert(json.loads(read_small(file, MOST)), Job)
+        job = msgspec.convert(json.loads(read_small(file, MOST)), Job[Recipe])
     except OSError as error:
         found, advice = f"cannot be read ({error.strerror or error})", "Begin one: tactile batch RECORDINGS --out DIR"
         raise TactileError(file, found, "the folder of a job", advice) from error

@@ -14,14 +14,14 @@ from __future__ import annotations
 import dataclasses
 import importlib
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from . import recipes
 
 if TYPE_CHECKING:
     from .job import Job
 
-MODULES = {
+MODULES: dict[Any, str] = {
     recipes.Translate: "translate_shards", recipes.Pairs: "pairs",
     recipes.Simulate: "simulate", recipes.Render: "render_shards",
 }  # fmt: skip

@@ -20,6 +20,9 @@ MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than any
 PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
 
 
+Law = Literal["sheet", "gap"]  # of electrodes
+
+
 class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Options of ``recordings.PrepareOptions``, with the same meanings."""
 
@@ -71,10 +74,10 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     seed: int
     surfaces: list[str]
     files: list[str]
-    electrodes: Literal["sheet", "gap"] = "sheet"
+    electrodes: Law = "sheet"
     source: str = SOURCE
     target: str = TARGET
-    keep: list[Literal["traction"]] = []
+    keep: list[str] = []
     version: str = __version__
 
 
@@ -89,7 +92,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
     values: list[dict[str, float | str]]
     files: list[str]
     keep: list[str]
-    electrodes: Literal["sheet", "gap"] = "sheet"
+    electrodes: Law = "sheet"
     version: str = __version__
 
 

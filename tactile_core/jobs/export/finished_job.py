@@ -113,7 +113,7 @@ def load(folder: Path) -> Finished:
     return Finished(folder, job.id, tuple(recordings), status.aside, manifest.warnings(folder))
 
 
-def _check(path: Path, job: Job, index: int, number: int, frames: int) -> None:
+def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int) -> None:
     """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)

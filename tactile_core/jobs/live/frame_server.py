@@ -82,7 +82,8 @@ class FrameServer:
             reader.sendall(GREETING + READY)
             while True:
                 with self._news:
-                    self._news.wait_for(lambda last=sent: self._closed or self._sent > last)
+                    while not (self._closed or self._sent > sent):
+                        self._news.wait()
                     content, sent = self._message, self._sent
                 if self._closed:
                     break

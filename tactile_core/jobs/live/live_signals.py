@@ -109,17 +109,22 @@ class LiveSignals:
     def _look(self) -> None:
         """Look at what the frames show."""
         self._looked_at = len(self._seen)
-        change = self._seen - self.rest
+        change = self._seen - self._known_rest()
         still = np.sqrt(np.square(change).sum(axis=1)) < TOUCHING
         pdc = self._pdc if np.isfinite(self._pdc).all() else None
         self.polarity = polarity_of(change, still, self._seen, pdc, sensor=self._sensor)
 
+    def _known_rest(self) -> np.ndarray:
+        if self.rest is None:
+            raise ValueError("no rest is known yet")
+        return self.rest
+
     def signals(self, electrodes: np.ndarray) -> Signals:
         """Return the signals of frames (T, 19) counts; call when rest is known."""
         flags = Flag.RECTIFIED if self.kind == "rectified" else 0
-        count = len(electrodes)
+        count, rest = len(electrodes), self._known_rest()
         signals = Signals(
-            change=self.polarity.sign * (electrodes - self.rest), rest=self.rest, drift=np.zeros_like(self.rest),
+            change=self.polarity.sign * (electrodes - rest), rest=rest, drift=np.zeros_like(rest),
             electrodes=electrodes, kind=self.kind,
             quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
             warnings=(), report={}, sensor=self._sensor,
