@@ -42,7 +42,7 @@ def test_the_front_holds_what_nothing_beats_in_both(script):
 
 
 def test_a_promise_counts_what_stayed_below(script):
-    from benchmarks.table.promise import Promise
+    from benchmarks.table.promised import Promise
 
     promise = Promise("x", "um", np.array([2.0, 2, 2, 2]), np.array([1.0, 1, 1, 3]), list("aabb"), "four")
     assert promise.covered() == 0.75 and promise.row()["ok"] is None

@@ -16,9 +16,14 @@ named. Needs the extras [fem] and [render].
 from __future__ import annotations
 
 import argparse
+import concurrent.futures
+import importlib
+import multiprocessing
 import os
 import sys
 import tempfile
+import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -26,10 +31,13 @@ for _threads in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
     os.environ[_threads] = "1"  # of this process and of those it starts: times are of one core
 
 from benchmarks.table.method import Method  # noqa: E402
-from benchmarks.table.stage_processes import STAGES, measured  # noqa: E402
 from tactile_core.accuracy import HEADER, failed, line  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
+
+STAGES = ("mechanics", "translation", "pictures", "chain", "photographs")
+WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
+LEAVE_TRUTH = ("pictures", "chain")  # whose first method leaves the truth that the others are measured against
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -77,6 +85,37 @@ def main(arguments: list[str] | None = None) -> int:
     return int(bool(failed(rows)))
 
 
+def stage_measured(
+    stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
+) -> Iterator[Method]:
+    """Measure every method of a stage; those that cannot run here are noted in ``missing``.
+
+    file : where the first method of pictures and chain leaves the others' truth; the photographs
+    only : words that name a stage, or a stage and a method; none for all
+    """
+    names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
+    wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
+    if wanted and stage in LEAVE_TRUTH:
+        wanted = list(dict.fromkeys([names[0], *wanted]))
+    for name in wanted:
+        began = time.perf_counter()
+        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            try:
+                found = pool.submit(one_measured, stage, name, quick, file).result()
+            except ModuleNotFoundError as error:
+                missing[f"{stage} {name}"] = f"no {error.name}"
+                continue
+        print(f"{stage} {name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+        if found is not None:
+            yield found
+
+
+def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
+    """Measure one method, in a process of its own, so that its memory and its first call are its own."""
+    measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
+    return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)
+
+
 def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
     """Measure every method of every requested stage."""
     methods = []
@@ -86,5 +125,5 @@ def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[M
             if file is None:
                 missing[stage] = "no PRESSES given"
             else:
-                methods += measured(stage, options.quick, file, missing, options.only)
+                methods += stage_measured(stage, options.quick, file, missing, options.only)
     return methods

@@ -52,11 +52,6 @@ def soft_to_choose_by(files: list[Path]) -> list[Path]:
     return [path for path in files if _trial(path) in CHOOSING and not path.name.startswith(HARD)]
 
 
-def hard_to_choose_by(files: list[Path]) -> list[Path]:
-    """Grips of hard flat objects in the trials that may be looked at."""
-    return [path for path in files if _trial(path) in CHOOSING and path.name.startswith(HARD)]
-
-
 def hard_to_report(files: list[Path]) -> list[Path]:
     """Grips of hard flat objects in the trials that nothing was chosen by."""
     return [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
