@@ -1,4 +1,4 @@
-"""Measure contacts in a simulator's loop: alone and along paths, with and without the extra [fast], and their pictures.
+"""Measure contacts in a simulator's loop: alone and along paths, their pictures, and whole steps of a ``Gel``.
 
     python scripts/benchmarks/measure_loop.py --count 500 --markdown FILE --json FILE   docs/in_the_loop.md's
     python scripts/benchmarks/measure_loop.py --count 18                                  a quick look
@@ -6,17 +6,14 @@
 Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
 same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
 to the goal and five slides of 0.1 mm along the finger. Median, 95 and 99 % of CPU and wall ms a contact on one core,
-warm; both ways of computing take turns by contact, so that a busy machine slows both. Beside them the error: of the
-fast tier against the full one (`mechanics_tiers.json`), and how far what is compiled lies from numpy. Needs the extras
-[fem] and [fast].
+warm. Beside them the fast tier's error against the full one (`mechanics_tiers.json`). Needs the extras [fem], [fast].
 """
 
 from __future__ import annotations
 
-import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +45,6 @@ STEPS, SEED = 10, 20261125
 SLIDE = 0.1e-3  # m a step
 LEVELS = (0.5, 0.95, 0.99)
 WARM = 9  # contacts before the first that counts, one of each indenter
-HOW = ("numpy", "compiled")
 Times = list[tuple[float, float]]  # CPU and wall, ms
 
 
@@ -64,14 +60,12 @@ def main(arguments: list[str] | None = None) -> int:
     rows, table = (
         [],
         [
-            "| | way | CPU ms: median | 95 % | 99 % | wall ms: median | 95 % | 99 % | error |",
-            "|---|---|---|---|---|---|---|---|---|",
+            "| | CPU ms: median | 95 % | 99 % | wall ms: median | 95 % | 99 % | error |",
+            "|---|---|---|---|---|---|---|---|",
         ],
     )
     for name, times, error in all_measured(options.count):
-        for how in HOW:
-            middle = quantiles(times[how])
-            table.append(f"| {name} | {how} | {' | '.join(f'{each:.3g}' for each in middle)} | {error[how]} |")
+        table.append(f"| {name} | {' | '.join(f'{each:.3g}' for each in quantiles(times))} | {error} |")
         rows += as_rows(name, times, error)
     printed(rows)
     print("\n".join(table))
@@ -85,103 +79,74 @@ def quantiles(times: Times) -> list[float]:
     return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
 
-def as_rows(name: str, times: dict[str, Times], error: dict[str, str]) -> list[Row]:
-    """Make six rows for each way of computing."""
-    rows = []
-    for how in HOW:
-        key = f"loop_{name.replace(', ', '_').replace(' ', '_')}_{how}"
-        of = f"{len(times[how])} contacts, one core; error {error[how]}"
-        labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
-        for label, value in zip(labels, quantiles(times[how]), strict=True):
-            rows.append(row(f"{key}_{label}", value, "ms", of=of))
-    return rows
+def as_rows(name: str, times: Times, error: str) -> list[Row]:
+    """Make six rows."""
+    of = f"{len(times)} contacts, one core; error {error}"
+    labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
+    key = f"loop_{name.replace(', ', '_').replace(' ', '_')}"
+    return [row(f"{key}_{label}", value, "ms", of=of) for label, value in zip(labels, quantiles(times), strict=True)]
 
 
-def all_measured(count: int):  # noqa: ANN201
-    """Yield a name, times by way, and the error by way in words."""
+def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
+    """Yield a name, times and the error in words."""
     for sensor in ("digit", "biotac"):
         for name, times, error, last in of_sensor(sensor, count):
             yield name, times, error
             if sensor == "digit" and name.endswith("path"):
                 yield from pictures(last)
-    yield gel_steps(count)
+    yield "digit, step and picture", gel_steps(count), "see above"
 
 
-def of_sensor(sensor: str, count: int):  # noqa: ANN201
+def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
     """Yield the same of a sensor's contacts alone and on paths, and the contacts at the paths' ends."""
     tier = measured()["tiers"]["fast"][sensor]["bins"][1]
     stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
     for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
-        times, apart, last = measure(sensor, steps, contacts)
-        error = {"numpy": stated, "compiled": f"{np.quantile(apart, 0.99):.2g} um from numpy in 99 of 100"}
-        yield f"{sensor}, {name}", times, error, last
+        times, last = measure(sensor, steps, contacts)
+        yield f"{sensor}, {name}", times, stated, last
 
 
-def measure(sensor: str, steps: int, count: int) -> tuple[dict[str, Times], list[float], list[FastContact]]:
-    """Times by way of random contacts, how far both ways lie apart, um, and the contacts at the ends of their paths."""
-    times: dict[str, Times] = {how: [] for how in HOW}
-    apart, last = [], []
+def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact]]:
+    """Times of random contacts, and the contacts at the ends of their paths."""
+    times: Times = []
+    last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):
         pose = pose_at(sensor, contact.indenter, contact.place)
         thick = thickness_under(sensor, contact.indenter, pose)
-        found: dict[str, list[FastContact | None]] = {}
-        for how in HOW:
-            switch(how)
-            press = CorrectedPress(compliance_of(sensor), contact.indenter, pose, DEPTH_LIMIT * thick, FRICTION)
-            found[how] = []
-            for step in range(1, steps + 1):
-                took, solved = timed(lambda p=press, d=contact.depth * thick * step / steps: at_depth(p, d))
-                found[how].append(solved)
-                if number >= WARM and (step > 1 or steps == 1):
-                    times[how].append(took)
-        for plain, fast in zip(*found.values(), strict=True):
-            if plain and fast:
-                apart.append(1e6 * np.abs(plain.corrected.displacement - fast.corrected.displacement).max())
-        last += [each for each in found["compiled"][-1:] if each]
-    return times, apart, last
+        press = CorrectedPress(compliance_of(sensor), contact.indenter, pose, DEPTH_LIMIT * thick, FRICTION)
+        for step in range(1, steps + 1):
+            took, solved = timed(lambda p=press, d=contact.depth * thick * step / steps: at_depth(p, d))
+            if number >= WARM and (step > 1 or steps == 1):
+                times.append(took)
+        last += [solved] if solved else []
+    return times, last
 
 
-def pictures(contacts: list[FastContact]):  # noqa: ANN201
-    """Yield the height map's and the fast picture's times and how far the two ways lie apart."""
+def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
+    """Yield the height map's and the fast picture's times."""
     renderer = Renderer(preset="fast")
     mapper = gel_mapper(renderer.camera)
-    heights: dict[str, Times] = {how: [] for how in HOW}
-    shading: dict[str, Times] = {how: [] for how in HOW}
-    apart, levels = [], []
+    heights: Times = []
+    shading: Times = []
     for contact in contacts:
-        maps, seen = [], []
-        for how in HOW:
-            switch(how)
-            with folds_counted():
-                took, height = timed(lambda c=contact: mapper(c.corrected.displacement))
-            heights[how].append(took)
-            took, picture = timed(lambda h=height: renderer(h))
-            shading[how].append(took)
-            maps.append(height)
-            seen.append(picture.astype(int))
-        apart.append(1e6 * np.abs(maps[0] - maps[1]).max())
-        levels.append(np.abs(seen[0] - seen[1]).max())
-    yield "digit, height map", heights, {"numpy": "0.1 um", "compiled": f"{max(apart):.2g} um from numpy"}
-    yield "digit, fast picture", shading, {"numpy": "see optics.md", "compiled": f"{max(levels)} levels from numpy"}
+        with folds_counted():
+            took, height = timed(lambda c=contact: mapper(c.corrected.displacement))
+        heights.append(took)
+        shading.append(timed(lambda h=height: renderer(h))[0])
+    yield "digit, height map", heights, "0.1 um"
+    yield "digit, fast picture", shading, "see optics.md"
 
 
-def gel_steps(count: int) -> tuple[str, dict[str, Times], dict[str, str]]:
-    """Time whole steps of a ``Gel`` along paths, with their pictures: name, times by way, error by way in words."""
-    times: dict[str, Times] = {how: [] for how in HOW}
-    levels = []
+def gel_steps(count: int) -> Times:
+    """Time whole steps of a ``Gel`` along paths, with their pictures."""
+    times: Times = []
     for number, contact in enumerate(random_contacts(-(-count // STEPS) + WARM, SEED)):
-        seen: dict[str, list[np.ndarray]] = {how: [] for how in HOW}
-        for how in HOW:
-            switch(how)
-            gel = Gel("digit", contact.indenter)
-            for step, pose in enumerate(pressed_and_slid(contact)):
-                took, picture = timed(lambda g=gel, p=pose: (g.press(p), g.picture())[1])
-                seen[how].append(picture.astype(int))
-                if number >= WARM and step:
-                    times[how].append(took)
-        levels.append(np.abs(np.subtract(*seen.values())).max())
-    error = f"{np.quantile(levels, 0.9):.0f} levels from numpy on 9 of 10 paths"
-    return "digit, step and picture", times, {"numpy": "see above", "compiled": error}
+        gel = Gel("digit", contact.indenter)
+        for step, pose in enumerate(pressed_and_slid(contact)):
+            took, _ = timed(lambda g=gel, p=pose: (g.press(p), g.picture()))
+            if number >= WARM and step:
+                times.append(took)
+    return times
 
 
 def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
@@ -196,12 +161,6 @@ def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
         matrix[0, 3] += SLIDE * max(step - half, 0)
         poses.append(matrix)
     return poses
-
-
-def switch(how: str) -> None:
-    """Compute by numpy alone, or compiled."""
-    os.environ[compiled.SWITCH] = "1" if how == "compiled" else "0"
-    compiled.available.cache_clear()
 
 
 def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:

@@ -50,7 +50,7 @@ def measure(name: str, quick: bool) -> Method:
     if tier == "fast":
         more += _on_test_contacts(sensor, quick)
         loop = _in_the_loop(sensor, quick)
-        took = next((each["value"] for each in loop if each["name"].endswith("alone_compiled_cpu")), took)
+        took = next((each["value"] for each in loop if each["name"].endswith("alone_cpu")), took)
         more += loop
     return Method("mechanics", name, took, mb, 1e6 * shape, "um", 1e6 * baseline, of, tuple(more))
 
@@ -76,7 +76,7 @@ def _reference(sensor: str, quick: bool) -> Method:
 
 
 def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
-    """Times of random contacts with friction, alone and on paths, by numpy and compiled (with the extra [fast])."""
+    """Times of random contacts with friction, alone and on paths (with the extra [fast])."""
     from benchmarks import measure_loop
 
     if not compiled.available():
