@@ -28,14 +28,14 @@ RIDGE = 0.1  # of their unit vectors' products: neighbours are alike, and their 
 FEWEST = 13  # different contacts: one press and its noise are like up to a dozen, and fewer hardly show a wrong gain
 # Share of a change left over, LEFT + MORE / sqrt(different contacts), that 199 of 200 recordings of units with the
 # right law stay below: simulated contacts of even presses, gains 10 % apart, noise of 1.5 counts, by
-# `wrong_laws.py --fit`.
+# `wrong_laws.py --fit`, commit d537259.
 LEFT, MORE = 0.1696, 0.3033
 # Likeness of contacts below which they are counted as apart; of fewer, neither gains nor exchanges say anything: within
 # one contact, what is unlike simulated ones is explained by both (up to .14 of it in single grips of real fingers).
 APART, FEWEST_APART = 0.95, 8
 # Shares of a change that must be explained by fitted gains, and by an exchange; and how far the gains are apart, root
-# mean square of their logarithms. Chosen on other contacts than those reported (`wrong_laws.py --fit`): from 20 on, 398
-# of 400 recordings of units as simulated stay below .003 by exchanges, and as many below one of the limits of gains.
+# mean square of their logarithms. Chosen likewise, on other contacts than those reported: from 20 on, 398 of 400
+# recordings of units as simulated stay below .003 by exchanges, and as many below one of the limits of gains.
 GAINED, SPREAD, EXCHANGED = 0.02, 0.2, 0.015
 PRIOR = 2.0  # contacts' worth of belief in gain 1
 FITS = 2  # one after the other, since belief in gain 1 leaves each of them short

@@ -18,7 +18,7 @@ from tactile_core.sensors import PRESSURE_PER_COUNT
 
 
 def share_doubted(law, contacts, recordings=60):
-    found = wrong_laws.recordings(True, contacts, law, seed=2)[:recordings]
+    found = wrong_laws.recordings(contacts, law, seed=2)[:recordings]
     return np.mean([bool(contact_law.doubt(*each)) for each in found])
 
 
@@ -35,7 +35,7 @@ def test_twenty_contacts_show_wrong_gains_and_exchanged_electrodes(law):
 
 @pytest.mark.parametrize("pair", [(0, 5), (3, 12), (7, 16)])
 def test_the_electrodes_that_are_exchanged_are_named(pair):
-    change = wrong_laws.touches(odd=True)[0]
+    change = wrong_laws.touches()[0]
     change = change[contact_law.touching(change)]
     change[:, pair] = change[:, pair[::-1]]
     less, found = contact_law.exchanged_share(change)
@@ -46,7 +46,7 @@ def test_the_electrodes_that_are_exchanged_are_named(pair):
 def test_one_contact_unlike_simulated_ones_says_nothing_of_gains_and_exchanges():
     """Within one grip of a real finger, gains and exchanges explain what makes it unlike simulated contacts."""
     noise = wrong_laws.NOISE * np.random.default_rng(0).standard_normal((200, 19))
-    grip = wrong_laws.touches(odd=True)[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
+    grip = wrong_laws.touches()[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
     assert contact_law.apart(grip) < contact_law.FEWEST_APART and contact_law.exchanged_share(grip)[0] > 0
     assert reason_of(contact_law.doubt(grip)) not in (Reason.LAW_GAINS, Reason.LAW_EXCHANGED)
 
@@ -56,7 +56,7 @@ def test_contacts_as_simulated_are_not_doubted():
 
 
 def test_a_skin_of_half_the_stiffness_is_seen_by_the_fluid_s_pressure_alone():
-    change, pressure, _ = wrong_laws.touches(odd=True)
+    change, pressure, _ = wrong_laws.touches()
     contact = contact_law.touching(change)
     change, pressure = change[contact], pressure[contact]
     assert contact_law.doubt(change) is contact_law.doubt(change, pressure) is None
@@ -84,7 +84,7 @@ def signals_of(change, pdc=None):
 
 
 def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
-    change = wrong_laws.touches(odd=True)[0]
+    change = wrong_laws.touches()[0]
     gain = np.where(np.arange(19) % 4 == 0, 2.5, 1.0)
     doubted = signals_of(change * gain)
     contact = contact_law.touching(change * gain)
@@ -98,7 +98,7 @@ def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
 
 
 def test_pressure_is_not_judged_where_its_rest_is_a_guess():
-    change, pressure, _ = wrong_laws.touches(odd=True)
+    change, pressure, _ = wrong_laws.touches()
     doubted = signals_of(change, pressure / 2 / PRESSURE_PER_COUNT)
     assert (doubted.flags & Flag.LAW_DOUBTED).any() and "pressure" in doubted.warnings[0]
     guessed = doubt_law(dataclasses.replace(doubted, flags=0 * doubted.flags + np.uint16(Flag.NO_QUIET_PART)))

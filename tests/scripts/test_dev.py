@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import os
 import re
 import subprocess
@@ -12,6 +11,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from by_path import module_at
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "scripts" / "dev.py"
@@ -19,10 +19,7 @@ SCRIPT = ROOT / "scripts" / "dev.py"
 
 @pytest.fixture
 def dev():
-    spec = importlib.util.spec_from_file_location("dev", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_at(SCRIPT)
 
 
 @pytest.fixture

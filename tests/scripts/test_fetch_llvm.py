@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 
 import pytest
+from by_path import module_at
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "fetch_llvm.py"
 
 
 @pytest.fixture
 def fetch():
-    spec = importlib.util.spec_from_file_location("fetch_llvm", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_at(SCRIPT)
 
 
 def test_what_is_unpacked_is_found(fetch, tmp_path, capsys):

@@ -43,7 +43,7 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
     """Medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)."""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
-    answers |= _metrics("nearest", *_nearest(pairs, change), pairs, slice(None), bodies)
+    answers |= _metrics("nearest", *nearest_example(pairs, change), pairs, slice(None), bodies)
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
         for metric in ("place_mm", "force_size_percent", "peak_percent", "iou"):
@@ -197,7 +197,7 @@ def _metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: 
     }
 
 
-def _nearest(pairs: Pairs, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def nearest_example(pairs: Pairs, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Gel (C, M, 3) m and force (C,) N of the nearest example to each signal, scaled to its size."""
     length = np.sqrt(np.square(change).sum(-1))
     known = np.sqrt(np.square(pairs.signal).sum(-1))

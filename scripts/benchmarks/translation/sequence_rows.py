@@ -51,7 +51,7 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
         found.append(_row(f"sequence_{metric}", metric, both, slice(None), of, unit, TARGETS[metric]))
         for which, name in enumerate(MOTIONS):
             found.append(_row(f"sequence_{metric}", metric, both, kind == which, name, unit))
-    value, baseline = (_quantile(each["place"], 90) for each in (followed, alone))
+    value, baseline = (quantile(each["place"], 90) for each in (followed, alone))
     found.append(row("sequence_place_90", value, "mm", baseline=baseline, of=f"{len(kind)} frames"))
     of = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
     return [*found, *_rows_of("sequence_rest_off", measured(network, truth, REST_OFF), of)]
@@ -125,11 +125,11 @@ def _row(
     name: str, metric: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
     target: float | None = None,
 ) -> Row:  # fmt: skip
-    value, baseline = (_quantile(each[metric][some], 50) for each in both)
+    value, baseline = (quantile(each[metric][some], 50) for each in both)
     return row(name, value, unit, target, baseline=baseline, of=of, at_least=metric == "iou")
 
 
-def _quantile(values: np.ndarray, level: int) -> float | None:
+def quantile(values: np.ndarray, level: int) -> float | None:
     """The value that so many per cent stay below; None where that is a lost contact."""
     found = float(np.nanpercentile(values, level, method="higher"))
     return found if np.isfinite(found) else None

@@ -1,18 +1,14 @@
 """Measure whether recordings of a wrong law are doubted, and how often right ones are.
 
     python scripts/benchmarks/translation/wrong_laws.py --json FILE     the table of docs/accuracy.md
-    python scripts/benchmarks/translation/wrong_laws.py --fit           what limits are chosen by, on other presses
-    python scripts/benchmarks/translation/wrong_laws.py --fit PAIRS.h5  the same of gains and exchanges, on new presses:
-        tactile pairs scenes/training --count 1500 --seed 77 --out PAIRS.h5
 
 A recording is so many simulated contacts of one unit, out of ``scenes/training/test_contacts.h5``, whose gains are 10 %
-apart, with 1.5 counts of noise. Even presses are for choosing the limits, odd ones are reported. A doubted recording is
-flagged in all frames in contact, so shares of recordings are shares of frames.
+apart, with 1.5 counts of noise. Even presses chose the limits (``--fit`` of commit d537259), odd ones are reported. A
+doubted recording is flagged in all frames in contact, so shares of recordings are shares of frames.
 """
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -23,9 +19,9 @@ sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 import h5py  # noqa: E402
 import numpy as np  # noqa: E402
 
+from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
 from benchmarks.translation.noise import GAIN, NOISE  # noqa: E402
-from tactile_core.accuracy import HEADER, Row, line, row  # noqa: E402
-from tactile_core.files import atomic  # noqa: E402
+from tactile_core.accuracy import Row, row  # noqa: E402
 from tactile_core.recordings import contact_law  # noqa: E402
 from tactile_core.sensors import PRESSURE_PER_COUNT  # noqa: E402
 from tactile_core.translation.simulated_likeness import residual_shares, unlike  # noqa: E402
@@ -34,8 +30,6 @@ CONTACTS = 5, 10, 20, 40, 100
 FRAMES = 20  # of each recording whose frames are judged one by one
 UNITS = 400  # recordings a law and number of contacts
 TARGET, ALARMS, FROM = 0.9, 0.05, 20  # shares of recordings; contacts from which on they are asked for
-CHOSEN = 0.005  # share of right recordings beyond the limit of what is left over, so that others stay below ALARMS
-A_PRESS = 3  # contacts, at most, of a press of new pairs: the test set has as many
 OFFSET, CHANNELS, FACTOR = 40.0, 4, 2.0  # counts of rest; channels whose gain is so many times as large
 PDC = 1.5  # counts of noise of the fluid's pressure (assumed, as the electrodes')
 SOFTER = 0.5  # of the skin's modulus: the same dents at so much of the pressure, in linear elasticity
@@ -45,20 +39,8 @@ Law = Callable[[np.ndarray, np.ndarray, np.random.Generator], Touches]
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--fit", nargs="?", const="", metavar="PAIRS", help="find limits on presses not reported")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
-    options = parser.parse_args(arguments)
-    if options.fit is not None:
-        print("LEFT, MORE = {:.4f}, {:.4f}".format(*fit()))
-        chosen = touches(odd=False)[:2] if not options.fit else new_touches(Path(options.fit))
-        print("\n".join(reached(chosen)))
-        return 0
-    rows = measured()
-    print("\n".join([HEADER, *map(line, rows)]))
-    if options.json:
-        atomic.write_json(options.json, rows)
-    return int(any(not each["ok"] for each in rows))
+    options = parser_of(__doc__).parse_args(arguments)
+    return finished(printed(measured()), options.json)
 
 
 def inverted(change: np.ndarray, pressure: np.ndarray, random: np.random.Generator) -> Touches:
@@ -102,34 +84,19 @@ WRONG: dict[str, Law] = {
 }  # fmt: skip
 
 
-def touches(odd: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Changes (n, 19) counts, pressures (n,) Pa and presses (n,) of the test set's contacts, of odd or even presses."""
+def touches() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Changes (n, 19) counts, pressures (n,) Pa and presses (n,) of the test set's contacts, of odd presses."""
     with h5py.File(ROOT / "scenes" / "training" / "test_contacts.h5", "r") as file:
         press = file["press"][:]
-        chosen = press % 2 == int(odd)
+        chosen = press % 2 == 1
         change, pressure = (file[name][:].astype(float)[chosen] for name in ("signal", "pressure"))
         return change, pressure, press[chosen]
 
 
-def new_touches(pairs: Path) -> Touches:
-    """Changes and pressures of new pairs, A_PRESS contacts of each press."""
-    with h5py.File(pairs) as file:
-        press, held = file["press"][:], [file[name][:].astype(float) for name in ("signal", "pressure")]
-    random = np.random.default_rng(0)
-    rows = [np.flatnonzero(press == each) for each in np.unique(press)]
-    chosen = np.concatenate([random.choice(of, min(A_PRESS, len(of)), replace=False) for of in rows])
-    return held[0][np.sort(chosen)], held[1][np.sort(chosen)]
-
-
-def recordings(odd: bool, contacts: int, law: Law, seed: int) -> list[Touches]:
-    """Contacts of UNITS recordings of the test set's presses, each of a unit with gains of its own."""
-    return drawn(touches(odd)[:2], contacts, law, seed)
-
-
-def drawn(known: Touches, contacts: int, law: Law, seed: int) -> list[Touches]:
-    """Contacts of UNITS recordings of known ones, each of a unit with gains of its own."""
+def recordings(contacts: int, law: Law, seed: int) -> list[Touches]:
+    """Contacts of UNITS recordings of the test set's odd presses, each of a unit with gains of its own."""
     random, found = np.random.default_rng([seed, contacts]), []
-    change, pressure = known
+    change, pressure, _ = touches()
     for _ in range(UNITS):
         gain = 1 + GAIN * random.standard_normal(change.shape[1])
         chosen = random.choice(len(change), min(contacts, len(change)), replace=False)
@@ -141,38 +108,11 @@ def drawn(known: Touches, contacts: int, law: Law, seed: int) -> list[Touches]:
     return found
 
 
-def fit() -> tuple[float, float]:
-    """LEFT and MORE, by least squares over contacts of what all but CHOSEN of right recordings stay below."""
-    counts, levels = [], []
-    for contacts in CONTACTS:
-        left = [contact_law.unexplained_share(each) for each, _ in recordings(False, contacts, right, seed=1)]
-        levels.append(float(np.quantile([share for share, _ in left], 1 - CHOSEN)))
-        counts.append(float(np.mean([different for _, different in left])))
-    more, base = np.polyfit(1 / np.sqrt(counts), levels, 1)
-    return float(base), float(more)
-
-
-def reached(known: Touches) -> list[str]:
-    """Lines of what exchanges explain, and how often gains explain enough, in recordings of FROM contacts and more."""
-    lines = []
-    for contacts in (each for each in CONTACTS if each >= FROM):
-        for law in (right, doubled, swapped):
-            of = [each for each, _ in drawn(known, contacts, law, seed=1)]
-            shares = np.array([(contact_law.exchanged_share(each)[0], *contact_law.gained_share(each)) for each in of])
-            both = (shares[:, 1] > contact_law.GAINED) & (shares[:, 2] > contact_law.SPREAD)
-            low, high = np.quantile(shares[:, 0], [0.05, 0.995])
-            lines.append(
-                f"{contacts} contacts, {law.__name__}: exchanges explain {low:.3f} to {high:.3f} (5 to 99.5 of 100),"
-                f" gains are beyond both limits in {both.mean():.1%}"
-            )
-    return lines
-
-
 def measured() -> list[Row]:
     """Shares of frames that are unexplained, by law, and of recordings that are doubted, by number of contacts too."""
     rows = []
     for name, law in ({"right": right} | WRONG).items():
-        seen = np.concatenate([each for each, _ in recordings(True, FRAMES, law, seed=3)])
+        seen = np.concatenate([each for each, _ in recordings(FRAMES, law, seed=3)])
         share = unlike(residual_shares(seen, np.zeros(len(seen), bool))).mean()
         of = f"{len(seen)} frames, each judged alone"
         rows.append(row(f"unexplained_{name}", 100 * float(share), "%", of=of))
@@ -180,7 +120,7 @@ def measured() -> list[Row]:
         asked, of = contacts >= FROM, f"{UNITS} recordings of {contacts} contacts"
         for name, law in ({"right": right} | WRONG).items():
             doubted = 100 * float(
-                np.mean([bool(contact_law.doubt(*each)) for each in recordings(True, contacts, law, seed=2)])
+                np.mean([bool(contact_law.doubt(*each)) for each in recordings(contacts, law, seed=2)])
             )
             wrong = law is not right
             target = 100 * (TARGET if wrong else ALARMS) if asked else None

@@ -59,7 +59,7 @@ def test_the_nearest_example_is_of_another_press_and_as_strong_as_the_signal():
     pairs = types.SimpleNamespace(
         signal=signal, press=np.array([0, 0, 1]), displacement_digit=gel, scale_digit=1e-6, force=force
     )
-    moved, load = contact_rows._nearest(pairs, 2 * signal)
+    moved, load = contact_rows.nearest_example(pairs, 2 * signal)
     factor = 200 / 50  # the first signal's size over that of the only contact of another press
     assert load[0] == pytest.approx(factor * 3)
     np.testing.assert_allclose(moved[0, :, 1], factor * 3e-6, rtol=1e-5)

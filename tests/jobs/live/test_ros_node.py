@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -10,6 +9,7 @@ from types import ModuleType, SimpleNamespace
 import fake_tools
 import numpy as np
 import pytest
+from by_path import module_at
 
 pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
 
@@ -53,10 +53,7 @@ class Node:
 
 @pytest.fixture
 def script():
-    spec = importlib.util.spec_from_file_location("ros_node", NODE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_at(NODE)
 
 
 def a_press(frames: int) -> SimpleNamespace:
