@@ -1,4 +1,4 @@
-"""Mitsuba's pictures: exact zeros, Lambert's law, symmetry, repeats, variants, bad input."""
+"""Pictures of every preset: exact zeros, Lambert's law, symmetry, repeats, variants, bad input."""
 
 from __future__ import annotations
 
@@ -46,8 +46,9 @@ def test_a_point_light_over_a_plane_is_lambert(variant, small):
         np.testing.assert_allclose(radiance[..., led.channel], unit.facing[led.channel] * expected, rtol=2e-3)
 
 
-def test_each_led_dims_in_its_own_shadow_alone(any_variant, small, press):
-    renderer = Renderer(small, "standard", any_variant)
+@pytest.mark.parametrize("preset", ["fast", "standard"])
+def test_each_led_dims_in_its_own_shadow_alone(preset, any_variant, small, press):
+    renderer = Renderer(small, preset, any_variant)
     change = (renderer.radiance(press.on(small.camera)) - renderer.rest_radiance) / small.facing
     right, down = np.meshgrid(small.camera.right, small.camera.down)
     for led in small.leds:
@@ -82,7 +83,7 @@ def test_a_mirrored_scene_makes_the_mirrored_picture(any_variant, small):
         leds=tuple(dataclasses.replace(led, position=(-led.position[0], *led.position[1:])) for led in small.leds),
     ).with_gain(small.gain)
     one, other = Press(right=1.2e-3), Press(right=-1.2e-3)
-    for preset in ("standard", "quality"):
+    for preset in ("fast", "standard", "quality"):
         left = Renderer(small, preset, any_variant, rest=flat).radiance(one.over(flat, small.camera))
         right = Renderer(mirrored, preset, any_variant, rest=flat).radiance(other.over(flat, small.camera))
         difference = levels(small, left - right[:, ::-1])
@@ -92,13 +93,14 @@ def test_a_mirrored_scene_makes_the_mirrored_picture(any_variant, small):
         assert np.abs(difference.mean()) < 0.05  # of 60: pixels' points are turned in fours, which is not mirrored
 
 
-def test_a_dent_that_moves_takes_its_picture_along(any_variant, small):
+@pytest.mark.parametrize("preset", ["fast", "standard"])
+def test_a_dent_that_moves_takes_its_picture_along(preset, any_variant, small):
     far = dataclasses.replace(
         small, camera=dataclasses.replace(small.camera, apparent_height=1.0),
         leds=tuple(dataclasses.replace(led, position=tuple(20 * c for c in led.position)) for led in small.leds),
     ).with_gain(small.gain)  # fmt: skip
     flat, camera = np.zeros(small.camera.shape, np.float32), far.camera
-    renderer = Renderer(far, "standard", any_variant, rest=flat)
+    renderer = Renderer(far, preset, any_variant, rest=flat)
     step = camera.pixel_size[0]
     one = renderer.radiance(Press(0.4e-3, 0, 0, soft=0.1e-3).over(flat, camera)) - renderer.rest_radiance
     moved = renderer.radiance(Press(0.4e-3, -6 * step, 8 * step, soft=0.1e-3).over(flat, camera))
