@@ -110,7 +110,6 @@ def convert(
     Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
     """
     from .. import recordings
-    from ..recordings.fingers import split
 
     if options.error is not None and options.error.um is not None:
         sampling_error.check_gel(tools.drawer.target)
@@ -123,8 +122,7 @@ def convert(
     with clock.stage("prepare"):
         unit = None
         if options.sensor is not None:
-            finger = split(os.fspath(recording_path))[1]
-            unit = options.sensor.gains_for(recording_path, finger, "--sensor", recording.sensor)
+            unit = options.sensor.gains_for(recording_path, recording.section, "--sensor", recording.sensor)
         rows = PreparedRows(recording, frames, answer, options.prepare, unit)
         del recording  # of a long one most rows are not needed any more
     made = FramePass(tools, rows.read, rows.count, options.keep, clock)

@@ -105,7 +105,7 @@ def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signal
     """Prepare each part of a recording; also yields the number of its frames that the part before had."""
     options, source = job.recipe.prepare.options(), job.recipe.source
     sensor = job.recipe.sensor
-    unit = None if sensor is None else sensor.gains_for(path, split(path)[1], "--sensor", source)
+    unit = None if sensor is None else sensor.gains_for(path, split(path).section, "--sensor", source)
 
     def parts() -> Iterator[Recording]:
         return (part.recording for part in read_parts(path, options.columns, source))

@@ -18,7 +18,7 @@ from ..files.toml_text import as_toml
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
-from .fingers import FINGERS, short_of, split
+from .fingers import FINGERS, short_of
 from .signals import Rest, Signals, doubt_law
 
 FORMAT = "tactile-sensor-2"
@@ -74,24 +74,21 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
         return {name: found for name in names if (found := getattr(self, name)) is not None} | (self.topics or {})
 
     def gains_for(
-        self, recording: str | os.PathLike, finger: int | None, where: str | os.PathLike, sensor: str = SOURCE
+        self, recording: str | os.PathLike, section: str, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
-        """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it."""
+        """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it.
+
+        section : of `fingers.split`, or of the Recording
+        """
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
             expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
             raise TactileError(where, found, expected)
-        name = section_of(split(os.fspath(recording)).topic, finger)
         sections = self.sections()
-        if name in sections:
-            return sections[name]
-        found = f"[{'], ['.join(sections)}], and {short_of(recording)} is of {_in_words(finger)}"
-        raise TactileError(where, found, f"a section [{name}]", "Adapt to recordings of that unit")
-
-
-def section_of(topic: str, finger: int | None) -> str:
-    """Return the name of the section of a recording's unit. topic, finger : of `fingers.split`"""
-    return (f"{topic}/" if topic else "") + ("unit" if finger is None else f"finger{finger}")
+        if section in sections:
+            return sections[section]
+        found = f"[{'], ['.join(sections)}], and {short_of(recording)} is of another unit"
+        raise TactileError(where, found, f"a section [{section}]", "Adapt to recordings of that unit")
 
 
 def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> SensorFile:
@@ -99,10 +96,6 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
     topics = {name: unit for name, unit in units.items() if "/" in name}
     plain: dict[str, Any] = {name: unit for name, unit in units.items() if name not in topics}
     return SensorFile(FORMAT, **plain, sensor=sensor, topics=topics or None)
-
-
-def _in_words(finger: int | None) -> str:
-    return "one unit" if finger is None else f"finger {finger}"
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:

@@ -29,6 +29,11 @@ class Chosen(NamedTuple):
         topic = f"_{UNFIT.sub('_', self.topic)}" if self.topic else ""
         return Path(self.file).stem + topic + ("" if self.finger is None else f"_finger{self.finger}")
 
+    @property
+    def section(self) -> str:
+        """Name of its unit's section in a file of `tactile adapt`: ``unit``, ``finger2``, ``left/biotac/finger2``."""
+        return (f"{self.topic}/" if self.topic else "") + ("unit" if self.finger is None else f"finger{self.finger}")
+
 
 def split(path: str) -> Chosen:
     """Split ``hand.bag#2`` or ``hand.bag#left/biotac/finger2``; a path that exists is taken as it is."""
@@ -52,5 +57,5 @@ def short_of(path: str | os.PathLike) -> str:
 
 
 def named(recording: Recording, chosen: Chosen) -> Recording:
-    """Rename a recording by its topic and finger, as `name_of` does."""
-    return dataclasses.replace(recording, name=chosen.name)
+    """Name a recording and its unit by its topic and finger, as `Chosen` does."""
+    return dataclasses.replace(recording, name=chosen.name, section=chosen.section)

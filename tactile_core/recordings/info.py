@@ -10,7 +10,6 @@ import numpy as np
 
 from ..sensors import electrode_count, title, typical_rest
 from .biotac_sp import describe_sp
-from .fingers import split
 from .flags import Flag, names
 from .preparer import Preparer
 from .readers import pac_columns, read, sensor_of
@@ -35,8 +34,7 @@ def describe(
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
     recording = read(path, columns, sensor, lean=True)
-    finger = split(os.fspath(path))[1]
-    gains = None if unit is None else unit.gains_for(path, finger, "--sensor", sensor)
+    gains = None if unit is None else unit.gains_for(path, recording.section, "--sensor", sensor)
     pac = pac_columns(path, columns) if recording.pac is None else recording.pac.shape[1]
     if typical_rest(sensor) is None:
         return describe_sp(os.fspath(path), recording, gains, _channels(recording, pac), _not_taken(recording))

@@ -63,6 +63,7 @@ class Recording(Summary):
 
     name : file name without its extension
     sensor : "biotac" or "biotac_sp"
+    section : of a file of `tactile adapt`, which has the recording's unit
     layout : which layout the file has, in words
     time : (T,) float, s from the first frame; may go back where the file's stamps do; NaN of snapshots, which do not
         follow each other
@@ -100,6 +101,7 @@ class Recording(Summary):
     truth: Truth | None = None
     about: dict[str, Any] = field(default_factory=dict)
     sensor: str = SOURCE
+    section: str = "unit"
     labels: dict[str, np.ndarray] = field(default_factory=dict)
 
     def __len__(self) -> int:

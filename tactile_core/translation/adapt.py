@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
-from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, section_of, units_file
+from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, units_file
 from ..recordings.fingers import FINGERS, short_of, split
 from ..recordings.gain_matching import PRIOR, Match, match
 from ..recordings.preparer import Preparer
@@ -114,10 +114,10 @@ def _units(every: Sequence[str]) -> dict[str, list[str]]:
     """Sort recordings by the sections of their units. Raises TactileError for files of one unit and of several."""
     units: dict[str, list[str]] = {}
     for one in every:
-        _, finger, topic = split(one)
-        if finger is not None and finger >= FINGERS and not topic:
-            raise TactileError(one, f"finger {finger}", f"a hand of at most {FINGERS} fingers")
-        units.setdefault(section_of(topic, finger), []).append(one)
+        chosen = split(one)
+        if not chosen.topic and (chosen.finger or 0) >= FINGERS:
+            raise TactileError(one, f"finger {chosen.finger}", f"a hand of at most {FINGERS} fingers")
+        units.setdefault(chosen.section, []).append(one)
     if len(units) > 1 and "unit" in units:
         found = "files of several fingers, and of one"
         raise TactileError(every[0], found, "one kind", "Adapt to each by itself")

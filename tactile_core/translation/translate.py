@@ -14,7 +14,6 @@ from .. import sensors
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, electrode_gains
 from ..recordings.electrode_gains import ElectrodeGains
-from ..recordings.fingers import split
 from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
 from . import error_bounds, networks, reference_signals
@@ -141,8 +140,8 @@ def translate(
     chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)
     translator, unit = _shared_translator(*chosen_by, answer or Answer()), None
     if sensor is not None:
-        finger = split(recording.path)[1]
-        unit = electrode_gains.read(sensor).gains_for(recording.path, finger, sensor, recording.sensor)
+        file, section = electrode_gains.read(sensor), recording.section
+        unit = file.gains_for(recording.path, section, sensor, recording.sensor)
     rows = PreparedRows(recording, chosen, translator.answer, prepare, unit)
     return translated(translator, rows, chosen)
 

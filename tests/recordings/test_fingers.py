@@ -38,6 +38,7 @@ def test_each_finger_is_a_recording_of_its_own(hand, press):
     first, second = (recordings.read(one) for one in each_finger(path))
     np.testing.assert_array_equal(first.electrodes, press.electrodes)
     assert (first.name, second.name) == ("hand_finger0", "hand_finger1") and second.pdc is None
+    assert (first.section, second.section) == ("finger0", "finger1")  # of a file of `tactile adapt`
     assert name_of(f"{path}#1") == "hand_finger1" and name_of(path) == "hand"
     assert recordings.read(path).warnings[0] == "finger 0 is read; others: 1 (ask for one as hand.mat#1)"
 

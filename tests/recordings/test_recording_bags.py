@@ -182,6 +182,22 @@ def test_a_topic_may_be_called_like_a_finger(make, tmp_path):
     assert name_of(f"{path}#left/finger1") == "touch_left_finger1" == recordings.read(f"{path}#left/finger1").name
 
 
+class LateTopic(Topic):
+    """A topic whose second finger's driver starts after 1.5 s."""
+
+    def counts(self, frame, finger):
+        return super().counts(frame, finger) * (finger == 0 or frame >= 150)
+
+
+@pytest.mark.parametrize("container", ["ros1", "mcap", "sqlite3"])
+def test_a_finger_whose_driver_starts_late_is_read(container, make, tmp_path):
+    write_topics(tmp_path / "touch", container, [LateTopic("/biotac", "all", make(frames=400), (0, 1))])
+    assert each_finger(tmp_path / "touch") == [f"{tmp_path / 'touch'}#{number}" for number in (0, 1)]
+    if container != "ros1":  # the file in the folder
+        (path,) = (each for each in (tmp_path / "touch").iterdir() if each.suffix != ".yaml")
+        assert each_finger(path) == [f"{path}#{number}" for number in (0, 1)]
+
+
 def test_messages_without_stamps_take_the_bag_s(make, tmp_path):
     press, path = make(frames=30), tmp_path / "touch"
     write_topics(path, "mcap", [Topic("/biotac", "hand", press, stamped=False)])

@@ -11,6 +11,7 @@ from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, units_file
+from tactile_core.recordings.fingers import split
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.translation.unit_rest import find_rest
@@ -67,11 +68,11 @@ def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
 def test_a_hand_s_file_is_read_by_finger(tmp_path):
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19)
     sensor = SensorFile(FORMAT, finger0=unit)
-    assert sensor.gains_for("hand.mat#0", 0, "unit.toml") is unit
+    assert sensor.gains_for("hand.mat#0", "finger0", "unit.toml") is unit
     with pytest.raises(TactileError, match=r"unit\.toml.*finger1"):
-        sensor.gains_for("hand.mat#1", 1, "unit.toml")
-    with pytest.raises(TactileError, match=r"of one unit.*\[unit\]"):
-        sensor.gains_for("touch.csv", None, "unit.toml")
+        sensor.gains_for("hand.mat#1", "finger1", "unit.toml")
+    with pytest.raises(TactileError, match=r"touch.csv is of another unit.*\[unit\]"):
+        sensor.gains_for("touch.csv", "unit", "unit.toml")
 
 
 def test_a_bag_s_units_are_read_by_topic_and_finger(tmp_path):
@@ -82,9 +83,11 @@ def test_a_bag_s_units_are_read_by_topic_and_finger(tmp_path):
     (tmp_path / "hands.bag").touch()
     sensor = electrode_gains.read(tmp_path / "hands.toml")
     for unit in (left, right):
-        assert sensor.gains_for(f"{tmp_path}/hands.bag#/{unit.note}/biotac/finger0", 0, "hands.toml") == unit
-    with pytest.raises(TactileError, match=r"hands.bag#up/biotac/finger0 is of finger 0.*\[up/biotac/finger0\]"):
-        sensor.gains_for(f"{tmp_path}/hands.bag#up/biotac/finger0", 0, "hands.toml")
+        path = f"{tmp_path}/hands.bag#/{unit.note}/biotac/finger0"
+        assert sensor.gains_for(path, split(path).section, "hands.toml") == unit
+    path = f"{tmp_path}/hands.bag#up/biotac/finger0"
+    with pytest.raises(TactileError, match=r"hands.bag#up/biotac/finger0 is of another.*\[up/biotac/finger0\]"):
+        sensor.gains_for(path, split(path).section, "hands.toml")
 
 
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
@@ -101,7 +104,7 @@ def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
     for path in hard:
         for finger in (0, 1):
             recording = recordings.read(f"{path}#{finger}")
-            signals = Preparer(None, sensor.gains_for(path, finger, "made"))(recording)
+            signals = Preparer(None, sensor.gains_for(path, f"finger{finger}", "made"))(recording)
             some = signals.at(slice(None, None, 100))
             for name, order in (("as read", slice(None)), ("shuffled", shuffled)):
                 turned = {"change": some.change[:, order], "rest": signals.rest[order]}

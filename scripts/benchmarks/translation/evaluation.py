@@ -78,7 +78,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
     folder, file = Path(options.recordings), options.sensor
     if grips.find(folder):
         return grips.rows(folder, network, read_pairs(options.test_set))
-    sensor = None if file is None else electrode_gains.read(file).gains_for(folder, None, file)
+    sensor = None if file is None else electrode_gains.read(file).gains_for(folder, "unit", file)
     most = QUICK if options.quick else None
     found = recordings.rows(folder, network, options.out, most, sensor)
     found += _slide_prints(folder, network, most, sensor)

@@ -69,8 +69,10 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
         raise TactileError(folder, f"{len(soft)} soft and {len(hard)} hard grips", "some of each, by their trials")
     sensor, _ = adapt.adapt_hand(soft, reference_signals.read(networks.WEIGHTS_FOLDER))
     held = [(one, finger) for path in hard for finger, one in enumerate(each_finger(path))]
-    prepared = [Preparer(None, sensor.gains_for(one, finger, SOFT))(recordings.read(one)) for one, finger in held]
-    every = [Preparer(None, sensor.gains_for(one, finger, SOFT))(recordings.read(one)) for path in files
+    prepared = [
+        Preparer(None, sensor.gains_for(one, f"finger{finger}", SOFT))(recordings.read(one)) for one, finger in held
+    ]
+    every = [Preparer(None, sensor.gains_for(one, f"finger{finger}", SOFT))(recordings.read(one)) for path in files
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
     found += prints.rows("grip", prepared, network)
@@ -95,7 +97,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
     results, baseline = [], []
     for path in hard:
         for finger, one in enumerate(each_finger(path)):
-            unit = sensor.gains_for(one, finger, SOFT)
+            unit = sensor.gains_for(one, f"finger{finger}", SOFT)
             results.append(_judged(recordings.read(one), unit, network))
             baseline.append(_judged(recordings.read(one), unit, network, shuffle))
     of = f"{len(results)} grips of hard flat objects, trials 04 and 05; baseline: electrodes shuffled"

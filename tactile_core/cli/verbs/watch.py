@@ -193,7 +193,7 @@ def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
     from ...recordings import electrode_gains
     from ...recordings.fingers import split
 
-    return electrode_gains.read(sensor).gains_for(path, split(path)[1], sensor, of)
+    return electrode_gains.read(sensor).gains_for(path, split(path).section, sensor, of)
 
 
 def _followed(options: argparse.Namespace, columns: ColumnMap | None, sensor: str) -> Rows:

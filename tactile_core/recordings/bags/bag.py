@@ -39,13 +39,17 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag. topics : those with BioTacs, in the order of their names; others : those without, in words"""
+    """An open bag.
+
+    topics : those with BioTacs, in the order of their names; others : those without, in words; middle : of its time, ns
+    """
 
     path: str
     ros1: bool
     topics: list[Topic]
     others: tuple[str, ...]
     reader: Any
+    middle: int
 
 
 def is_bag_folder(path: str) -> bool:
@@ -131,7 +135,10 @@ def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
         found = f"no messages of a BioTac: {listed(others)}" if others else "no topics"
         expected = "messages with a list of 19 or 24 electrodes, such as sr_robot_msgs/msg/BiotacAll"
         raise TactileError(path, found, expected, "Record the topic of the BioTacs' driver")
-    return Bag(path, ros1, list(topics.values()), tuple(others), reader)
+    with refused(path):
+        times = reader if hasattr(reader, "start_time") else reader.metadata  # a folder's reader has them itself
+        middle = (times.start_time + times.end_time) // 2
+    return Bag(path, ros1, list(topics.values()), tuple(others), reader, middle)
 
 
 def _bound_unpacking() -> None:

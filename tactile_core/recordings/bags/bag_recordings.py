@@ -18,7 +18,9 @@ from .bag import Bag, Topic, refused
 from .ros_messages import Decoder
 from .ros_sensors import channels, in_message, not_read, sensors_in, stamp_of
 
-LOOKED_AT = 100  # messages from which a hand's fingers with signals are recognised; more, where none has
+# Messages from which a hand's fingers with signals are recognised, at the bag's start and, for drivers that start late,
+# from its middle; more, where none has.
+LOOKED_AT = 100
 
 
 @dataclass
@@ -32,7 +34,7 @@ class Finger:
     def silence(self) -> str:
         """The reason for which no recording is made of it, unless it is asked for."""
         known = sensor_with(self.electrodes)
-        return f"{self.electrodes} electrodes" if not known else f"all zeros in the first {LOOKED_AT} messages"
+        return f"{self.electrodes} electrodes" if not known else "all zeros at the start and in the middle"
 
 
 @dataclass(frozen=True)
@@ -99,15 +101,16 @@ def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
 
 
 def _hand(bag: Bag, topic: Topic) -> list[Finger]:
-    """Look at the fingers of a topic's first messages, until one of them has signals."""
+    """Look at the fingers of some of a topic's messages, until one of them has signals."""
     hand: list[Finger] = []
-    for count, (_, sensors) in enumerate(_messages(bag, topic), start=1):
-        for number, (_, electrodes) in enumerate(sensors):
-            if number == len(hand):
-                hand.append(Finger(len(electrodes)))
-            hand[number].live |= any(electrodes) and bool(sensor_with(hand[number].electrodes))
-        if count >= LOOKED_AT and any(one.live for one in hand):
-            break
+    for start in (None, bag.middle):
+        for count, (_, sensors) in enumerate(_messages(bag, topic, start), start=1):
+            for number, (_, electrodes) in enumerate(sensors):
+                if number == len(hand):
+                    hand.append(Finger(len(electrodes)))
+                hand[number].live |= any(electrodes) and bool(sensor_with(hand[number].electrodes))
+            if count >= LOOKED_AT and any(one.live for one in hand):
+                break
     return hand
 
 
@@ -176,11 +179,16 @@ def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
         yield np.array(rows)
 
 
-def _messages(bag: Bag, topic: Topic) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
-    """Yield the stamp (unix s) of each message, the bag's where it has none, and `channels` of each sensor in it."""
+def _messages(
+    bag: Bag, topic: Topic, start: int | None = None
+) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
+    """Yield the stamp (unix s) of each message, the bag's where it has none, and `channels` of each sensor in it.
+
+    start : ns, from which messages are read
+    """
     known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
-        for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections)):
+        for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):
             message, known = _decoded(f"{bag.path}, {topic.name}, message {count}", topic.kind, known, data)
             sensors = [channels(one, fields) for fields in known[0][1] for one in in_message(message, fields)]
             yield stamp_of(message) or 1e-9 * written, sensors
