@@ -99,10 +99,10 @@ def press():
 
 @pytest.fixture
 def compiled_loops(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[bool], None]]:
-    """``compiled_loops(False)`` leaves everything to numpy; a skip where the extra [fast] is not installed."""
+    """``compiled_loops(False)`` compiles nothing; a skip where numba is not installed."""
     from tactile_core.files import compiled
 
-    pytest.importorskip("numba", reason="the extra [fast] is not installed")
+    pytest.importorskip("numba", reason="the extras [fem] and [fast] are not installed")
 
     def switch(on: bool) -> None:
         monkeypatch.setenv(compiled.SWITCH, "1" if on else "0")

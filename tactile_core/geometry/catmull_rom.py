@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..files.compiled import Loop, available
+from ..files.compiled import Loop
 
 _STEPS = np.arange(-1, 3)[:, None]
 
@@ -12,13 +12,10 @@ _STEPS = np.arange(-1, 3)[:, None]
 def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
     """Return points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
 
-    axes : contiguous; sums over many places at a time are faster axis by axis
+    axes : contiguous
     closed : whether the last column joins the first; places beyond other ends lie on them
     """
-    if available():
-        return points_on_grid(axes, np.ascontiguousarray(places, float), closed)
-    nodes, weights = stencil(axes.shape[1:], places, closed=closed)
-    return np.einsum("ijp,cijp->pc", weights, axes.reshape(3, -1).take(nodes, axis=1))
+    return _points_on_grid(axes, np.ascontiguousarray(places, float), closed)
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +49,8 @@ def catmull_rom(t: np.ndarray | float) -> np.ndarray:
 
 
 @Loop
-def points_on_grid(axes, places, closed):  # noqa: ANN001, ANN201
-    """Sum as ``on_grid`` does, in the same order; compiled."""
+def _points_on_grid(axes, places, closed):  # noqa: ANN001, ANN202
+    """See ``on_grid``."""
     rows, columns = axes.shape[1], axes.shape[2]
     points, along, across = np.empty((places.shape[1], 3)), np.empty(4), np.empty(4)
     for p in range(places.shape[1]):

@@ -10,7 +10,11 @@ import json
 import math
 from typing import Any
 
+import numpy as np
+
 from ..files.shipped import shipped
+from .fast.compliance_rows import surface_motion
+from .fast.contact_state import Contact
 from .sharpness import RESOLVED_RADIUS
 
 Errors = tuple[float, float]  # shape, m rms, and relative, of the force
@@ -30,6 +34,7 @@ _ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
 _HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0
 TABLE = shipped("mechanics_tiers.json")
 _UNKNOWN = {"bins": [{"depth_share_to": math.inf, "shape_95_um": math.nan, "force_95": math.nan}]}
+_COUNTS = 10e-6  # m, of nodes that count: as in the measured errors of shapes
 REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of order 2 leaves a quarter; a margin on it)
 
 
@@ -79,3 +84,36 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
     bins = measured()["tiers"][tier].get(sensor, _UNKNOWN)["bins"]
     found = next((each for each in bins if share <= each["depth_share_to"]), bins[-1])
     return 1e-6 * found["shape_95_um"], found["force_95"]
+
+
+def unsure_side(contact: Contact, normals: np.ndarray, radius: float) -> float:
+    """Estimate how far, m rms, a surface lies aside because a sharp indenter's normals are known at nodes alone.
+
+    Round an edge normals turn by a radian for each radius of way. Touching nodes lie up to half a spacing beside the
+    places that would touch, and their forces lean by that: a wedge that meets nodes on one of its faces alone pushes a
+    fluid-filled skin aside as a whole. Of the contact's force aside, the doubtful part is the share that no node on
+    another face balances, and no more than normals that are off by half a spacing can make. The estimate is the
+    displacement under that part.
+
+    normals : (n, 3), outward, of the resting surface; radius : m, of the indenter where it is sharpest
+    """
+    if not len(contact.nodes):
+        return 0.0
+    size, force = np.linalg.norm(contact.nodal_force, axis=1), float(np.linalg.norm(contact.force))
+    along = size @ normals[contact.compliance.touchable[contact.nodes]]
+    along /= np.linalg.norm(along)
+    aside = contact.force - (contact.force @ along) * along
+    sideways = float(np.linalg.norm(aside))
+    if not sideways:
+        return 0.0
+    at = contact.compliance.surface.rest[contact.compliance.touchable]
+    hardest = at[contact.nodes[int(np.argmax(size))]]
+    spacing = float(np.partition(np.linalg.norm(at - hardest, axis=1), 1)[1])
+    one_sided = sideways**2 / float(np.abs(contact.nodal_force @ aside).sum())  # 1: no node pushes back
+    doubt = min(one_sided * sideways, force * spacing / (2 * radius))
+    loads = (size / size.sum())[:, None] * (doubt / sideways * aside)
+    response = surface_motion(
+        contact.compliance, contact.nodes, loads, contact.core_nodes, np.zeros_like(contact.core_force)
+    )
+    moves = np.linalg.norm(contact.displacement, axis=1) > _COUNTS
+    return float(np.sqrt((response[moves] ** 2).sum(axis=1).mean())) if moves.any() else 0.0

@@ -24,7 +24,6 @@ from .rest_normals import rest_normals
 from .sharpness import RESOLVED_RADIUS, sharpest
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 from .thickness import DEPTH_LIMIT, thickness_under
-from .unsure_side import unsure_side
 
 _LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
@@ -195,4 +194,6 @@ def _fast_errors(
     moved = contact.compliance.surface.rest[near] + contact.displacement[near]
     radius = sharpest(indenter, contact.pose, moved)
     shape, force = error_estimate.of_fast(table, depth, len(contact.nodes), radius)
-    return shape + (unsure_side(contact, rest_normals(sensor), radius) if radius < RESOLVED_RADIUS else 0.0), force
+    return shape + (
+        error_estimate.unsure_side(contact, rest_normals(sensor), radius) if radius < RESOLVED_RADIUS else 0.0
+    ), force

@@ -2,13 +2,17 @@
 
 import itertools
 
+import numpy as np
 import pytest
 
+from tactile_core.geometry.indenters import Edge, Sphere
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, expected_error, measured
-from tactile_core.mechanics.solve import TIERS
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solve import TIERS, solve
 from tactile_core.mechanics.thickness import DEPTH_LIMIT
 
 SENSORS = "digit", "biotac"
+MIDDLE = Placement(-8.2e-3, 1.13e-3)
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
@@ -38,3 +42,15 @@ def test_errors_are_those_of_the_bin_and_of_the_deepest_one_beyond():
     shape, force = expected_error("reference", "digit", 0.1)
     assert shape == pytest.approx(REFERENCE_SHARE * 1e-6 * bins[0]["shape_95_um"], rel=1e-3)  # written in four digits
     assert force == pytest.approx(REFERENCE_SHARE * bins[0]["force_95"], rel=1e-3)
+
+
+def test_a_wedge_that_leans_on_one_face_says_that_the_skin_may_lie_aside():
+    """73 um : rms off the full tier; the skin lies 62 um aside of it as a whole."""
+    found = solve("biotac", Edge(np.radians(60), 0.4e-3), MIDDLE, depth=0.3e-3, friction=0.0)
+    assert 73e-6 < found.shape_error < 110e-6
+
+
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+def test_a_blunt_indenter_states_the_error_of_its_depth(sensor):
+    found = solve(sensor, Sphere(2e-3), Placement(-8.2e-3, 1.13e-3, 0.3), depth=0.3e-3, friction=0.0)
+    assert found.shape_error == expected_error("fast", sensor, found.depth / found.thickness)[0]

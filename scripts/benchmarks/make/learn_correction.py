@@ -183,7 +183,7 @@ def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> li
     """RMS and largest shape error m, relative force error; each after the correction, then before."""
     truth = sample.full.astype(float)
     counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
-    after = sample.fast + sample.depth * correction.spread_field(sensor, sample.frame, field) - truth
+    after = correction.add_field(sensor, sample.fast, sample.frame, field, sample.depth) - truth
     out = []
     for error in (after[counts], (sample.fast - truth)[counts]):
         size = np.linalg.norm(error, axis=1) if counts.any() else np.zeros(1)

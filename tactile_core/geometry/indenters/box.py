@@ -8,8 +8,7 @@ import functools
 import numpy as np
 
 from ...errors import TactileError
-from ...files.compiled import available
-from .distance_loops import from_box
+from ...files.compiled import Loop
 from .indenter import NEAREST, Indenter, check_length, contiguous, lengths, sign_of
 from .scene_form import SceneForm, Size
 
@@ -32,20 +31,7 @@ class Box(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact (a smaller box inflated by the edge radius), inside to the nearest face."""
-        if available():
-            return from_box(contiguous(points), self._middle, self._inner, self.edge)
-        arm = points - self._middle
-        out = np.abs(arm) - self._inner
-        beyond = np.maximum(out, 0)
-        corner = lengths(beyond)
-        inside = np.flatnonzero(corner == 0)
-        distance, far = corner - self.edge, corner
-        if len(inside):
-            face = np.argmax(out[inside], axis=1)
-            distance[inside] += out[inside, face]
-            beyond[inside, face], far = 1.0, corner.copy()
-            far[inside] = 1.0
-        return distance, np.copysign(beyond, arm) / far[:, None]
+        return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``; zero at faces, 1 / arm across round edges, in all tangents at corners."""
@@ -69,6 +55,29 @@ class Box(Indenter):
     def _inner(self) -> np.ndarray:
         """Half-sizes (3,) m of the smaller box."""
         return np.array(self.sizes) / 2 - self.edge
+
+
+@Loop
+def _from_box(points, middle, inner, edge):  # noqa: ANN001, ANN202
+    """Distance (n,) m and its gradient (n, 3) of points (n, 3) m; middle, inner : (3,) m."""
+    distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
+    for p in range(len(points)):
+        square, face, deepest = 0.0, 0, -np.inf
+        for i in range(3):
+            out = abs(points[p, i] - middle[i]) - inner[i]
+            if out > deepest:
+                face, deepest = i, out
+            beyond = max(out, 0.0)
+            gradient[p, i] = beyond
+            square += beyond * beyond
+        corner = np.sqrt(square)
+        distance[p], far = corner - edge, corner
+        if corner == 0:
+            distance[p] += deepest
+            gradient[p, face], far = 1.0, 1.0
+        for i in range(3):
+            gradient[p, i] = np.copysign(gradient[p, i], points[p, i] - middle[i]) / far
+    return distance, gradient
 
 
 SCENE = SceneForm(

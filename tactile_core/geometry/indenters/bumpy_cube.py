@@ -9,12 +9,11 @@ import numpy as np
 
 from ...errors import TactileError
 from .box import Box
-from .circle import circle_curvature, circle_distance
 from .indenter import NEAREST, Hull, Indenter, Surface, check_length
 from .pose import Pose
-from .preview_surface import joined
+from .ring import circle_curvature, circle_distance
 from .scene_form import SceneForm, Size
-from .several import Several
+from .several import Several, joined
 from .sphere import Sphere
 
 _CUBE, _BALL, _RIM, _SHAFT = range(4)  # what is nearest

@@ -8,9 +8,8 @@ import functools
 import numpy as np
 
 from ...errors import TactileError
-from ...files.compiled import available
+from ...files.compiled import Loop
 from . import extrusion
-from .distance_loops import from_cylinder
 from .indenter import NEAREST, SQUARE, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
@@ -31,10 +30,8 @@ class Cylinder(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
-        if available():
-            inner, half = self.radius - self.edge, self.length / 2
-            return from_cylinder(contiguous(points), 2, self._middle, inner, half - self.edge, self.edge, NEAREST)
-        return extrusion.distance(*self._prism(points), self.edge)
+        inner, half = self.radius - self.edge, self.length / 2
+        return from_cylinder(contiguous(points), 2, self._middle, inner, half - self.edge, self.edge, NEAREST)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""
@@ -55,6 +52,29 @@ class Cylinder(Indenter):
     def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
         outline = extrusion.disc(points[:, :2], self.radius - self.edge)
         return outline, points[:, 2] - self.length / 2, self.length / 2 - self.edge
+
+
+@Loop
+def from_cylinder(points, axis, middle, radius, half_span, edge, nearest):  # noqa: ANN001, ANN201
+    """Distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along an own axis about a middle."""
+    distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    for p in range(len(points)):
+        x, y = points[p, first] - middle[first], points[p, second] - middle[second]
+        along = points[p, axis] - middle[axis]
+        length = np.sqrt(x * x + y * y)
+        if length < nearest:
+            x, y, length = 0.0, -nearest, nearest
+        side, end = length - radius, abs(along) - half_span
+        across, beyond = max(side, 0.0), max(end, 0.0)
+        corner = np.sqrt(across * across + beyond * beyond)
+        distance[p], far = corner - edge, corner
+        if corner == 0:
+            distance[p] += max(side, end)
+            across, beyond, far = (1.0, 0.0, 1.0) if side > end else (0.0, 1.0, 1.0)
+        gradient[p, first], gradient[p, second] = across / far * (x / length), across / far * (y / length)
+        gradient[p, axis] = np.copysign(beyond / far, along)
+    return distance, gradient
 
 
 SCENE = SceneForm(

@@ -8,9 +8,8 @@ import functools
 import numpy as np
 
 from ...errors import TactileError
-from ...files.compiled import available
 from . import extrusion
-from .distance_loops import from_cylinder
+from .cylinder import from_cylinder
 from .indenter import NEAREST, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
@@ -37,11 +36,8 @@ class LyingCylinder(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
-        if available():
-            inner, half = self.radius - self.edge, self.length / 2
-            return from_cylinder(contiguous(points), 0, self._middle, inner, half - self.edge, self.edge, NEAREST)
-        distance, gradient = extrusion.distance(*self._prism(points), self.edge)
-        return distance, gradient.take(_OWN, axis=1)
+        inner, half = self.radius - self.edge, self.length / 2
+        return from_cylinder(contiguous(points), 0, self._middle, inner, half - self.edge, self.edge, NEAREST)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""

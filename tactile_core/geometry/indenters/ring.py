@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 
 from ...errors import TactileError
-from .circle import circle_curvature, circle_distance
-from .indenter import SQUARE, Hull, Indenter, Surface, check_length
+from ...files.compiled import Loop
+from .indenter import NEAREST, SQUARE, Hull, Indenter, Surface, check_length, contiguous
 from .scene_form import SceneForm, Size
 
 _ACROSS, _AROUND = 24, 64  # of the preview: nodes across and along the wire
@@ -59,6 +59,61 @@ class Ring(Indenter):
         c, d = np.roll(b, -1, axis=1), np.roll(a, -1, axis=1)
         quads = np.stack([a, b, c, d], -1).reshape(-1, 4)
         return nodes.reshape(-1, 3), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance (n,) m of points (n, 3) m from a circle about z of ``radius`` m, and its gradient (n, 3)."""
+    return _from_circle(contiguous(points), radius, NEAREST)
+
+
+def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
+    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance``: 1 / length round the wire, and along it."""
+    around, radial, arm, length = _arms(points, radius)
+    turn = np.column_stack([-arm[:, 1:] * radial, arm[:, 0]])
+    along = np.column_stack([-radial[:, 1], radial[:, 0], np.zeros(len(points))])
+    hoop = arm[:, 0] / length / np.maximum(around, NEAREST)
+    return _square(turn) / length[:, None, None] ** 3 + hoop[:, None, None] * _square(along)
+
+
+def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Distance (n,) m from the axis, direction from it (n, 2), arm from the circle (n, 2) m, its length (n,) m."""
+    across = points[:, :2]
+    around = np.sqrt(np.einsum("ni,ni->n", across, across))
+    if around.min(initial=np.inf) >= NEAREST:
+        radial = across / around[:, None]
+    else:
+        radial = across / np.maximum(around, NEAREST)[:, None]
+        radial[around < NEAREST] = [1.0, 0.0]
+    arm = np.empty((len(points), 2))
+    arm[:, 0], arm[:, 1] = around - radius, points[:, 2]
+    length = np.sqrt(np.einsum("ni,ni->n", arm, arm))
+    if length.min(initial=np.inf) < NEAREST:
+        arm[length < NEAREST] = [0.0, -NEAREST]
+        length = np.maximum(length, NEAREST)
+    return around, radial, arm, length
+
+
+def _square(vectors: np.ndarray) -> np.ndarray:
+    """The outer product (n, 3, 3) of each vector (n, 3) with itself."""
+    return vectors[:, :, None] * vectors[:, None, :]
+
+
+@Loop
+def _from_circle(points, radius, nearest):  # noqa: ANN001, ANN202
+    """See ``circle_distance``."""
+    distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
+    for p in range(len(points)):
+        x, y, above = points[p, 0], points[p, 1], points[p, 2]
+        around = np.sqrt(x * x + y * y)
+        right, up = (x / around, y / around) if around >= nearest else (1.0, 0.0)
+        outward = around - radius
+        length = np.sqrt(outward * outward + above * above)
+        if length < nearest:
+            outward, above, length = 0.0, -nearest, nearest
+        distance[p] = length
+        gradient[p, 0], gradient[p, 1] = outward * right / length, outward * up / length
+        gradient[p, 2] = above / length
+    return distance, gradient
 
 
 SCENE = SceneForm(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import numpy as np
 
 from ...errors import TactileError
 from .indenter import SQUARE, Hull, Indenter, Surface
 from .pose import Pose
-from .preview_surface import joined
 
 _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 
@@ -67,3 +67,14 @@ class Several(Indenter):
         row = np.arange(len(points))
         distance, gradient = (np.stack(values)[nearest, row] for values in zip(*answers, strict=True))
         return distance, gradient, nearest
+
+
+def joined(parts: Iterable[tuple[Indenter, Pose]], hull: Hull) -> Surface:
+    """Join the surfaces that show bodies, each in its pose, into one."""
+    nodes, faces, count = [], [], 0
+    for body, pose in parts:
+        own, triangles = body.preview(hull)
+        nodes.append(pose.from_own(own))
+        faces.append(triangles + count)
+        count += len(own)
+    return np.concatenate(nodes), np.concatenate(faces)

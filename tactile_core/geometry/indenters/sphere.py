@@ -6,9 +6,8 @@ import dataclasses
 
 import numpy as np
 
-from ...files.compiled import available
-from .distance_loops import from_ball
-from .indenter import NEAREST, Indenter, check_length, contiguous, lengths
+from ...files.compiled import Loop
+from .indenter import NEAREST, Indenter, check_length, contiguous
 from .scene_form import SceneForm, Size
 
 
@@ -23,29 +22,31 @@ class Sphere(Indenter):
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
-        if available():
-            return from_ball(contiguous(points), self.radius, NEAREST)
-        length, normal = self._polar(points)
+        length, normal = _polar(contiguous(points), self.radius, NEAREST)
         return length - self.radius, normal
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""
-        length, normal = self._polar(points)
+        length, normal = _polar(contiguous(points), self.radius, NEAREST)
         return (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / length[:, None, None]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """See ``Indenter.support``."""
         return np.array([0.0, 0.0, self.radius]) + self.radius * direction
 
-    def _polar(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Distance (n,) m from the centre, and the direction away from it (n, 3)."""
-        arm = points.copy()
-        arm[:, 2] -= self.radius
-        length = lengths(arm)
-        if length.min(initial=np.inf) < NEAREST:
-            arm[length < NEAREST] = [0.0, 0.0, -NEAREST]
-            length = np.maximum(length, NEAREST)
-        return length, arm / length[:, None]
+
+@Loop
+def _polar(points, height, nearest):  # noqa: ANN001, ANN202
+    """Distance (n,) m of points (n, 3) m from a centre ``height`` m up the own z, and directions from it (n, 3)."""
+    distance, direction = np.empty(len(points)), np.empty((len(points), 3))
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2] - height
+        length = np.sqrt(x * x + y * y + z * z)
+        if length < nearest:
+            x, y, z, length = 0.0, 0.0, -nearest, nearest
+        distance[p] = length
+        direction[p, 0], direction[p, 1], direction[p, 2] = x / length, y / length, z / length
+    return distance, direction
 
 
 SCENE = SceneForm("sphere", Sphere, "A ball", {"radius": Size("radius_mm", slider="radius")}, "Sphere", "MESH_UVSPHERE")

@@ -7,7 +7,7 @@ import itertools
 
 import numpy as np
 
-from ...files.compiled import Loop, available
+from ...files.compiled import Loop
 from ...files.short_text import Summary
 from ..cubic_spline import bspline_slopes, bspline_weights
 
@@ -62,18 +62,8 @@ class SplineGrid(Summary):
         cell = np.minimum(place.astype(np.intp), shape - 3)
         along = (place - cell).ravel()
         weights = np.stack([bspline_weights(along), bspline_slopes(along), _bends(along)][:orders])  # (orders, 4, 3 n)
-        if available():
-            by_point = np.ascontiguousarray(weights.reshape(orders, 4, -1, 3).transpose(2, 3, 0, 1))
-            return spline_sums(self.coefficients, place, cell, by_point, orders)
-        x, y, z = weights.reshape(orders, 4, -1, 3).transpose(3, 2, 1, 0)  # three times (n, 4, orders)
-        steps = np.array([shape[1] * shape[2], shape[2], 1])
-        k = np.arange(-1, 3)
-        around = (k[:, None, None] * steps[0] + k[:, None] * steps[1] + k).ravel()
-        near = self.coefficients.ravel()[(cell @ steps)[:, None] + around].astype(np.float64)
-        n = len(place)
-        sums = near.reshape(n, 16, 4) @ z
-        sums = x.swapaxes(1, 2) @ sums.reshape(n, 4, 4 * orders)
-        return y.swapaxes(1, 2)[:, None] @ sums.reshape(n, orders, 4, orders)
+        by_point = np.ascontiguousarray(weights.reshape(orders, 4, -1, 3).transpose(2, 3, 0, 1))
+        return _spline_sums(self.coefficients, place, cell, by_point, orders)
 
 
 def _bends(t: np.ndarray) -> np.ndarray:
@@ -82,7 +72,7 @@ def _bends(t: np.ndarray) -> np.ndarray:
 
 
 @Loop
-def spline_sums(coefficients, place, cell, weights, orders):  # noqa: ANN001, ANN201
+def _spline_sums(coefficients, place, cell, weights, orders):  # noqa: ANN001, ANN202
     """Sum the spline's derivatives (n, orders, orders, orders) in cells (n, 3); weights : (n, 3, orders, 4) by axis."""
     sums = np.zeros((len(place), orders, orders, orders))
     along, flat = np.zeros(3), np.zeros((3, 3))

@@ -26,8 +26,7 @@ from ...sensors import Material, digit
 from ...sensors import unrolling as surface
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.hex_mesh import HexMesh, inner_faces, solid_mesh
-from .condense import condense, mirror_nodes
-from .mirror_symmetry import MirrorSymmetry, axes_of
+from .condense import MirrorSymmetry, axes_of, condense, mirror_nodes
 from .sensing_points import ON_PLANE, electrode_feet, facing_nodes, images, sensing_points_of
 
 log = logging.getLogger(__name__)

@@ -1,14 +1,36 @@
-"""Entries of a sensor's large compliance among the nodes near an indenter, each gathered when it is first asked for."""
+"""Entries of a sensor's large compliance among the nodes near an indenter, and the motion that forces on them make."""
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from ...files.compiled import available
+from ...files.compiled import Loop, add_scaled
 from .compliance import Compliance
-from .mirror_symmetry import axes_of
-from .surface_loops import gather_rows, surface_motion
-from .surface_response import runs
+from .condense import axes_of
+
+# Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
+# one node presses two faces of a concave corner.
+_RIDGE = 1e-6
+_INNER = 2**40  # more than a surface has degrees of freedom
+
+
+class Rows(Protocol):
+    """Compliance among points near an indenter: ``ComplianceRows`` of nodes, or of nodes and points between them."""
+
+    @property
+    def near(self) -> np.ndarray:
+        """Sorted numbers (n,) of the points."""
+
+    def block(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the compliance (3 k, 3 k) float32 m/N among sorted, near numbers (k,)."""
+
+    def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
+        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
+
+    def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
+        """Return the points' displacements (n, 3) m by forces (k, 3) N at sorted nodes, (c,) N at sensing points."""
 
 
 class ComplianceRows:
@@ -42,12 +64,10 @@ class ComplianceRows:
 
     def _under(self, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Near nodes' displacements (3 n,) float32, m, by forces (k, 3) N at sorted ones."""
-        if not available():
-            return force.ravel().astype(np.float32) @ self._rows(nodes)
         at, (_, _, image) = self._gather(nodes), self.compliance.answers
         none, no_force, inner_move = np.empty(0, int), np.empty(0), self.compliance.inner_move
         straight = np.zeros(len(at), bool)
-        return surface_motion(self._entries_to_read, at, straight, image, force, inner_move, none, no_force)
+        return _sum_motion(self._entries_to_read, at, straight, image, force, inner_move, none, no_force)
 
     def _rows(self, nodes: np.ndarray) -> np.ndarray:
         """Rows (3 k, 3 n) of nodes (k,)."""
@@ -60,26 +80,165 @@ class ComplianceRows:
         if len(new):
             new = np.unique(new)  # a node may stand twice
             self._known[new] = True
-            if available():
-                gather_rows(
-                    self.compliance.move, self._entries, new, self._row, self._mirrored, self._columns,
-                    self._mirrored_columns,
-                )  # fmt: skip
-                return at
-            mirrored = self._mirrored[new]
-            direct, turned = new[~mirrored], new[mirrored]
-            self._entries[axes_of(direct)] = self._gathered(self._row[direct], self._columns)
-            turned = turned[np.argsort(self._row[turned], kind="stable")]
-            answer = self._gathered(self._row[turned], self._mirrored_columns)
-            answer[:, 2::3] *= -1
-            answer[2::3] *= -1
-            self._entries[axes_of(turned)] = answer
+            _gather_rows(
+                self.compliance.move, self._entries, new, self._row, self._mirrored, self._columns,
+                self._mirrored_columns,
+            )  # fmt: skip
         return at
 
-    def _gathered(self, row: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Entries (3 k, j) of three rows of the large matrix for each of sorted ``row`` (k,), in ``columns`` (j,)."""
-        answer = np.empty((3 * len(row), len(columns)), np.float32)
-        for start, stop, first, last in runs(row) if len(row) else ():
-            rows = self.compliance.move[3 * first : 3 * last]
-            rows.take(columns, axis=1, out=answer[3 * start : 3 * stop], mode="clip")
-        return answer
+
+class ComplianceBlock:
+    """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
+
+    nodes : (k,) sorted numbers of the rows, twice where one touches two faces
+    inner : (c,) sorted sensing points
+    rows : the entries of the nodes near an indenter, all of these among them
+    matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
+    """
+
+    def __init__(
+        self,
+        compliance: Compliance,
+        nodes: np.ndarray,
+        inner: np.ndarray,
+        rows: Rows,
+    ) -> None:
+        self.nodes, self.inner = nodes, inner
+        self.k, self.c = len(nodes), len(inner)
+        self.keys = np.concatenate([axes_of(nodes), _INNER + inner])  # (3 k + c,), sorted: the same in every block
+        size = 3 * self.k
+        surface = rows.block(nodes)
+        self.matrix = surface if not self.c else np.empty((size + self.c, size + self.c), np.float32)
+        if self.c:
+            self.matrix[:size, :size] = surface
+            self.matrix[:size, size:] = rows.sensing_motion(nodes, inner)
+            self.matrix[size:, :size] = self.matrix[:size, size:].T
+            self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
+
+    def respond(self, force: np.ndarray, pressing_core: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return displacement (k, 3) m and motion (c,) m of inner points off the core, by forces (k, 3), (c,) N."""
+        answer = np.concatenate([force.ravel(), pressing_core]).astype(np.float32) @ self.matrix
+        return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
+
+    def normal(self, normals: np.ndarray) -> np.ndarray:
+        """Return the compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
+        return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, _RIDGE)
+
+    def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
+        """Update ``normal`` to ``normals`` (k, 3), where those of the nodes ``at`` (j,) have turned."""
+        k, size = self.k, 3 * self.k
+        rows = self.matrix.take(axes_of(at), axis=0)
+        strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)
+        strips[np.arange(len(at)), at] *= 1 + _RIDGE
+        matrix = matrix.copy()
+        matrix[at, :k], matrix[:k, at] = strips, strips.T
+        if self.c:
+            side = np.einsum("aic,ai->ac", rows[:, size:].reshape(len(at), 3, self.c), normals[at])
+            matrix[at, k:], matrix[k:, at] = side, side.T
+        return matrix
+
+
+def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Contract sum over i, j of source[a, i] block[a i, b j] target[b, j]; by strides, faster than einsum here."""
+    half = block[:, 0::3] * target[:, 0]
+    half += block[:, 1::3] * target[:, 1]
+    half += block[:, 2::3] * target[:, 2]
+    half = half.reshape(len(source), 3, len(target))
+    return half[:, 0] * source[:, :1] + half[:, 1] * source[:, 1:2] + half[:, 2] * source[:, 2:]
+
+
+def surface_motion(
+    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
+) -> np.ndarray:
+    """Return the surface's motion (n, 3) float32 m by forces (k, 3) N at sorted ``nodes``, (c,) at sensing points."""
+    rows, mirror, image = compliance.answers
+    row, mirrored = rows[nodes], mirror[nodes]
+    moved = _sum_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)
+    return moved.reshape(-1, 3)
+
+
+def sensing_gaps(
+    compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
+) -> np.ndarray:
+    """Return the gaps (count,) m of the first sensing points under the same forces."""
+    gaps = compliance.watch_gap[:count].astype(float)
+    if not len(gaps):
+        return gaps
+    for start, stop, first, last in _runs(nodes) if len(nodes) else ():
+        gaps = gaps + force[start:stop].ravel().astype(np.float32) @ compliance.watch[3 * first : 3 * last, :count]
+    if len(inner):
+        gaps = gaps + inner_force.astype(np.float32) @ compliance.inner_watch[inner, :count]
+    return gaps
+
+
+def _runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
+    """Find stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and the numbers' own."""
+    cuts = np.flatnonzero(np.diff(indices) != 1) + 1
+    starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
+    return list(
+        zip(starts.tolist(), stops.tolist(), indices[starts].tolist(), (indices[stops - 1] + 1).tolist(), strict=True)
+    )
+
+
+@Loop
+def _gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns):  # noqa: ANN001, ANN202
+    """Fill the rows (3 n) of ``entries`` (3 n, 3 n) that belong to near nodes ``at`` (k,).
+
+    move : (3 r, j) float32 m/N; rows : (n,), that answer each near node; mirrored : (n,) bool, by its image
+    columns, mirrored_columns : (3 n,) of ``move``, of the near nodes and of their images
+    """
+    for each in at:
+        flip = mirrored[each]
+        for axis in range(3):
+            source, out = move[3 * rows[each] + axis], entries[3 * each + axis]
+            if not flip:
+                out[:] = source[columns]
+                continue
+            sign = np.float32(-1.0 if axis == 2 else 1.0)  # mirrored in z: of the force, and of the motion
+            out[:] = sign * source[mirrored_columns]
+            out[2::3] *= np.float32(-1.0)
+
+
+@Loop
+def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_force):  # noqa: ANN001, ANN202
+    """Compute the displacement (3 n,) float32, m, of the whole surface; see ``surface_motion``.
+
+    rows : (k,) of ``move`` for each node; mirrored : (k,) bool; image : (n,), of every surface node
+    """
+    size = move.shape[1]
+    moved, there = np.zeros(size, np.float32), np.zeros(size, np.float32)
+    any_there = False
+    for a in range(len(rows)):
+        flip = mirrored[a]
+        any_there |= flip
+        out = there if flip else moved
+        x, y = np.float32(force[a, 0]), np.float32(force[a, 1])
+        z = np.float32(-force[a, 2] if flip else force[a, 2])
+        first, second, third = move[3 * rows[a]], move[3 * rows[a] + 1], move[3 * rows[a] + 2]
+        out += x * first + y * second + z * third
+    for p in range(len(inner)):
+        line, load = inner_move[inner[p]], np.float32(inner_force[p])
+        add_scaled(moved, load, line)
+    if any_there:
+        moved[0::3] += there[0::3][image]
+        moved[1::3] += there[1::3][image]
+        moved[2::3] -= there[2::3][image]
+    return moved
+
+
+@Loop
+def _normal_compliance(matrix, normal, c, ridge):  # noqa: ANN001, ANN202
+    """See ``ComplianceBlock.normal``; ridge : relative, added to each point's own."""
+    k = len(normal)
+    size, gaps = 3 * k, np.empty((k + c, k + c))
+    for a in range(k):
+        x, y, z = normal[a, 0], normal[a, 1], normal[a, 2]
+        first, second, third = matrix[3 * a], matrix[3 * a + 1], matrix[3 * a + 2]
+        half = x * first + y * second + z * third
+        gaps[a, :k] = half[0:size:3] * normal[:, 0] + half[1:size:3] * normal[:, 1] + half[2:size:3] * normal[:, 2]
+        gaps[a, k:] = half[size:]
+        gaps[k:, a] = half[size:]
+    gaps[k:, k:] = matrix[size:, size:]
+    for a in range(k + c):
+        gaps[a, a] *= 1 + ridge
+    return gaps

@@ -11,22 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...files.compiled import available
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import check_follows
 from ..pose_path import between, same_place
-from . import surface_response
 from .active_set import UnsolvedError, Work
-from .candidates import Candidates
-from .compiled_friction import CompiledFriction
+from .candidates import Candidates, first_contact, project
 from .compliance import Compliance
-from .compliance_block import ComplianceBlock
-from .compliance_rows import ComplianceRows
-from .contact_state import Contact, sideways_share
+from .compliance_rows import ComplianceBlock, ComplianceRows, sensing_gaps
+from .contact_state import Contact, among, borne, sideways_share
 from .contact_stiffness import ContactStiffness
 from .friction import Friction
 from .frictionless import Frictionless, Try
-from .projection import first_contact, project
 
 PENETRATION = 1e-6  # m, the target at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
@@ -101,7 +96,7 @@ class ContactProblem:
         wanted = self._nodes_within(pose, _REACH)
         touched = np.empty(0, int) if start is None else start.nodes
         if len(self.near) > _LARGE * len(wanted) or not (
-            _among(wanted, self.near).all() and _among(touched, self.near).all()
+            among(wanted, self.near).all() and among(touched, self.near).all()
         ):
             near = wanted if start is None else np.union1d(self._nodes_within(pose, _REACH + _SPARE), touched)
             self._rows = self._rows_of(near)
@@ -113,7 +108,7 @@ class ContactProblem:
         """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
         nodes, _ = self.compliance.surface.blocks.near(self.indenter, pose, reach)
         touchable = self.compliance.touchable
-        return np.searchsorted(touchable, nodes[_among(nodes, touchable)])
+        return np.searchsorted(touchable, nodes[among(nodes, touchable)])
 
     @property
     def near(self) -> np.ndarray:
@@ -211,11 +206,9 @@ class ContactProblem:
         if self.friction == 0:
             solver = self._frictionless(block, rest, core_gap, pose, candidates)
         else:
-            begin.force, begin.slipping = _borne(before, candidates.nodes)
+            begin.force, begin.slipping = borne(before, candidates.nodes)
             spots = self._spots(before, moved, pose, candidates.nodes)
-            solver = (CompiledFriction if available() else Friction)(
-                block, rest, core_gap, self.indenter, pose, spots, self.friction, self._stiffness
-            )
+            solver = Friction(block, rest, core_gap, self.indenter, pose, spots, self.friction, self._stiffness)
         unknowns = len(active) if self.friction == 0 else len(block.matrix)
         try:
             found = solver.solve(begin, axial_force)
@@ -233,7 +226,7 @@ class ContactProblem:
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
         """Sticking points (k, 3) m of nodes (k,) in the indenter's frame: the old ones, or where they first meet it."""
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
-        spots, new = before.pose.to_own(points), ~_among(nodes, before.nodes)
+        spots, new = before.pose.to_own(points), ~among(nodes, before.nodes)
         if pose is not before.pose:
             spots[new] = first_contact(self.indenter, spots[new], pose.to_own(points[new]))
         return spots
@@ -270,7 +263,7 @@ class ContactProblem:
         gap, normal = self._distance(pose, self.near, moved)
         sideways = sideways_share(pressed, normal[np.searchsorted(self.near, touching)])
         over_core = self.compliance.feet + self.compliance.facing
-        gaps = surface_response.sensing_gaps(self.compliance, nodes, force, inner, inner_force, over_core)
+        gaps = sensing_gaps(self.compliance, nodes, force, inner, inner_force, over_core)
         core = gaps[self.compliance.feet :]
         penetration = max(-float(gap.min(initial=0.0)), -float(core.min(initial=0.0)))
         total = force.sum(axis=0)
@@ -305,19 +298,3 @@ def _way_in(before: Contact, axial_force: float | None) -> float:
     if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
         return 0.0
     return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)
-
-
-def _borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
-    force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
-    same = _among(nodes, before.nodes)
-    at = np.searchsorted(before.nodes, nodes[same])
-    force[same], slipping[same] = before.nodal_force[at], before.slipping[at]
-    return force, slipping
-
-
-def _among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Mark (k,) bool the nodes (k,) that are among sorted others (j,); a few times quicker than ``np.isin``."""
-    if not len(others):
-        return np.zeros(len(nodes), bool)
-    return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes

@@ -8,8 +8,8 @@ import functools
 import numpy as np
 
 from ...geometry.indenters import Pose
-from . import surface_response
 from .compliance import Compliance
+from .compliance_rows import sensing_gaps, surface_motion
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,9 +45,7 @@ class Contact:
     @functools.cached_property
     def displacement(self) -> np.ndarray:
         """Displacement (n, 3) float32, m, of the whole surface; computed on first use."""
-        return surface_response.displacement(
-            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force
-        )
+        return surface_motion(self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force)
 
     def at_depth(self, depth: float) -> Contact:
         """Return the same contact with its depth, m, measured from another first touch."""
@@ -72,9 +70,7 @@ class Contact:
         return self._gaps(self.compliance.feet)
 
     def _gaps(self, count: int) -> np.ndarray:
-        return surface_response.sensing_gaps(
-            self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force, count
-        )
+        return sensing_gaps(self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force, count)
 
     @property
     def fluid_pressure(self) -> float:
@@ -89,3 +85,19 @@ def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
     size = np.linalg.norm(force.sum(axis=0))
     across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
     return float(np.linalg.norm(across) / size) if size else 0.0
+
+
+def borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
+    force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
+    same = among(nodes, before.nodes)
+    at = np.searchsorted(before.nodes, nodes[same])
+    force[same], slipping[same] = before.nodal_force[at], before.slipping[at]
+    return force, slipping
+
+
+def among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Mark (k,) bool the nodes (k,) that are among sorted others (j,); a few times quicker than ``np.isin``."""
+    if not len(others):
+        return np.zeros(len(nodes), bool)
+    return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes

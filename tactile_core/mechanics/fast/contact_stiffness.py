@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from .active_set import UnsolvedError
-from .compliance_block import ComplianceBlock
+from .compliance_rows import ComplianceBlock
 
 RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 _MOST_UPDATES = 50  # of one inverse, before it is made anew: rounding adds up

@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import sensors
-from ...files.compiled import available
+from ...files.compiled import Loop
 from ...files.shipped import shipped
 from ...sensors import unrolling
 from .compliance import Compliance
 from .contact_state import Contact
-from .surface_loops import add_field
 
 REACH = 12.0  # patch radii, how far the learned fields go; they fade over the last of their cells
 LINES = 33  # of their grid, even in asinh(distance / radius): fine at the patch, coarse far from it
@@ -208,22 +207,6 @@ def grid_places() -> np.ndarray:
     return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 
 
-def spread_field(sensor: str, at: Frame, field: np.ndarray) -> np.ndarray:
-    """A field on the grid (g, 3), at all nodes of a sensor (n, 3), in the sensor's axes: bilinear, 0 beyond."""
-    place = (plane(sensor).T - at.centre[:, None]) / at.radius
-    inside = np.flatnonzero(np.maximum(np.abs(place[0]), np.abs(place[1])) < REACH)
-    position = (np.arcsinh(place.take(inside, axis=1)) / np.arcsinh(REACH) + 1) * ((LINES - 1) / 2)
-    cell = np.minimum(position.astype(int), LINES - 2)
-    u, v = position - cell
-    corner = cell[0] * LINES + cell[1]
-    grid = np.ascontiguousarray(field.reshape(-1, 3).T)  # axis by axis: sums over many nodes at a time are faster
-    local = (1 - v) * ((1 - u) * grid.take(corner, axis=1) + u * grid.take(corner + LINES, axis=1))
-    local += v * ((1 - u) * grid.take(corner + 1, axis=1) + u * grid.take(corner + LINES + 1, axis=1))
-    moved = np.zeros((place.shape[1], 3))
-    moved[inside] = np.einsum("ijk,jk->ki", _frames_by_axis(sensor).take(inside, axis=2), local)
-    return moved
-
-
 @functools.cache
 def _frames_by_axis(sensor: str) -> np.ndarray:
     """Return ``node_frames`` as (3, 3, n)."""
@@ -267,14 +250,37 @@ def correct(compliance: Compliance, contact: Contact, parts: Correction | None =
         return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)
     seen = features(compliance, contact, at)
-    return Corrected(_with_field(compliance.name, contact, at, parts.field(seen)), parts.factor(seen))
+    return Corrected(
+        add_field(compliance.name, contact.displacement, at, parts.field(seen), contact.depth), parts.factor(seen)
+    )
 
 
-def _with_field(sensor: str, contact: Contact, at: Frame, field: np.ndarray) -> np.ndarray:
-    """Displacement (n, 3) m of a contact with a field on the grid (g, 3), per metre of depth."""
-    if not available():
-        return contact.displacement + contact.depth * spread_field(sensor, at, field)
-    return add_field(
-        contact.displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius,
-        REACH, LINES, field, contact.depth,
+def add_field(sensor: str, displacement: np.ndarray, at: Frame, field: np.ndarray, scale: float) -> np.ndarray:
+    """Return a displacement (n, 3) m plus ``scale`` m times a field on the grid (g, 3), in the sensor's axes."""
+    return _add_field(
+        displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, REACH, LINES,
+        field, scale,
     )  # fmt: skip
+
+
+@Loop
+def _add_field(displacement, plane, frames, centre, radius, reach, lines, field, scale):  # noqa: ANN001, ANN202
+    """``displacement`` (n, 3) plus ``scale`` times a field on a grid, float64: bilinear, 0 beyond it."""
+    moved, per_line = np.empty(displacement.shape), (lines - 1) / 2 / np.arcsinh(reach)
+    middle = (lines - 1) / 2
+    for node in range(len(plane)):
+        x, z = (plane[node, 0] - centre[0]) / radius, (plane[node, 1] - centre[1]) / radius
+        for i in range(3):
+            moved[node, i] = displacement[node, i]
+        if max(abs(x), abs(z)) >= reach:
+            continue
+        u, v = np.arcsinh(x) * per_line + middle, np.arcsinh(z) * per_line + middle
+        row, column = min(int(u), lines - 2), min(int(v), lines - 2)
+        u, v = u - row, v - column
+        corner = row * lines + column
+        for j in range(3):
+            local = (1 - v) * ((1 - u) * field[corner, j] + u * field[corner + lines, j])
+            local += v * ((1 - u) * field[corner + 1, j] + u * field[corner + lines + 1, j])
+            for i in range(3):
+                moved[node, i] += scale * frames[i, j, node] * local
+    return moved

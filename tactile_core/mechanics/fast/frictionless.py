@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...files.compiled import available
+from ...files.compiled import Loop
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.indenters.indenter import lengths
-from ...geometry.node_vectors import weighted
 from .active_set import Pressing, complement
-from .compliance_block import ComplianceBlock
-from .frictionless_loops import tangent_response
+from .compliance_rows import ComplianceBlock
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
@@ -233,7 +231,8 @@ class Frictionless:
             return None
         nodes, root = touching[felt[chosen // 3]], np.sqrt(weight[chosen])
         tangent = axes[chosen // 3, :, chosen % 3] * root[:, None]
-        among, onto_gaps = self._tangent_response(nodes, tangent, normal, active)
+        core = active[len(touching) :] - self.block.k
+        among, onto_gaps = _tangent_response(self.block.matrix, self.block.k, nodes, tangent, normal, touching, core)
         relief, _ = lapack.dpotrs(solved.factor, onto_gaps.T, lower=1)
         among = among - onto_gaps @ relief
         mode, shape = np.linalg.eigh((among + among.T) / 2)
@@ -246,22 +245,6 @@ class Frictionless:
         force = change[: self.block.k, None] * normal
         np.add.at(force, nodes, amount[:, None] * tangent)
         return force, change[self.block.k :]
-
-    def _tangent_response(
-        self, nodes: np.ndarray, tangent: np.ndarray, normal: np.ndarray, active: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Motion along weighted tangents (q, 3) at nodes (q,) under forces along them (q, q); of active gaps (q, a)."""
-        k, touching = self.block.k, active[active < self.block.k]
-        if available():
-            core = active[len(touching) :] - k
-            return tangent_response(self.block.matrix, k, nodes, tangent, normal, touching, core)
-        three = 3 * nodes + np.arange(3)[:, None]
-        moved = weighted(self.block.matrix.take(three, axis=0), tangent.T[:, :, None])
-        on_surface = moved[:, : 3 * k].reshape(len(nodes), k, 3)
-        onto_gaps = np.einsum("qbi,bi->qb", on_surface, normal).take(touching, axis=1)
-        if self.block.c:
-            onto_gaps = np.concatenate([onto_gaps, moved[:, active[len(touching) :] + 2 * k]], axis=1)
-        return np.einsum("qri,ri->qr", on_surface[:, nodes], tangent), onto_gaps
 
     def _settled(self, state: Try, gap, normal, step, axial_force) -> bool:  # noqa: ANN001
         active = state.active[: len(gap)]
@@ -283,3 +266,33 @@ def _stiffness(mode: np.ndarray) -> np.ndarray:
     """1 - mode, Newton's divisor; a mode above 1 runs away from equilibrium, and the step goes that way."""
     away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
     return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)
+
+
+@Loop
+def _tangent_response(matrix, k, nodes, tangent, normal, touching, core):  # noqa: ANN001, ANN202
+    """Compute what unit forces along weighted tangents (q, 3) at ``nodes`` (q,) move.
+
+    Returns the motion along them (q, q), and of the gaps (q, t + d) of the touching nodes (t,) and of the points
+    (d,) that press on the core.
+    """
+    q, t, d = len(nodes), len(touching), len(core)
+    among, onto_gaps = np.empty((q, q)), np.empty((q, t + d))
+    for each in range(q):
+        x, y, z = tangent[each, 0], tangent[each, 1], tangent[each, 2]
+        first, second, third = matrix[3 * nodes[each]], matrix[3 * nodes[each] + 1], matrix[3 * nodes[each] + 2]
+        for b in range(t):
+            total = 0.0
+            for i in range(3):
+                j = 3 * touching[b] + i
+                total += (x * first[j] + y * second[j] + z * third[j]) * normal[touching[b], i]
+            onto_gaps[each, b] = total
+        for b in range(d):
+            j = 3 * k + core[b]
+            onto_gaps[each, t + b] = x * first[j] + y * second[j] + z * third[j]
+        for other in range(q):
+            total = 0.0
+            for i in range(3):
+                j = 3 * nodes[other] + i
+                total += (x * first[j] + y * second[j] + z * third[j]) * tangent[other, i]
+            among[each, other] = total
+    return among, onto_gaps

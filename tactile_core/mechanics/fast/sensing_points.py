@@ -12,8 +12,7 @@ from ... import sensors
 from ...sensors import unrolling
 from ..solids.biotac_core import Core, above_core, facing_core
 from ..solids.hex_mesh import HexMesh, skin_mesh
-from .condense import mirror_nodes
-from .mirror_symmetry import axes_of
+from .condense import axes_of, mirror_nodes
 
 ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 

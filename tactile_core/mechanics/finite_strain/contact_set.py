@@ -13,7 +13,7 @@ import dataclasses
 import numpy as np
 
 from ...geometry.indenters import Pose
-from ..fast.projection import first_contact
+from ..fast.candidates import first_contact
 from .obstacle import Obstacle
 
 _NO_WAY = np.zeros((0, 3))

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from benchmarks.mechanics.random_contacts import INDENTERS
 
-from tactile_core.mechanics.fast import surface_response
 from tactile_core.mechanics.fast.compliance import compliance_of
-from tactile_core.mechanics.fast.compliance_rows import ComplianceRows
+from tactile_core.mechanics.fast.compliance_rows import ComplianceBlock, ComplianceRows, surface_motion
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.sensors import sensor_surface
@@ -21,7 +20,7 @@ def test_near_nodes_move_as_on_the_whole_surface(sensor):
     for some in (slice(0, 20), slice(10, 50)):  # half of the second ones are known by then
         nodes = near[some]
         force = random.normal(size=(len(nodes), 3)) * 0.01
-        whole = surface_response.displacement(compliance, nodes, force, inner, inner_force)[compliance.touchable[near]]
+        whole = surface_motion(compliance, nodes, force, inner, inner_force)[compliance.touchable[near]]
         found = rows.moved(nodes, force, inner, inner_force)
         # single precision of sums of some hundred terms
         np.testing.assert_allclose(found, whole, rtol=0, atol=1e-5 * np.abs(whole).max())
@@ -55,3 +54,17 @@ def test_nodes_are_followed_as_the_indenter_slides_on():
         gap, _ = there.distance(ball, compliance.surface.rest + contact.displacement)
         assert contact.converged and contact.axial_force > 0
         assert gap.min() > -1e-6  # m, the target
+
+
+def test_turning_some_normals_is_the_same_as_starting_with_them():
+    skin = compliance_of("biotac")
+    nodes = np.arange(400, 440)
+    block = ComplianceBlock(skin, nodes, skin.feet + np.arange(5), ComplianceRows(skin, nodes))
+    random = np.random.default_rng(0)
+    before, after = (v / np.linalg.norm(v, axis=1, keepdims=True) for v in random.normal(size=(2, block.k, 3)))
+    at = np.array([0, 7, 39])
+    mixed = before.copy()
+    mixed[at] = after[at]
+    whole = block.normal(mixed)
+    # single precision of sums of nine terms
+    np.testing.assert_allclose(block.turned(block.normal(before), mixed, at), whole, atol=1e-6 * np.abs(whole).max())

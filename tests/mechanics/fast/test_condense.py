@@ -6,9 +6,8 @@ import scipy.sparse.linalg
 from slab import slab_mesh
 
 from tactile_core.mechanics.fast.compliance import Compliance, Solid, build
-from tactile_core.mechanics.fast.compliance_block import ComplianceBlock
+from tactile_core.mechanics.fast.compliance_rows import ComplianceBlock, ComplianceRows, surface_motion
 from tactile_core.mechanics.fast.condense import condense, mirror_nodes
-from tactile_core.mechanics.fast.surface_response import displacement
 from tactile_core.mechanics.solids.elasticity import assemble
 from tactile_core.sensors import Material
 
@@ -36,8 +35,8 @@ def test_every_force_has_the_answer_of_the_solid(block):
     mesh, lattice, answer = block
     touchable = np.flatnonzero(lattice.rest[:, 0] > -1.5e-3)
     compliance = Compliance("slab", lattice, touchable, **build(Solid("slab", lattice, touchable, mesh, MATERIAL)))
-    none = np.empty(0, int)
-    matrix = ComplianceBlock(compliance, np.arange(len(touchable)), none).matrix
+    none, every = np.empty(0, int), np.arange(len(touchable))
+    matrix = ComplianceBlock(compliance, every, none, ComplianceRows(compliance, every)).matrix
     surface = (3 * mesh.surface[:, None] + np.arange(3)).ravel()
     for node, at in enumerate(touchable):
         force = np.eye(3)[node % 3]
@@ -45,7 +44,7 @@ def test_every_force_has_the_answer_of_the_solid(block):
         load[mesh.surface[at]] = force
         exact = answer(load.ravel())[surface]
         error = 2e-7 * np.abs(matrix).max()  # single precision
-        moved = displacement(compliance, np.array([node]), force[None], none, np.empty(0))
+        moved = surface_motion(compliance, np.array([node]), force[None], none, np.empty(0))
         np.testing.assert_allclose(moved.ravel(), exact, atol=error)
         np.testing.assert_allclose(matrix[3 * node + node % 3], exact.reshape(-1, 3)[touchable].ravel(), atol=error)
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tactile_core.mechanics.fast.active_set import UnsolvedError
-from tactile_core.mechanics.fast.compliance_block import ComplianceBlock
+from tactile_core.mechanics.fast.compliance_rows import ComplianceBlock
 from tactile_core.mechanics.fast.contact_stiffness import RIDGE, ContactStiffness
-from tactile_core.mechanics.fast.stick_slip import Slipping, Step
+from tactile_core.mechanics.fast.coulomb import Motion, Points, slipping_nodes
+from tactile_core.mechanics.fast.newton_step import change_of
 
 CORE = 2
 
@@ -72,13 +73,16 @@ def test_the_step_fulfils_its_linear_equations(deepens):
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     lean = np.cross(normal, random.normal(size=(of.k, 3)))
     lean /= np.linalg.norm(lean, axis=1)[:, None]
-    slip, moves, gap = (random.normal(size=(of.k, 3)) * 1e-5 for _ in range(3))
+    slip, moves = (random.normal(size=(of.k, 3)) * 1e-5 for _ in range(2))
+    slip -= np.einsum("ai,ai->a", slip, normal)[:, None] * normal
+    gap = random.normal(size=of.k) * 1e-5
     bend = np.eye(3) * np.array([300.0, 500.0])[:, None, None]  # 1/m
-    slipping = Slipping(
-        at, normal[at], lean[at], np.full(len(at), 0.05), slip[at], moves[at], curved, bend, friction
-    )  # fmt: skip
-    direction, core_gap, away = np.array([0.0, 1.0, 0.0]), np.array([1e-5, -2e-5]), slip + gap
-    step = Step(ContactStiffness(), of, active, away, core_gap, direction, slipping, deepens=deepens)
+    direction, core_gap, bears = np.array([0.0, 1.0, 0.0]), np.array([1e-5, -2e-5]), 0.05 * normal
+    slips = np.isin(np.arange(of.k), at)
+    points = Points(bears, np.zeros(CORE), active, slips, normal, lean, gap, core_gap, slip)
+    motion = Motion(moves, slip, gap)
+    slipping, away = slipping_nodes(at, points, motion, curved, bend, friction), slip + gap[:, None] * normal
+    step = change_of(ContactStiffness().among(of, active), points, motion, slipping, direction, deepens=deepens)
     on = np.r_[np.repeat(active[: of.k], 3), active[of.k :]]
     compliance = of.matrix.astype(float) * (1 + RIDGE * np.eye(len(of.matrix)))
     for column in range(1 + deepens):
@@ -91,7 +95,7 @@ def test_the_step_fulfils_its_linear_equations(deepens):
         np.testing.assert_allclose(
             (compliance @ forces)[3 * of.k :], [-core_gap, 0 * core_gap][column], atol=1e-4 * scale
         )
-        off, across = moved[at] - goal[at], slipping.across
+        off, across = moved[at] - goal[at], slipping.across  # a slipping node closes its gap and may slip
         bears = forces[: 3 * of.k].reshape(-1, 3)[at]
         relative = moved[at[curved]] + (moves[at[curved]] if column == 0 else -direction)
         bears[curved] -= np.einsum("cij,cj->ci", slipping.turning, relative)

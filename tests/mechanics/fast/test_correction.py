@@ -13,8 +13,10 @@ from tactile_core.mechanics.fast.compliance import digit_compliance
 from tactile_core.mechanics.fast.correction import LINES, MIRRORED, Frame, correct, features, frame
 from tactile_core.mechanics.fast.press import FORCE_TOLERANCE, CorrectedPress
 from tactile_core.mechanics.placement import Placement, digit_pose
+from tactile_core.sensors import sensor_surface
 
 BALL = Sphere(3.5e-3)
+REST = np.zeros_like(sensor_surface("digit").rest)
 
 
 def press(z=1.5e-3, tilt=0.2, heading=0.7):
@@ -38,7 +40,7 @@ def test_a_field_is_spread_where_it_belongs_and_fades():
     at = Frame(np.array([-8e-3, 1e-3]), 1e-3)
     field = np.zeros((LINES, LINES, 3))
     field[LINES // 2, LINES // 2, 1] = -1.0  # outward at the centre
-    moved = correction.spread_field("digit", at, field.reshape(-1, 3))
+    moved = correction.add_field("digit", REST, at, field.reshape(-1, 3), 1.0)
     plane = correction.plane("digit")
     far = np.linalg.norm(plane - at.centre, axis=1) > 0.4e-3  # a cell of the grid at the centre is 0.2 mm
     assert not moved[far].any() and moved[:, 1].max() > 0.1 and not moved[:, [0, 2]].any()
@@ -49,7 +51,7 @@ def test_a_field_on_the_nodes_survives_the_way_to_the_grid_and_back():
     plane = correction.plane("digit")
     bump = np.exp(-((plane - at.centre) ** 2).sum(axis=1) / (2 * (2e-3) ** 2))
     field = np.stack([0.3 * bump, bump, -0.2 * bump], -1)
-    back = correction.spread_field("digit", at, learn_correction.residual_on_grid("digit", at, field))
+    back = correction.add_field("digit", REST, at, learn_correction.residual_on_grid("digit", at, field), 1.0)
     near = np.linalg.norm(plane - at.centre, axis=1) < 5e-3
     assert np.abs(back - field)[near].max() < 0.03  # bilinear on cells of 0.3 to 0.8 mm, a bump of 2 mm
 
@@ -78,7 +80,7 @@ def test_learning_recovers_a_known_factor_and_field(contact):
         at = frame(compliance, found)
         x = features(compliance, found, at)
         grid = np.exp(-(correction.grid_places() ** 2).sum(axis=-1)).reshape(-1, 1) * [0.0, 0.05 + 0.3 * x[0], 0.0]
-        full = found.displacement + found.depth * correction.spread_field("digit", at, grid)
+        full = correction.add_field("digit", found.displacement, at, grid, found.depth)
         samples.append(
             learn_correction.Sample(
                 number, 0.0, x, at, found.depth, 1 + x[0], found.displacement, full.astype(np.float32)

@@ -7,8 +7,7 @@ from tactile_core.geometry.catmull_rom import on_grid
 from tactile_core.geometry.indenters import Ring, Sphere
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
-from tactile_core.mechanics.fast.edge_contact import EdgeContactProblem
-from tactile_core.mechanics.fast.interpolated_points import SpringRows, interpolated_points
+from tactile_core.mechanics.fast.edge_contact import EdgeContactProblem, SpringRows, interpolated_points
 from tactile_core.mechanics.fast.press import FORCE_TOLERANCE, CorrectedPress
 from tactile_core.mechanics.penetration import PenetrationError, penetration_between
 from tactile_core.mechanics.placement import Placement, pose_at

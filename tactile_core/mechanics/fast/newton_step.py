@@ -1,0 +1,215 @@
+"""Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
+
+All motions but those of slipping nodes are known, and the stiffness of what touches (``contact_stiffness``) makes
+forces of them: the system to be solved has two unknowns a slipping node, however many stick. See ``coulomb``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...files.compiled import Loop, add_scaled
+from .active_set import UnsolvedError
+from .coulomb import LARGEST_TILT, LARGEST_TURN, Motion, Points, Slipping, known_motion
+
+
+class Change(NamedTuple):
+    """Change of forces in a Newton step, r columns: at rest and, where the indenter may move, for a metre of that.
+
+    forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, besides what turns with normals
+    moved : (q, 3, r) m, of curved nodes along the indenter; turns : (s, r) N, of friction across itself
+    """
+
+    forces: np.ndarray
+    bearing: np.ndarray
+    moved: np.ndarray
+    turns: np.ndarray
+
+
+def change_of(
+    stiffness: tuple[np.ndarray, np.ndarray], points: Points, motion: Motion, slipping: Slipping,
+    direction: np.ndarray, *, deepens: bool,
+) -> Change:  # fmt: skip
+    """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey the law.
+
+    stiffness : see ``ContactStiffness.among``; direction : (3,), in which the indenter moves if it ``deepens``
+    Raises UnsolvedError.
+    """
+    inverse, rows = stiffness
+    known = known_motion(points, motion, slipping, direction, 2 if deepens else 1)
+    forces = moving_forces(inverse, rows, known)
+    bearing, moved = borne(forces, known, motion.moves, slipping, direction)
+    count = len(slipping.at)
+    if not count:
+        return Change(forces, bearing, moved, np.empty((0, known.shape[1])))
+    system, right = slip_system(inverse, rows, len(known), slipping, bearing)
+    answer = np.ascontiguousarray(_solved(system, right))
+    slide(known, answer, slipping)
+    forces = moving_forces(inverse, rows, known)
+    return Change(forces, *borne(forces, known, motion.moves, slipping, direction), answer[count:])
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve the system (j, j) for ``right`` (j, r); overwrites the matrix. Raises UnsolvedError."""
+    from scipy.linalg import lapack
+
+    # LAPACK stores by columns: what it takes for the transposed matrix needs no copy.
+    factor, pivots, failed = lapack.sgetrf(matrix.T, overwrite_a=1)
+    if failed:
+        raise UnsolvedError("no motion of the slipping nodes balances their forces")
+    return lapack.sgetrs(factor, pivots, right, trans=1)[0].astype(float)
+
+
+@Loop
+def respond(matrix, force, core):  # noqa: ANN001, ANN201
+    """Compute the displacement (k, 3) m of nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
+    k, c = force.shape[0], core.shape[0]
+    size = 3 * k + c
+    moved, displacement, core_moved = np.zeros(size), np.empty((k, 3)), np.empty(c)
+    for row in range(size):
+        load = force[row // 3, row % 3] if row < 3 * k else core[row - 3 * k]
+        if load != 0.0:
+            add_scaled(moved, load, matrix[row])
+    for a in range(k):
+        for i in range(3):
+            displacement[a, i] = moved[3 * a + i]
+    for p in range(c):
+        core_moved[p] = moved[3 * k + p]
+    return displacement, core_moved
+
+
+@Loop
+def moving_forces(inverse, rows, motion):  # noqa: ANN001, ANN201
+    """Forces (m, r) N that move the points of ``rows`` (j,) by their ``motion`` (m, r) m; inverse : (j, j) float32."""
+    forces, sums = np.zeros(motion.shape), np.empty(len(rows), np.float32)
+    for column in range(motion.shape[1]):
+        sums[:] = 0
+        for i in range(len(rows)):
+            way = np.float32(motion[rows[i], column])
+            if way != 0:
+                add_scaled(sums, way, inverse[i])
+        for j in range(len(rows)):
+            forces[rows[j], column] = sums[j]
+    return forces
+
+
+@Loop
+def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
+    """Find what slipping nodes bear, (s, 3, r) N, besides what turns with their normals, and curved ones' motion.
+
+    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the second (q, 3, r) m is relative to the indenter
+    """
+    at, curved, columns = slipping.at, slipping.curved, forces.shape[1]
+    bearing, moved = np.empty((len(at), 3, columns)), np.empty((len(curved), 3, columns))
+    for a in range(len(at)):
+        for i in range(3):
+            for column in range(columns):
+                bearing[a, i, column] = forces[3 * at[a] + i, column]
+    for p in range(len(curved)):
+        node = at[curved[p]]
+        for column in range(columns):
+            for i in range(3):
+                moved[p, i, column] = known[3 * node + i, column]
+                moved[p, i, column] += moves[node, i] if column == 0 else -direction[i]
+            for i in range(3):
+                for j in range(3):
+                    bearing[curved[p], i, column] -= slipping.turning[p, i, j] * moved[p, j, column]
+    return bearing, moved
+
+
+@Loop
+def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
+    """System (2 s, 2 s) float32 and right (2 s, r) of the unknowns of slipping nodes: way along friction, and turn.
+
+    Its rows demand that no force is left along t - mu n, and that friction turns as the slip across it does.
+    rows : (j,) of the inverse, among ``size`` degrees of freedom
+    """
+    s, columns, curved = len(slipping.at), bearing.shape[2], slipping.curved
+    system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
+    bend, at, ways, place = np.empty(s, np.int64), np.empty(s, np.int64), np.empty((2, 3)), np.empty(size, np.int64)
+    for j in range(len(rows)):
+        place[rows[j]] = j
+    for a in range(s):
+        at[a], bend[a] = place[3 * slipping.at[a]], -1
+    for p in range(len(curved)):
+        bend[curved[p]] = p
+    normal, lean, across, against = slipping.normal, slipping.lean, slipping.across, slipping.against
+    for a in range(s):
+        node, first, second, third = slipping.at[a], inverse[at[a]], inverse[at[a] + 1], inverse[at[a] + 2]
+        for i in range(3):
+            ways[0, i], ways[1, i] = lean[node, i] - slipping.friction * normal[node, i], across[a, i]
+        for way in range(2):
+            x, y, z = np.float32(ways[way, 0]), np.float32(ways[way, 1]), np.float32(ways[way, 2])
+            mixed = x * first + y * second + z * third
+            for i in range(3):
+                for j in range(3 if bend[a] >= 0 else 0):
+                    mixed[at[a] + j] -= np.float32(ways[way, i] * slipping.turning[bend[a], i, j])
+                for column in range(columns):
+                    right[way * s + a, column] -= ways[way, i] * bearing[a, i, column]
+            line = system[way * s + a]
+            for b in range(s):
+                x, y, z, other = mixed[at[b]], mixed[at[b] + 1], mixed[at[b] + 2], slipping.at[b]
+                line[b] = x * lean[other, 0] + y * lean[other, 1] + z * lean[other, 2]
+                line[s + b] = -against[b] * (x * across[b, 0] + y * across[b, 1] + z * across[b, 2])
+        system[s + a, s + a] -= np.float32(1)
+    return system, right
+
+
+@Loop
+def slide(known, answer, slipping):  # noqa: ANN001, ANN201
+    """Add the slip that belongs to the slipping nodes' unknowns (2 s, r) to the motion ``known`` (3 k + c, r) m."""
+    s, lean, across, against = len(slipping.at), slipping.lean, slipping.across, slipping.against
+    for a in range(s):
+        node = slipping.at[a]
+        for i in range(3):
+            for column in range(known.shape[1]):
+                way = lean[node, i] * answer[a, column] - across[a, i] * against[a] * answer[s + a, column]
+                known[3 * node + i, column] += way
+
+
+@Loop
+def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
+    """Compute forces (k, 3), (c,) N after a ``Change``; step : m, of the indenter."""
+    forces, bearing, moved, turns = change
+    k, new, new_core, last = len(force), force.copy(), core.copy(), forces.shape[1] - 1
+    for a in range(k):
+        for i in range(3):
+            new[a, i] += forces[3 * a + i, 0] + (step * forces[3 * a + i, 1] if last else 0.0)
+    for p in range(len(core)):
+        new_core[p] += forces[3 * k + p, 0] + (step * forces[3 * k + p, 1] if last else 0.0)
+    normal, lean, across, curved = slipping.normal, slipping.lean, slipping.across, slipping.curved
+    place, u, v, tilt = 0, np.empty(3), np.empty(3), np.empty(3)
+    for a in range(len(slipping.at)):
+        node, total = slipping.at[a], slipping.pressing[a]
+        for i in range(3):
+            total += normal[node, i] * (bearing[a, i, 0] + (step * bearing[a, i, 1] if last else 0.0))
+        turn = turns[a, 0] + (step * turns[a, 1] if last else 0.0)
+        turn = min(max(turn / slipping.limit[a], -LARGEST_TURN), LARGEST_TURN)
+        for i in range(3):
+            u[i] = normal[node, i]
+            v[i] = np.cos(turn) * lean[node, i] + np.sin(turn) * across[a, i]
+        if place < len(curved) and curved[place] == a:
+            size = 0.0
+            for i in range(3):
+                tilt[i] = 0.0
+                for j in range(3):
+                    way = moved[place, j, 0] + (step * moved[place, j, 1] if last else 0.0)
+                    tilt[i] += slipping.bend[place, i, j] * way
+                size += tilt[i] ** 2
+            share, size = min(1.0, LARGEST_TILT / max(np.sqrt(size), 1e-12)), 0.0
+            for i in range(3):
+                u[i] += share * tilt[i]
+                size += u[i] ** 2
+            for i in range(3):
+                u[i] /= np.sqrt(size)
+            place += 1
+        onto = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+        size = 0.0
+        for i in range(3):
+            v[i] -= onto * u[i]
+            size += v[i] ** 2
+        for i in range(3):
+            new[node, i] = total * (u[i] + slipping.friction * v[i] / np.sqrt(size))
+    return new, new_core
