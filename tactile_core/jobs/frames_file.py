@@ -8,6 +8,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from .. import sensors
 from ..files.hdf5_writer import Disk
 from ..files.version import __version__
@@ -16,7 +18,6 @@ from ..sensors import PAIR
 
 if TYPE_CHECKING:
     import h5py
-    import numpy as np
 
     from ..translation.answer import Answer
 
@@ -59,7 +60,7 @@ KEPT = {
         "traction_force": ("N", "(T, 3) what traction_digit adds up to: as large as force, along the gel's own shear"),
     },
     "marker_motion": {
-        "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: (n, 2) px"),
+        "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: n pairs, px"),
     },
     SAMPLES: {
         "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),
@@ -105,6 +106,13 @@ def described(meaning: str, pair: tuple[str, str]) -> str:
     return meaning.replace("(T, 19) E1..E19", f"(T, {count}) E1..E{count}")
 
 
+def netcdf_value(value: Any) -> Any:
+    """Return an attribute as netCDF can hold it, which has neither truth values nor arrays of several axes."""
+    if isinstance(value, bool | np.bool_):
+        return int(value)
+    return value.ravel() if isinstance(value, np.ndarray) else value
+
+
 class FramesFile:
     """Writer of ``frames.h5``, some frames at a time; it holds the kept arrays alone.
 
@@ -130,7 +138,8 @@ class FramesFile:
         self._count, self._framed, self._pair = count, bool(room), pair
         self._disk = Disk(path)
         self._file = h5py.File(self._disk, "w", userblock_size=room)
-        self._file.attrs.update({"format": FORMAT, "tactile_core": __version__, **attributes})
+        about = {"format": FORMAT, "tactile_core": __version__, **attributes}
+        self._file.attrs.update({name: netcdf_value(value) for name, value in about.items()})
 
     def __enter__(self) -> FramesFile:
         return self
@@ -172,7 +181,7 @@ class FramesFile:
     def annotate(self, name: str, **attributes: Any) -> None:
         """Add attributes to a dataset that exists."""
         with self._checked():
-            self._file[name].attrs.update(attributes)
+            self._file[name].attrs.update({key: netcdf_value(value) for key, value in attributes.items()})
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
         kind = "float32" if array.dtype.kind == "f" and name != "time" else array.dtype  # an hour has 4e8 us

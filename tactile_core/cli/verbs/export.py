@@ -19,7 +19,7 @@ EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""
 LEAVES = NOTHING
-LAYOUTS = ("npz", "png", "exr", "lerobot")
+LAYOUTS = ("npz", "png", "exr", "lerobot", "lerobot21")
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 import shutil
-import sys
 from pathlib import Path
 
-import fake_tools
 import h5py
 import numpy as np
 import pytest
@@ -20,32 +17,10 @@ from tactile_core.cli.verbs import export as verb
 from tactile_core.errors import TactileError
 from tactile_core.files import checksummed
 from tactile_core.jobs import export
-from tactile_core.jobs.engine import inputs, local, recipes
 from tactile_core.jobs.engine import job as jobs
-from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.export import finished_job
 
-WORKER = Path(__file__).resolve().parents[2] / "jobs" / "engine" / "fake_worker.py"
 FRAMES = {"00000_a": 70, "00001_b": 45}
-
-
-@pytest.fixture(scope="module")
-def job(tmp_path_factory):
-    """A finished job of two recordings with pictures."""
-    folder = tmp_path_factory.mktemp("job")
-    paths = []
-    for name, frames in (("a", 70), ("b", 45)):
-        press = np.clip(np.arange(frames) - 20, 0, 30)[:, None] * np.linspace(1, 3, 19)
-        noise = np.random.default_rng(frames).normal(0, 1, (frames, 19))
-        paths.append(folder.parent / f"{name}.npz")
-        np.savez(paths[-1], electrodes=np.rint(3000 + press + noise), time=np.arange(frames) / 100)
-    recipe = recipes.Translate(["latent", "height", "image"], "0" * 64, shard_frames=40)
-    made = jobs.make(inputs.hashed(paths, lambda done, total: None), recipe, None)
-    jobs.write(folder, made)
-    with runs.opened(folder, None):
-        place = local.Local(folder, 1, command=(sys.executable, str(WORKER)))
-        runs.run(folder, made, place, None, lambda done, total: None)
-    return folder
 
 
 def silent(done, total):
@@ -53,7 +28,7 @@ def silent(done, total):
 
 
 def test_every_layout_has_a_test_here():
-    assert set(export.layouts()) == {"npz", "png", "exr", "lerobot"} == set(verb.LAYOUTS)
+    assert set(export.layouts()) == {"npz", "png", "exr", "lerobot", "lerobot21"} == set(verb.LAYOUTS)
 
 
 def test_npz_holds_every_array_whole_and_the_same_bytes_each_time(job, tmp_path):
@@ -91,43 +66,6 @@ def test_exr_holds_heights_and_pictures(job, tmp_path):
         np.testing.assert_array_equal(planes["height"], block["height_map"][30])
         np.testing.assert_array_equal(np.stack([planes[c] for c in "RGB"], -1), block["image"][30])
         assert about["frame"] == "30" and about["recording"] == one.name
-
-
-def test_lerobot_reads_back_with_plain_pyarrow(job, tmp_path):
-    reason = "pyarrow is absent, or newer than this numpy: pip install tactile-core[batch]"
-    pq = pytest.importorskip("pyarrow.parquet", reason=reason, exc_type=ImportError)
-    source = export.export(job, "lerobot", tmp_path / "out", silent)
-    out = tmp_path / "out"
-    info = json.loads((out / "meta" / "info.json").read_text())
-    assert (info["codebase_version"], info["total_episodes"], info["total_frames"], info["fps"]) == (
-        "v3.0",
-        2,
-        115,
-        100,
-    )
-    episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
-    assert [one["length"] for one in episodes] == [70, 45]
-    assert pq.read_table(out / "meta" / "tasks.parquet").to_pylist()[0]["task_index"] == 0
-    for one, episode in zip(source.recordings, episodes, strict=True):
-        path = info["data_path"].format(chunk_index=episode["data/chunk_index"], file_index=episode["data/file_index"])
-        table = pq.read_table(out / path)
-        assert set(table.column_names) == set(info["features"])
-        rows = [row for row in table.to_pylist() if row["episode_index"] == episode["episode_index"]]
-        first, last = episode["dataset_from_index"], episode["dataset_to_index"]
-        assert [row["index"] for row in rows] == list(range(first, last))
-        assert [row["frame_index"] for row in rows] == list(range(one.frames))
-        arrays = {name: np.concatenate([block[name] for block in one.blocks()]) for name in one.arrays()}
-        for name in ("electrodes", "force", "latent_digit"):
-            found = np.array([row[f"observation.{name}"] for row in rows], np.float32)
-            np.testing.assert_array_equal(found, arrays[name])
-        picture = Image.open(io.BytesIO(rows[-1]["observation.images.digit"]["bytes"]))
-        np.testing.assert_array_equal(np.asarray(picture), arrays["image"][-1])
-        assert list(info["features"]["observation.images.digit"]["shape"]) == [*fake_tools.SHAPE, 3]
-    stats = json.loads((out / "meta" / "stats.json").read_text())
-    forces = np.concatenate([block["force"] for one in source.recordings for block in one.blocks()])
-    np.testing.assert_allclose(
-        stats["observation.force"]["std"], forces.std(axis=0, dtype=np.float64), rtol=1e-6, atol=1e-9
-    )
 
 
 def test_what_cannot_be_exported_is_told(job, tmp_path):
@@ -242,17 +180,3 @@ def test_what_was_set_aside_is_told(job, tmp_path, capsys):
     assert json.loads((tmp_path / "out" / "note.json").read_text())["left_out"] == {"00001_b": "b.npz: damaged"}
     assert main(words) == 2
     assert "--overwrite" not in capsys.readouterr().err  # which this verb does not have
-
-
-@pytest.mark.parametrize(("stretch", "said"), [(3.0, "as the first"), (1e6, "1 or more")])
-def test_lerobot_takes_one_rate(stretch, said, job, tmp_path):
-    reason = "pyarrow is absent, or newer than this numpy: pip install tactile-core[batch]"
-    pytest.importorskip("pyarrow.parquet", reason=reason, exc_type=ImportError)
-    shutil.copytree(job, tmp_path / "job")
-    for name, number in (("00001_b", 0), ("00001_b", 1), *([("00000_a", 0), ("00000_a", 1)] if stretch > 99 else [])):
-        path = jobs.shard_file(tmp_path / "job", name, number)
-        with h5py.File(path, "r+") as file:
-            file["time"][:] *= stretch
-        checksummed.write_checksum(path)
-    with pytest.raises(TactileError, match=said):
-        export.export(tmp_path / "job", "lerobot", tmp_path / "out", silent)

@@ -1,4 +1,7 @@
-"""``<recording>.npz``: all arrays of a recording, as NumPy reads them; frames are written as they come."""
+"""``<recording>.npz``: all arrays of a recording, as NumPy reads them, and labels as ``labels/<name>``.
+
+Frames are written as they come.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,9 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
         with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:
             for name, (shape, kind) in one.arrays().items():
                 _write(archive, one, name, (one.frames, *shape), kind)
+            for label, column in one.labels.items():
+                with archive.open(zipfile.ZipInfo(f"labels/{label}.npy", TIME), "w") as out:
+                    np.lib.format.write_array(out, column.astype(str), allow_pickle=False)
         done += one.frames
         progress(done, source.frames)
 

@@ -1,0 +1,198 @@
+"""What LeRobot's layouts 2.1 and 3.0 share: features, rows, statistics, and the pass over a job's recordings.
+
+One recording is one episode. LeRobot trains on what a robot sees, its state, and the action asked of it. A touch has no
+command, so the state is the contact on the DIGIT, and the action the state of the next frame: what is learnt is the
+touch to come. Steps of time are even, as LeRobot demands; ``time`` is the recording's own clock. A number that is not
+known is 0, as training on NaN ends in NaN; ``contact`` tells a place from none.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+
+from ...errors import TactileError
+from ...files import atomic
+from ...sensors import SAMPLE_RATE
+from .finished_job import Finished, Recorded
+from .lerobot_stats import EpisodeStats, Stats
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Rows = dict[str, np.ndarray]
+Features = dict[str, dict[str, Any]]  # name -> type, shape and names, as info.json has them
+CHUNK = 1000  # files a folder
+SAME_RATE = 0.1  # that recordings may differ by: clocks and lost frames do, 100 Hz and 50 Hz do not (assumed)
+TASK = "touch, BioTac to DIGIT"
+PICTURE, STATE, ACTION = "observation.images.digit", "observation.state", "action"
+CONTACT = {
+    "force": ("force_x", "force_y", "force_z"),
+    "contact_center": ("place_x", "place_z"),
+    "contact": ("contact",),
+}
+NUMBERS = ("electrodes", *CONTACT, "confidence", "latent_digit")
+PLAIN = {
+    "time": "float64", "timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64",
+    "task_index": "int64",
+}  # fmt: skip
+
+
+class Layout(Protocol):
+    """Where the files of a version lie. version : as info.json names it; picture : the type of pictures in it."""
+
+    version: str
+    picture: Literal["image", "video"]
+
+    def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
+        """Add rows of an episode."""
+
+    def end_episode(self) -> dict[str, Any]:
+        """Close what holds one episode; returns what the list of episodes says of its place."""
+
+    def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
+        """Close all files and write all lists; returns what info.json says of the layout."""
+
+
+def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:
+    """Write all recordings; needs pyarrow of the extra [batch].
+
+    Raises TactileError where numpy does not fit pyarrow, and for recordings of different rates.
+    """
+    try:
+        import pyarrow  # noqa: F401
+    except ModuleNotFoundError:
+        raise
+    except ImportError as error:
+        raise TactileError("pyarrow", str(error), "one that this numpy works with") from error
+    rate = _one_rate(source)
+    features = _features(source, layout.picture, rate)
+    episodes: list[dict[str, Any]] = []
+    stats: list[Stats] = []
+    done = 0
+    for index, one in enumerate(source.recordings):
+        start, gathered = done, EpisodeStats()
+        for rows in _rows(one, index, start, features, rate):
+            gathered.add(rows)
+            layout.write(index, rows, features, rate)
+            done += len(rows["index"])
+            progress(done, source.frames)
+        about = {"episode_index": index, "tasks": [TASK], "length": one.frames, "recording": one.name}
+        episodes.append(about | {"dataset_from_index": start, "dataset_to_index": done} | layout.end_episode())
+        stats.append(gathered.summarise())
+    (folder / "meta").mkdir()
+    info = {
+        "codebase_version": layout.version, "robot_type": "biotac_to_digit", "total_episodes": len(episodes),
+        "total_frames": done, "total_tasks": 1, "chunks_size": CHUNK, "fps": rate,
+        "splits": {"train": f"0:{len(episodes)}"}, **layout.finish(episodes, stats), "features": features,
+    }  # fmt: skip
+    atomic.write_json(folder / "meta" / "info.json", info)
+
+
+def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
+    """Describe what every frame has."""
+    arrays = source.recordings[0].arrays()
+    shapes = {name: list(shape) or [1] for name, (shape, _) in arrays.items()} | {"contact": [1]}
+    found: Features = {}
+    if "image" in arrays:
+        found[PICTURE] = {"dtype": picture, "shape": shapes["image"], "names": ["height", "width", "channels"]}
+        if picture == "video":
+            found[PICTURE]["info"] = _about_video(*shapes["image"], rate)
+    names = [part for parts in CONTACT.values() for part in parts]
+    for name in (STATE, ACTION):
+        found[name] = {"dtype": "float32", "shape": [len(names)], "names": names}
+    for name in NUMBERS:
+        if name in shapes:
+            found[f"observation.{name}"] = {"dtype": "float32", "shape": shapes[name], "names": None}
+    labels = sorted({name for one in source.recordings for name in one.labels})
+    kinds = {LABEL + name: "string" for name in labels} | PLAIN
+    return found | {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in kinds.items()}
+
+
+def _about_video(height: int, width: int, channels: int, rate: int) -> dict[str, Any]:
+    about = {"height": height, "width": width, "channels": channels, "fps": rate, "codec": "mpeg4"}
+    about |= {"pix_fmt": "yuv420p", "is_depth_map": False}
+    return {f"video.{name}": value for name, value in about.items()} | {"has_audio": False}
+
+
+def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
+    """Yield columns of some rows of an episode; `start` is its first row in the whole data set."""
+    blocks = map(_with_state, one.blocks())
+    for block, following in itertools.pairwise(itertools.chain(blocks, [None])):
+        frame, state = block["frame"].astype(np.int64), block["state"]
+        after = state[-1:] if following is None else following["state"][:1]
+        own = {
+            "timestamp": frame / rate, "frame_index": frame, "index": frame + start,
+            "episode_index": np.full(len(frame), episode), "task_index": np.zeros(len(frame)), "time": block["time"],
+            ACTION: np.concatenate([state[1:], after]), PICTURE: block.get("image"),
+        }  # fmt: skip
+        rows: Rows = {}
+        for name, feature in features.items():
+            if name.startswith(LABEL):
+                words = one.labels.get(name.removeprefix(LABEL))
+                rows[name] = np.full(len(frame), "") if words is None else words[frame].astype(str)
+            else:
+                values = own[name] if name in own else block[name.removeprefix("observation.")]
+                rows[name] = values if name == PICTURE else _finite(values).astype(feature["dtype"])
+        yield rows
+
+
+def _with_state(block: Rows) -> Rows:
+    """Add whether a contact has a place, and the state."""
+    block = block | {"contact": np.isfinite(block["contact_center"]).all(axis=1)}
+    parts = [_finite(block[name]).reshape(len(block["frame"]), -1) for name in CONTACT]
+    return block | {"state": np.concatenate(parts, axis=1)}
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(values, nan=0, posinf=0, neginf=0)
+
+
+def _one_rate(source: Finished) -> int:
+    """Return the rate of all recordings, whole frames a second.
+
+    Raises TactileError for a recording of another rate than the first one's, and for less than a frame a second.
+    """
+    first = _rate(source.recordings[0])
+    for one in source.recordings:
+        rate = _rate(one)
+        if round(first) < 1 or abs(rate / first - 1) > SAME_RATE:
+            expected = f"{first:g} frames/s, as the first: the layout has one rate" if round(first) else "1 or more"
+            advice = "Export it on its own, from a job of recordings of one rate"
+            raise TactileError(one.name, f"{rate:g} frames/s", expected, advice)
+    return round(first)
+
+
+def _rate(one: Recorded) -> float:
+    """Hz, over the first frames; the nominal rate for a single one."""
+    steps = np.diff(next(one.blocks())["time"])
+    steps = steps[steps > 0]
+    return float(1 / np.median(steps)) if len(steps) else SAMPLE_RATE
+
+
+def table(rows: dict[str, Any], features: Features) -> pa.Table:
+    """Return rows in Arrow's types, with the features as Hugging Face's datasets library reads them; without videos."""
+    import pyarrow as pa
+
+    fields, described = [], {}
+    for name, feature in features.items():
+        kind, length = feature["dtype"], feature["shape"][0]
+        if kind == "video":
+            continue
+        if kind == "image":
+            fields.append(pa.field(name, pa.struct([("bytes", pa.binary()), ("path", pa.string())])))
+            described[name] = {"_type": "Image"}
+        elif length == 1:
+            fields.append(pa.field(name, pa.type_for_alias(kind)))
+            described[name] = {"dtype": kind, "_type": "Value"}
+        else:
+            fields.append(pa.field(name, pa.list_(pa.type_for_alias(kind), length)))
+            described[name] = {"feature": {"dtype": kind, "_type": "Value"}, "length": length, "_type": "Sequence"}
+    schema = pa.schema(fields, metadata={"huggingface": json.dumps({"info": {"features": described}})})
+    columns = [pa.array(list(rows[field.name]), field.type) for field in schema]
+    return pa.Table.from_arrays(columns, schema=schema)

@@ -1,0 +1,52 @@
+"""frames.h5 as other programs read it: netCDF's rules, xarray, pandas."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+from tactile_core.jobs.frames_file import ALWAYS, FramesFile
+
+FRAMES = 5
+SHAPES = {"electrodes": (19,), "force": (3,), "contact_center": (2,)}
+
+
+@pytest.fixture
+def frames(tmp_path):
+    """A file with every attribute that a conversion writes."""
+    arrays = {name: np.arange(FRAMES * np.prod(SHAPES.get(name, ()), dtype=int), dtype=float) for name in ALWAYS}
+    arrays = {name: values.reshape(FRAMES, *SHAPES.get(name, ())) for name, values in arrays.items()}
+    arrays |= {"flags": np.zeros(FRAMES, np.uint16), "frame": np.arange(FRAMES, dtype=np.int32)}
+    arrays |= {"marker_motion": np.zeros((FRAMES, 6, 2)), "height_map": np.zeros((FRAMES, 4, 3))}
+    path, about = tmp_path / "frames.h5", {"recording": "touch", "simulated": np.True_}
+    with FramesFile(path, FRAMES, ("marker_motion", "height"), about) as file:
+        file.write(0, arrays)
+        file.annotate("time", start_time=0.0)
+        file.annotate("electrodes", rest=np.ones(19), kind="raw")
+        file.annotate("marker_motion", rest=np.ones((6, 2)))
+    return path
+
+
+def test_no_attribute_or_dataset_breaks_netcdf_rules(frames):
+    with h5py.File(frames) as file:
+        every = [(name, key, value) for name, item in [("/", file), *file.items()] for key, value in item.attrs.items()]
+        assert ("/", "simulated", 1) in every
+        for name, key, value in every:
+            kind = np.asarray(value)
+            assert kind.ndim <= 1 and (isinstance(value, str) or kind.dtype.kind in "iuf"), (name, key)
+        assert {data.dtype.kind for data in file.values()} <= set("iuf")
+
+
+@pytest.mark.filterwarnings("ignore:The 'phony_dims' kwarg")  # axes have no names
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_xarray_opens_it_and_writes_netcdf_and_pandas(engine, frames, tmp_path):
+    xarray = pytest.importorskip("xarray", reason="xarray is absent: pip install xarray h5netcdf netCDF4 pandas")
+    pytest.importorskip({"netcdf4": "netCDF4"}.get(engine, engine), reason=f"{engine} is absent: pip install it")
+    with xarray.open_dataset(frames, engine=engine) as found:
+        found.to_netcdf(tmp_path / "frames.nc", engine=engine)
+        table = found["force"].to_pandas()
+    with xarray.open_dataset(tmp_path / "frames.nc", engine=engine) as again, h5py.File(frames) as file:
+        for name, data in file.items():
+            np.testing.assert_array_equal(again[name], data)
+        np.testing.assert_array_equal(table, file["force"])
