@@ -49,8 +49,9 @@ def check(folder: Path, venv: Path) -> int:
         call(*tactile, "export", folder / "job", "--to", layout, "--out", made)
         failed += run(python.parent / "lerobot-doctor", "check", made)
         if layout == "lerobot21":
-            failed += min(run(python, "-m", name, "--repo-id", layout, "--root", made, "--push-to-hub", "false")
-                          for name in CONVERTERS if can_find(python, name))  # fmt: skip
+            name, root = next((name, root) for name, root in CONVERTERS.items() if can_find(python, name))
+            words = ("--repo-id", layout, "--root", (made / root).resolve(), "--push-to-hub", "false")
+            failed += run(python, "-m", name, *words)
         failed += run(python, __file__, "--train", made)
     print("failed" if failed else "LeRobot trains on both layouts, and the doctor passes them")
     return int(failed > 0)

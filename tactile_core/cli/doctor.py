@@ -56,7 +56,7 @@ LIBRARIES = (
     Library("distributed", "distributed", "batch", "batches on many machines (tactile batch --cluster)"),
     Library("pyarrow", "pyarrow", "batch", "LeRobot data sets (tactile export)"),
     Library("zmq", "pyzmq", "live", "reading what tactile watch --serve publishes (docs/read_frames.py)"),
-    Library("cv2", "opencv-python-headless", "camera", "a real DIGIT's camera (tactile watch --camera)"),
+    Library("cv2", "opencv-python-headless", "camera", "a DIGIT's camera (watch --camera), LeRobot v2.1's videos"),
     Library("torch", "torch", "train", "training (tactile train)"),
 )
 

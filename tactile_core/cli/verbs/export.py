@@ -14,7 +14,11 @@ Write the shards of a finished job (see `tactile batch`) as
   png      a folder of pictures a recording (the job must have kept image)
   exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
            (needs OpenEXR: see `tactile doctor`)
-  lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: see `tactile doctor`)"""
+  lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: see `tactile doctor`)
+  lerobot21
+           the same in LeRobot v2.1, which GR00T reads too: a file and a video an episode (needs pyarrow and OpenCV)
+In LeRobot's data sets observation.state is force (N), place (m) and contact (0 or 1), action that of the next frame;
+what is not known is 0, and labels are the strings labels.NAME."""
 EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""

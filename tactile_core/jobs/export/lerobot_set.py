@@ -8,7 +8,6 @@ known is 0, as training on NaN ends in NaN; ``contact`` tells a place from none.
 
 from __future__ import annotations
 
-import itertools
 import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -31,11 +30,10 @@ CHUNK = 1000  # files a folder
 SAME_RATE = 0.1  # that recordings may differ by: clocks and lost frames do, 100 Hz and 50 Hz do not (assumed)
 TASK = "touch, BioTac to DIGIT"
 PICTURE, STATE, ACTION = "observation.images.digit", "observation.state", "action"
-CONTACT = {
-    "force": ("force_x", "force_y", "force_z"),
-    "contact_center": ("place_x", "place_z"),
-    "contact": ("contact",),
-}
+LABEL = "labels."  # before a label's name; strings under "observation." end LeRobot's training
+CONTACT = {  # that the state is made of, in this order
+    "force": ("force_x", "force_y", "force_z"), "contact_center": ("place_x", "place_z"), "contact": ("contact",)
+}  # fmt: skip
 NUMBERS = ("electrodes", *CONTACT, "confidence", "latent_digit")
 PLAIN = {
     "time": "float64", "timestamp": "float32", "frame_index": "int64", "episode_index": "int64", "index": "int64",
@@ -102,7 +100,7 @@ def _features(source: Finished, picture: Literal["image", "video"], rate: int) -
     if "image" in arrays:
         found[PICTURE] = {"dtype": picture, "shape": shapes["image"], "names": ["height", "width", "channels"]}
         if picture == "video":
-            found[PICTURE]["info"] = _about_video(*shapes["image"], rate)
+            found[PICTURE]["info"] = _about_video(shapes["image"], rate)
     names = [part for parts in CONTACT.values() for part in parts]
     for name in (STATE, ACTION):
         found[name] = {"dtype": "float32", "shape": [len(names)], "names": names}
@@ -114,43 +112,48 @@ def _features(source: Finished, picture: Literal["image", "video"], rate: int) -
     return found | {name: {"dtype": kind, "shape": [1], "names": None} for name, kind in kinds.items()}
 
 
-def _about_video(height: int, width: int, channels: int, rate: int) -> dict[str, Any]:
-    about = {"height": height, "width": width, "channels": channels, "fps": rate, "codec": "mpeg4"}
-    about |= {"pix_fmt": "yuv420p", "is_depth_map": False}
+def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
+    about: dict[str, Any] = dict(zip(("height", "width", "channels"), shape, strict=True))
+    about |= {"fps": rate, "codec": "mpeg4", "pix_fmt": "yuv420p", "is_depth_map": False}
     return {f"video.{name}": value for name, value in about.items()} | {"has_audio": False}
 
 
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
     """Yield columns of some rows of an episode; `start` is its first row in the whole data set."""
-    blocks = map(_with_state, one.blocks())
-    for block, following in itertools.pairwise(itertools.chain(blocks, [None])):
-        frame, state = block["frame"].astype(np.int64), block["state"]
-        after = state[-1:] if following is None else following["state"][:1]
-        own = {
-            "timestamp": frame / rate, "frame_index": frame, "index": frame + start,
-            "episode_index": np.full(len(frame), episode), "task_index": np.zeros(len(frame)), "time": block["time"],
-            ACTION: np.concatenate([state[1:], after]), PICTURE: block.get("image"),
+    for block, following in _followed(one):
+        frame = block["frame"].astype(np.int64)
+        own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {
+            "timestamp": frame / rate, "frame_index": frame, "index": frame + start, "time": block["time"],
+            "episode_index": np.full(len(frame), episode), "task_index": np.zeros(len(frame)),
+            ACTION: np.concatenate([block["state"][1:], following]),
         }  # fmt: skip
         rows: Rows = {}
         for name, feature in features.items():
-            if name.startswith(LABEL):
+            if name == PICTURE:
+                rows[name] = block["image"]
+            elif name.startswith(LABEL):
                 words = one.labels.get(name.removeprefix(LABEL))
                 rows[name] = np.full(len(frame), "") if words is None else words[frame].astype(str)
             else:
-                values = own[name] if name in own else block[name.removeprefix("observation.")]
-                rows[name] = values if name == PICTURE else _finite(values).astype(feature["dtype"])
+                rows[name] = _finite(own[name]).astype(feature["dtype"])
         yield rows
 
 
-def _with_state(block: Rows) -> Rows:
-    """Add whether a contact has a place, and the state."""
-    block = block | {"contact": np.isfinite(block["contact_center"]).all(axis=1)}
-    parts = [_finite(block[name]).reshape(len(block["frame"]), -1) for name in CONTACT]
-    return block | {"state": np.concatenate(parts, axis=1)}
+def _followed(one: Recorded) -> Iterator[tuple[Rows, np.ndarray]]:
+    """Yield blocks of frames with their states, and the state that follows each block; after the last its own last."""
+    held: Rows = {}
+    for block in one.blocks():
+        block["contact"] = np.isfinite(block["contact_center"]).all(axis=1)
+        parts = [_finite(block[name]).reshape(len(block["frame"]), -1) for name in CONTACT]
+        block["state"] = np.concatenate(parts, axis=1)
+        if held:
+            yield held, block["state"][:1]
+        held = block
+    yield held, held["state"][-1:]
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    return np.nan_to_num(values, nan=0, posinf=0, neginf=0)
+    return np.nan_to_num(values, nan=0, posinf=0, neginf=0)  # what is not known
 
 
 def _one_rate(source: Finished) -> int:
@@ -179,7 +182,8 @@ def table(rows: dict[str, Any], features: Features) -> pa.Table:
     """Return rows in Arrow's types, with the features as Hugging Face's datasets library reads them; without videos."""
     import pyarrow as pa
 
-    fields, described = [], {}
+    fields: list[Any] = []
+    described: dict[str, dict[str, Any]] = {}
     for name, feature in features.items():
         kind, length = feature["dtype"], feature["shape"][0]
         if kind == "video":

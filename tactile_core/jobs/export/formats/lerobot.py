@@ -45,10 +45,10 @@ class _Together:
         """Add rows to the file that is open."""
         import pyarrow.parquet as pq
 
+        columns: dict[str, Any] = dict(rows)
         if PICTURE in rows:
-            pictures = [{"bytes": _png(picture), "path": None} for picture in rows[PICTURE]]
-            rows = {**rows, PICTURE: pictures}
-        added = table(rows, features)
+            columns[PICTURE] = [{"bytes": _png(picture), "path": None} for picture in rows[PICTURE]]
+        added = table(columns, features)
         if self._writer is None:
             self._path = self._folder / DATA.format(**self._place())
             self._path.parent.mkdir(parents=True, exist_ok=True)

@@ -88,7 +88,7 @@ class _Apart:
 def _open_video(path: Path, shape: list[int], rate: int) -> Any:
     import cv2
 
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), rate, (shape[1], shape[0]))
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), rate, (shape[1], shape[0]))
     if not video.isOpened():
         raise TactileError(path, "OpenCV writes no MPEG-4 here", "opencv-python-headless, of the extra [camera]")
     return video
