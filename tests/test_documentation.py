@@ -78,6 +78,8 @@ ELSEWHERE = {
     "tactile adapt slips/": ("tests/recordings/test_biotac_sp.py", '["adapt"'),
     "tactile convert slips/": ("tests/translation/test_shipped_biotac_sp.py", '"convert"'),
     "tactile info slips/": ("tests/recordings/test_biotac_sp.py", '["info"'),
+    "tactile calibrate presses.mp4": ("tests/pictures/calibrate/test_video_frames.py", "presses.mp4"),
+    "tactile calibrate small/": ("tests/pictures/calibrate/test_fit.py", '"small"'),
     "sbatch ": ("tests/jobs/engine/test_batch_slurm.py", "sbatch"),
 }
 # What no test runs, and why.

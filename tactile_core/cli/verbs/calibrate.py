@@ -26,6 +26,9 @@ and lights, their extent, colours, scale. Without a photograph of the untouched 
 takes its place. Ten presses spread over the gel are best; five or even one suffice, since parameters that presses do
 not determine stay near those of --start, and are named. Writes the calibration, and a sheet to look at (.png).
 
+A video (AVI, MP4; extra [camera]) stands for a folder: its deepest frame of each press is taken, and some of the
+untouched gel. Balls of several sizes: a folder or video for each, and their diameters in that order.
+
 The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
 
 With --test, a calibration is tested on photographs instead: only place and depth of each press are fitted, and the
@@ -36,6 +39,8 @@ examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
   tactile calibrate presses/ --ball-diameter 6 --background untouched.png --out unit.toml
   tactile calibrate presses/ --ball-diameter 6 --gel gelsight_mini --out unit.toml
+  tactile calibrate presses.mp4 --ball-diameter 6 --out unit.toml
+  tactile calibrate small/ large/ --ball-diameter 4,6 --out unit.toml
   tactile calibrate --test unit.toml more_presses/ --json trial.json"""
 LEAVES = NOTHING
 TRIED = ("fast", "standard", "quality")  # presets
@@ -43,9 +48,11 @@ TRIED = ("fast", "standard", "quality")  # presets
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument("presses", metavar="PRESSES", help="folder of photographs of one unit, fingertip up")
+    about = "folder of photographs, or video, of one unit, fingertip up; for each ball one"
+    verb.add_argument("presses", metavar="PRESSES", nargs="+", help=about)
     verb.add_argument("--out", metavar="FILE", help="new TOML file to write")
-    verb.add_argument("--ball-diameter", type=float, metavar="MM", help="diameter of the ball (with --test: as fitted)")
+    about = "diameter of the ball, or for each PRESSES one, separated by commas (with --test: as fitted, the first)"
+    verb.add_argument("--ball-diameter", type=_millimetres, metavar="MM", help=about)
     verb.add_argument("--background", metavar="FILE", help="photograph of the untouched gel (default: estimated)")
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the unit (default: that of --start, else digit)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
@@ -64,7 +71,10 @@ def run(options: argparse.Namespace) -> int:
     from ...pictures.calibrate.photographs import chosen, read_photographs
 
     _check_options(options)
-    photographs = read_photographs(options.presses, options.background)
+    radii = None
+    if options.ball_diameter is not None and len(options.ball_diameter) > 1:
+        radii = [0.5e-3 * diameter for diameter in options.ball_diameter]
+    photographs = read_photographs(options.presses, options.background, radii)
     if options.only is not None:
         photographs = chosen(photographs, [name.strip() for name in options.only.split(",")])
     return _test(options, photographs) if options.test else _fit(options, photographs)
@@ -74,6 +84,11 @@ def _check_options(options: argparse.Namespace) -> None:
     from ...files import atomic
     from ...pictures.calibrate.fit import check_diameter
 
+    for diameter in options.ball_diameter or ():
+        check_diameter(1e-3 * diameter)
+    if len(options.ball_diameter or (0,)) not in (1, len(options.presses)):
+        found = f"{len(options.ball_diameter)} diameters, and {len(options.presses)} folders or videos"
+        raise TactileError("--ball-diameter", found, "one, or one for each")
     if options.test:
         for name in ("out", "gel", "start", "unit"):
             if getattr(options, name) is not None:
@@ -83,8 +98,6 @@ def _check_options(options: argparse.Namespace) -> None:
                 atomic.claim(path)
         if options.json is not None and options.json == options.sheet:
             raise TactileError("--json and --sheet", options.json, "two files")
-        if options.ball_diameter is not None:
-            check_diameter(1e-3 * options.ball_diameter)
         return
     for name in ("json", "sheet", "preset"):
         if getattr(options, name) is not None:
@@ -92,11 +105,14 @@ def _check_options(options: argparse.Namespace) -> None:
     if options.out is None or options.ball_diameter is None:
         missing = "--out" if options.out is None else "--ball-diameter"
         raise TactileError(missing, "missing", "a file to write and the ball's diameter in mm", "Or try one: --test")
-    check_diameter(1e-3 * options.ball_diameter)
     if _sheet_beside(options.out) == Path(options.out):
         raise TactileError("--out", options.out, "a file to write that ends in .toml: the sheet is the .png beside it")
     atomic.claim(options.out)
     atomic.claim(_sheet_beside(options.out))
+
+
+def _millimetres(text: str) -> list[float]:
+    return [float(word) for word in text.split(",")]
 
 
 def _sheet_beside(out: str) -> Path:
@@ -105,11 +121,12 @@ def _sheet_beside(out: str) -> Path:
 
 def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...pictures.calibrate.fit import calibrate
-    from ...pictures.calibrate.held_out import check_orientation, check_worth, cross_validated
+    from ...pictures.calibrate.held_out import check_worth, cross_validated
+    from ...pictures.calibrate.orientation import check_orientation
     from ...pictures.calibrate.report import rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration, write_calibration
 
-    start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter
+    start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter[0]
     with bar("the way the photographs lie", "way", options.progress) as progress:
         check_orientation(photographs, diameter, start, progress)
     with bar("trial on held-out presses", "step", options.progress) as progress:
@@ -143,7 +160,7 @@ def _test(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...sensors.calibration_file import load_calibration
 
     calibration = load_calibration(options.test)
-    diameter = calibration.fit.ball_diameter if options.ball_diameter is None else 1e-3 * options.ball_diameter
+    diameter = calibration.fit.ball_diameter if options.ball_diameter is None else 1e-3 * options.ball_diameter[0]
     with bar("test", "press", options.progress) as progress:
         pictures = _pictures(options.preset or TRIED[0])
         tried = evaluate_unit(calibration, photographs, diameter / 2, pictures=pictures, progress=progress)

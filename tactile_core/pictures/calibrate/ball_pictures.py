@@ -82,7 +82,12 @@ class FastPictures(BallPictures):
 
 def working_factor(width: int, height: int) -> int:
     """Return the whole factor by which pictures are made smaller for a fit."""
-    wanted = max(min(width, height) // WORKING_WIDTH, 1)
+    return whole_factor(width, height, WORKING_WIDTH)
+
+
+def whole_factor(width: int, height: int, side: int) -> int:
+    """Return the largest whole factor by which pictures can be made smaller and keep a short side of ``side`` px."""
+    wanted = max(min(width, height) // side, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 
 

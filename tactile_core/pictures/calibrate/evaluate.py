@@ -58,7 +58,7 @@ def evaluate_unit(
     pictures: Callable[[Calibration], BallPictures] = FastPictures,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate a calibration on each press of the photographs; radius : m, of the ball.
+    """Evaluate a calibration on each press of the photographs; radius : m, of the balls that name none.
 
     pictures : what makes a unit's; places and depths are found by the fast ones
     Raises TactileError for photographs of another shape than the calibration's pictures.
@@ -88,6 +88,7 @@ def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
     sight = Sight(press)
+    radius = sight.radius(radius)
     untouched = background + press.drift  # the baseline knows how the light drifted as well
 
     def compared(change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:

@@ -98,7 +98,9 @@ def calibrate(
     metrics = {name: value for name, value in mean_metrics(tried)[0].items() if np.isfinite(value)}
     names = tuple(press.name for press in search.presses)
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if photographs.estimated else "photographed"
-    note = f"{light}; {len(names)} presses; background {rest}"
+    balls = {f"{2e3 * press.radius:g}" for press in search.presses if press.radius is not None}
+    of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
+    note = f"{light}; {len(names)} presses{of}; background {rest}"
     rest_radiance = Shader(fitted).radiance(rest_height_map(fitted.camera))
     degree = AMBIENT_DEGREE if photographs.estimated else PHOTOGRAPHED_DEGREE
     calibration = dataclasses.replace(
@@ -131,7 +133,9 @@ class _Search:
     def place(self) -> None:
         """Fit presses and gain alone, with the unit's numbers as in the start."""
         bench = FastPictures(self.start)
-        balls = [1e3 * np.array(fit_ball(bench, sight, self.radius)[0].numbers[:3]) for sight in self._sights]
+        balls = [
+            1e3 * np.array(fit_ball(bench, sight, sight.radius(self.radius))[0].numbers[:3]) for sight in self._sights
+        ]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
         self._minimise(np.concatenate(balls), PLACING_STEPS)
 
@@ -158,7 +162,7 @@ class _Search:
         for press in self._all:
             if press.name in self.aside:
                 sight = Sight(press)
-                ball, left = fit_ball(bench, sight, self.radius)
+                ball, left = fit_ball(bench, sight, sight.radius(self.radius))
                 self.aside[press.name] = unexplained_share(sight, left)
                 if self.aside[press.name] < UNEXPLAINED:
                     placed[press.name] = (1e3 * np.array(ball.numbers[:3])).tolist()

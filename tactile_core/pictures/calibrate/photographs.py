@@ -1,15 +1,17 @@
-"""A folder of photographs of a ball pressed into a DIGIT: pictures, background, and where each press shows."""
+"""Photographs of balls pressed into a gel: pictures, background, and where each press shows."""
 
 from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...errors import TactileError
 from ..background import read_photograph
+from . import video_frames
 from .lighting_drift import lighting_drift
 from .photo_metrics import windowed
 
@@ -32,6 +34,7 @@ class Press:
     change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large ones
     region : (H, W) bool, the region of interest, which knows nothing of drift
     flags : what is wrong with it, in words; empty for nothing
+    radius : m, of its ball; None for that of the whole set
     """
 
     name: str
@@ -41,6 +44,7 @@ class Press:
     touched: np.ndarray
     region: np.ndarray
     flags: tuple[str, ...]
+    radius: float | None = None
 
     @property
     def middle(self) -> tuple[float, float]:
@@ -71,20 +75,32 @@ class Photographs:
         return self.background.shape[:2]
 
 
-def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | None = None) -> Photographs:
-    """Read all pictures of a folder, by name; without a background photograph it is estimated.
+def read_photographs(
+    folders: str | os.PathLike | Sequence[str | os.PathLike],
+    background: str | os.PathLike | None = None,
+    radii: Sequence[float] | None = None,
+) -> Photographs:
+    """Read all pictures of folders or videos, by name; without a background photograph it is estimated.
 
+    radii : m, of each folder's ball; None where one ball, named to what uses the photographs, pressed all
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
-    pictures to tell the background.
+    pictures to tell the background; ModuleNotFoundError for a video without OpenCV.
     """
-    files = _files(Path(folder))
-    pictures = {file.name: read_photograph(file) for file in files}
+    paths = [Path(each) for each in ([folders] if isinstance(folders, str | os.PathLike) else folders)]
+    folder = paths[0] if len(paths) == 1 else Path(os.path.commonpath([path.absolute() for path in paths]))
+    pictures, ball = {}, {}
+    for number, path in enumerate(paths):
+        for name, picture in _pictures(path).items():
+            name = name if len(paths) == 1 else f"{path.name}/{name}" if path.is_dir() else name
+            if name in pictures:
+                raise TactileError(path, f"a second {name}", "folders and videos of different names")
+            pictures[name], ball[name] = picture, radii[number] if radii else None
     sizes = {name: picture.shape[:2] for name, picture in pictures.items()}
     first = next(iter(sizes))
     for name, size in sizes.items():
         if size != sizes[first]:
             found = f"{size[1]} x {size[0]} pixels"
-            raise TactileError(Path(folder) / name, found, f"{sizes[first][1]} x {sizes[first][0]}, as {first}")
+            raise TactileError(folder / name, found, f"{sizes[first][1]} x {sizes[first][0]}, as {first}")
     if background is not None:
         rest = read_photograph(background).astype(np.float32)
         if rest.shape[:2] != sizes[first]:
@@ -96,13 +112,13 @@ def read_photographs(folder: str | os.PathLike, background: str | os.PathLike | 
         raise TactileError(folder, found, f"{FEWEST_FOR_MEDIAN} or more", advice)
     else:
         rest = estimated_background(np.stack(list(pictures.values())))
-    tried = {name: press_of(name, picture, rest) for name, picture in pictures.items()}
+    tried = {name: press_of(name, picture, rest, ball[name]) for name, picture in pictures.items()}
     presses = tuple(press for press in tried.values() if press is not None)
     if not presses:
         advice = "Give the background with --background, or press harder"
         raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
     untouched = tuple(name for name, press in tried.items() if press is None)
-    return Photographs(Path(folder), presses, rest, background is None, untouched, measured_noise(presses, rest))
+    return Photographs(folder, presses, rest, background is None, untouched, measured_noise(presses, rest))
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:
@@ -114,13 +130,6 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
                 photographs.folder / name, "shows no press or is absent", f"some of {', '.join(by_name)}"
             )
     return dataclasses.replace(photographs, presses=tuple(by_name[name] for name in names))
-
-
-def turned(press: Press, rows: bool, columns: bool) -> Press:
-    """Return a press whose picture has its rows, its columns or both reversed."""
-    way = slice(None, None, -1 if rows else 1), slice(None, None, -1 if columns else 1)
-    arrays = ("picture", "drift", "change", "touched", "region")
-    return dataclasses.replace(press, **{name: getattr(press, name)[way] for name in arrays})
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
@@ -176,17 +185,25 @@ def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
     return grown
 
 
-def _files(folder: Path) -> list[Path]:
-    if not folder.is_dir():
-        raise TactileError(folder, "is no folder", "a folder of photographs of a pressed ball")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in SUFFIXES)
-    if not files:
-        raise TactileError(folder, "no photographs", f"files that end in {', '.join(SUFFIXES)}")
-    return files
+def _pictures(path: Path) -> dict[str, np.ndarray]:
+    """Pictures (H, W, 3) uint8 by name: a folder's photographs and videos, or a video's frames."""
+    if not path.is_dir() and path.suffix.lower() in video_frames.SUFFIXES:
+        return video_frames.frames_of(path)
+    if not path.is_dir():
+        raise TactileError(path, "is no folder", "a folder of photographs of a pressed ball, or a video of presses")
+    pictures = {}
+    for file in sorted(path.iterdir()):
+        if file.suffix.lower() in SUFFIXES:
+            pictures[file.name] = read_photograph(file)
+        elif file.suffix.lower() in video_frames.SUFFIXES:
+            pictures |= video_frames.frames_of(file)
+    if not pictures:
+        raise TactileError(path, "no photographs", f"files that end in {', '.join(SUFFIXES + video_frames.SUFFIXES)}")
+    return pictures
 
 
-def press_of(name: str, picture: np.ndarray, background: np.ndarray) -> Press | None:
-    """Return the press that a photograph shows; None where it shows none."""
+def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
+    """Return the press that a photograph shows, of a ball of a radius, m; None where it shows none."""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift
@@ -201,4 +218,4 @@ def press_of(name: str, picture: np.ndarray, background: np.ndarray) -> Press | 
         flags.append("over-exposed")
     if (np.abs(difference).max(-1) > CHANGE).mean() > LARGEST_SHARE:
         flags.append("changed nearly all over: another lighting than the background's")
-    return Press(name, picture, drift, change, touched, region, tuple(flags))
+    return Press(name, picture, drift, change, touched, region, tuple(flags), radius)

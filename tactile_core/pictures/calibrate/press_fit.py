@@ -40,14 +40,22 @@ class Ball:
 
 
 class Sight:
-    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w)."""
+    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w).
 
-    def __init__(self, press: Press) -> None:
-        factor = working_factor(press.picture.shape[1], press.picture.shape[0])
+    factor : by which the photograph is made smaller; None for that of fits
+    """
+
+    def __init__(self, press: Press, factor: int | None = None) -> None:
+        factor = factor or working_factor(press.picture.shape[1], press.picture.shape[0])
+        self._radius = press.radius
         self.change = smaller(press.change, factor)
         spoilt = smaller((press.picture.max(-1) == 255).astype(np.float32), factor) > 0
         self.region = smaller(press.touched.astype(np.float32), factor) > 0.25
         self.counts = dilated(self.region, MARGIN) & ~spoilt
+
+    def radius(self, common: float) -> float:
+        """Return the radius, m, of the photograph's own ball; without one that of the whole set's."""
+        return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
         """Return right and down, m, of the change's middle, and of where it is largest over about a ball's print."""

@@ -45,7 +45,8 @@ class _Lights:
 class UnitResiduals:
     """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
 
-    start : the calibration that the spread of units is centred on, in working pixels; radius : m, the ball's
+    start : the calibration that the spread of units is centred on, in working pixels
+    radius : m, of the balls that name none
     free : (21,) bool, which of the unit's numbers may change; pictures : what makes a unit's
     """
 
@@ -59,7 +60,8 @@ class UnitResiduals:
     ) -> None:
         self._start, self._sights, self._radius, self._free = start, sights, radius, free
         self._pictures = pictures
-        self._deepest = deepest(radius, shape_of(start.camera.sensor).thickness)
+        thickness = shape_of(start.camera.sensor).thickness
+        self._deepest = np.array([deepest(sight.radius(radius), thickness) for sight in sights])
         self._numbers = parameters_of(start)
         self._seen = [sight.change[sight.counts].T.astype(float) for sight in sights]  # (3, p) each
         gain = start.gain
@@ -123,7 +125,7 @@ class UnitResiduals:
         return bool(inside and (radii >= SMALLEST_RADIUS).all() and (radii <= LARGEST_RADIUS).all())
 
     def _lights(self, bench: BallPictures, ball: np.ndarray, sight: Sight) -> _Lights:
-        changes = bench.lights((*(1e-3 * ball), self._radius))[:, sight.counts]
+        changes = bench.lights((*(1e-3 * ball), sight.radius(self._radius)))[:, sight.counts]
         return _Lights(changes, self._terms(bench, changes, sight))
 
     def _terms(self, bench: BallPictures, changes: np.ndarray, sight: Sight) -> np.ndarray:

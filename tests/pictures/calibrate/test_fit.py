@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pressed_unit
 import pytest
 from PIL import Image
 from plain_unit import plain_unit
@@ -118,6 +119,26 @@ def test_photograph_of_something_else_is_left_out(folder: Path, tmp_path: Path) 
     assert any("strange.png" in warning and "left out" in warning for warning in done.warnings)
 
 
+@pytest.mark.usefixtures("coarse_fits")
+def test_balls_of_two_sizes_are_fitted_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    large = write_photographs(tmp_path / "large", other_unit(), PLACES[:2])
+    monkeypatch.setattr(pressed_unit, "BALL", BALL / 2)
+    small = write_photographs(tmp_path / "small", other_unit(), PLACES[2:4])
+    photographs = read_photographs([large, small], tmp_path / "untouched.png", [BALL, BALL / 2])
+    found = calibrate(photographs, 2 * BALL, plain_unit(), unit="other", quick=True)
+    names = ["large/press_0.png", "large/press_1.png", "small/press_0.png", "small/press_1.png"]
+    assert [each.press.name for each in found.tried] == names
+    assert [each.ball.radius for each in found.tried] == [BALL, BALL, BALL / 2, BALL / 2]
+    for each, (_, _, depth) in zip(found.tried, PLACES, strict=False):
+        assert each.ball.depth == pytest.approx(1e-3 * depth, abs=0.08e-3)
+        assert each.metrics["roi_l1"] < 2.5  # levels, of which the noise makes 0.9; coarse
+    assert "4 presses by balls of 3, 6 mm" in found.calibration.fit.note
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other/small").symlink_to(small)
+    with pytest.raises(TactileError, match=r"a second small/press_0\.png"):
+        read_photographs([small, tmp_path / "other/small"], tmp_path / "untouched.png")
+
+
 def test_ball_that_does_not_fit_is_refused(folder: Path) -> None:
     with pytest.raises(TactileError, match="ball diameter"):
         calibrate(read_photographs(folder), 0.0, plain_unit(), unit="other")
@@ -189,6 +210,8 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
         (["--ball-diameter", "6", "--out", "unit.png"], "ends in .toml"),
         (["--ball-diameter", "17", "--out", "unit.toml"], "ball diameter, mm: 17"),
         (["--test", "none.toml", "--ball-diameter", "nan"], "ball diameter, mm: nan"),
+        (["--ball-diameter", "6,17", "--out", "unit.toml"], "ball diameter, mm: 17"),
+        (["--ball-diameter", "4,6", "--out", "unit.toml"], "--ball-diameter: 2 diameters, and 1 folders or videos"),
         (["--test", "none.toml", "--json", "same", "--sheet", "same"], "--json and --sheet"),
     ],
 )
