@@ -12,8 +12,7 @@ torch = pytest.importorskip("torch", reason="training needs torch")
 
 from tactile_core.sensors import REST_COUNTS  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
-from tactile_core.training.data import Contacts  # noqa: E402
-from tactile_core.training.noise_model import measured  # noqa: E402
+from tactile_core.training.data import Contacts, measured  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.surface_codec import SILENT, principal_basis  # noqa: E402
 
