@@ -6,7 +6,7 @@
 Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
 same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
 to the goal and five slides of 0.1 mm along the finger. Median, 95 and 99 % of CPU and wall ms a contact on one core,
-warm. Beside them the fast tier's error against the full one (`mechanics_tiers.json`). Needs the extras [fem], [fast].
+warm. Beside them the fast tier's error against the full one (`mechanics_tiers.json`). Needs the extra [fem].
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--markdown", type=Path, metavar="FILE", help="write the table here")
     options = parser.parse_args(arguments)
     if not compiled.available():
-        print("measure_loop: the extra [fast] is not installed, or switched off", file=sys.stderr)
+        print("measure_loop: numba is not installed (extra [fem]), or switched off", file=sys.stderr)
         return 2
     rows, table = (
         [],

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-pytest.importorskip("numba", reason="the extra [fast] is not installed")
+pytest.importorskip("numba", reason="numba is not installed")
 
 
 def test_the_table_has_every_kind_of_step_and_its_error(tmp_path, monkeypatch):

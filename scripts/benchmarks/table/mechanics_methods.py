@@ -26,7 +26,7 @@ REPEATS = {"fast": 3, "full": 1}
 def measure(name: str, quick: bool) -> Method:
     """Measure one tier on one sensor: median time and error of the contacts.
 
-    The fast tier's time is that of random contacts alone, compiled, where the extra [fast] is installed.
+    The fast tier's time is that of random contacts alone, where numba is installed.
     """
     sensor, tier = name.split("_")
     if tier == "reference":
@@ -76,7 +76,7 @@ def _reference(sensor: str, quick: bool) -> Method:
 
 
 def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
-    """Times of random contacts with friction, alone and on paths (with the extra [fast])."""
+    """Times of random contacts with friction, alone and on paths, where numba is installed."""
     from benchmarks import measure_loop
 
     if not compiled.available():
