@@ -4,9 +4,10 @@
 the change against rest that the networks take. A new file layout is one new file in ``formats/``; see there.
 """
 
+from .answers import prepare
 from .readers import layouts, read
 from .recording import Recording, Truth
-from .signals import PrepareOptions, Signals, prepare
+from .signals import PrepareOptions, Signals
 from .simulated import write_simulated
 
 __all__ = ["PrepareOptions", "Recording", "Signals", "Truth", "layouts", "prepare", "read", "write_simulated"]

@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
+from math import prod
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -14,10 +15,12 @@ import numpy as np
 from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked, read_rows
 from .assemble import MAX_FRAMES
+from .labels import LONGEST
 
 # Bytes of one array in memory; a truth of 700 frames and 6,000 nodes takes 50 MB as float32 (assumed enough).
 MAX_BYTES = 2 * 2**30
 MAX_HEADER = 10_000  # bytes of an array's header in NPZ, numpy's own limit
+NPY = b"\x93NUMPY"
 _NPY_START = 12  # bytes: magic, version, length
 
 
@@ -36,6 +39,25 @@ class Store:
     attributes_of: Callable[[str], dict[str, Any]] = lambda name: {}
     load_rows: Callable[[str, slice], np.ndarray] | None = None
     taken: set[str] = field(default_factory=set)
+
+    def is_text(self, name: str) -> bool:
+        """Return true for an array of texts of at most `LONGEST` characters, or of any length in an HDF5 file."""
+        kind = self.shapes[name][1]
+        short = kind.kind in "SU" and kind.itemsize <= 4 * LONGEST
+        return short or (kind.metadata is not None and kind.metadata.get("vlen") in (str, bytes))
+
+    def texts(self, name: str) -> list[str]:
+        """Read an array of texts; of texts of any length one at a time, and not beyond `LONGEST` characters."""
+        self.taken.add(name)
+        shape, kind = self.shapes[name]
+        if prod(shape) > MAX_FRAMES:
+            where = f"{self.path}, {name}"
+            raise TactileError(where, f"shape {shape}", f"at most {MAX_FRAMES:,} frames", "Split the recording")
+        if kind.hasobject and shape and self.load_rows is not None:
+            parts = (self.load_rows(name, slice(row, row + 1)) for row in range(shape[0]))
+        else:
+            parts = (self._loaded(name) for _ in range(1))
+        return [_plain(each)[:LONGEST] for part in parts for each in np.ravel(part).tolist()]
 
     def rows(self, rows: slice, count: int) -> Store:
         """Return the same store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
@@ -146,7 +168,21 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Read an opened file; never unpickles. Sizes come from the arrays' own headers, not from unpacking them."""
+    """Read an opened file; never unpickles. Sizes come from the arrays' own headers, not from unpacking them.
+
+    The one array of an NPY file is called ``electrodes``.
+    """
+    if file.read(len(NPY)) == NPY:
+        file.seek(0)
+        with damage_reported(path, "NPY"):
+            header = _npy_header(file)
+
+        def load_whole(name: str) -> np.ndarray:
+            file.seek(0)
+            return np.lib.format.read_array(file, allow_pickle=False)
+
+        yield Store(path, {"electrodes": header}, load_whole)
+        return
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}
     with ExitStack() as stack:
         with damage_reported(path, "NPZ"):
@@ -181,7 +217,7 @@ def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
     """Read shape and type; a header that declares itself long is refused, as numpy would load it before checking."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
-    if not start.startswith(b"\x93NUMPY") or length > MAX_HEADER:
+    if not start.startswith(NPY) or length > MAX_HEADER:
         raise ValueError(f"a header of {length} bytes")
     whole = io.BytesIO(start + stream.read(length))
     version = np.lib.format.read_magic(whole)

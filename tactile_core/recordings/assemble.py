@@ -14,16 +14,14 @@ from ..errors import TactileError
 from ..sensors import SAMPLE_RATE, SOURCE, describe, electrode_count, title
 from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import Fluid
+from .electrode_faults import without_absent
 from .flags import Flag
 from .recording import Recording, Truth
+from .time_stamps import seconds_of, tell_rate, time_jumps
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
 MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
-GAP_STEPS = 1.9  # a missing frame is 2 median steps; jitter of whole recordings reaches 1.8 (18 ms: docs/sources.md)
-OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is said; 62.5 to 160 Hz are fine (assumed)
-MAX_STAMP = 1e19  # the year 2286 in nanoseconds
-STAMP_UNITS = ((1e17, 1e-9, "nanoseconds"), (1e14, 1e-6, "microseconds"), (1e11, 1e-3, "milliseconds"))  # of unix time
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
 SHOWN = 8  # problems spelled out one by one; more are counted
 
@@ -86,12 +84,14 @@ def assemble(
     warnings: Sequence[str] = (),
     sensor: str = SOURCE,
     snapshots: bool = False,
+    labels: dict[str, np.ndarray] | None = None,
     **channels: np.ndarray | None,
 ) -> Recording:
     """Check the columns and make a Recording of them.
 
     electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
-    names : the electrode columns' names in the file; snapshots : whether frames do not follow each other
+    names : the electrode columns' names in the file, empty where it has none, which is a dead channel
+    snapshots : whether frames do not follow each other
     channels : pdc, tac, tdc, pac, position, force
     Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad.
     """
@@ -99,20 +99,21 @@ def assemble(
     _check_size(path, electrodes, sensor)
     rows = np.arange(frames) if rows is None else rows
     names = names or [f"E{j + 1}" for j in range(electrodes.shape[1])]
+    electrodes, absent, notes = without_absent(path, electrodes, names, sensor)
     bad = ~((electrodes <= MAX_READING) & (electrodes >= -MAX_READING))  # NaN compares false
     problems = [*problems, *_unreadable(electrodes, bad, names, rows, problems)]
     if bad.any():
         electrodes = np.where(bad, np.nan, electrodes)
-    notes = list(warnings)
+    notes = [*warnings, *notes]
     if stamps is None and not snapshots:
         notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
     if stamps is None:
         stamps = np.arange(frames) / SAMPLE_RATE
     _check_share(path, np.any(bad, axis=1), problems, row_word)
     notes += tell_problems(problems, row_word)
-    seconds, start, more = _seconds(stamps)
-    more += _tell_rate(seconds)
-    jumps, jump_notes = _time_jumps(seconds, rows, row_word)
+    seconds, start, more = seconds_of(stamps)
+    more += tell_rate(seconds)
+    jumps, jump_notes = time_jumps(seconds, rows, row_word)
     clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
@@ -122,12 +123,13 @@ def assemble(
         start_time=start,
         electrodes=electrodes,
         rows=rows,
-        flags=_flags(bad, problems, jumps),
+        flags=_flags(bad, problems, jumps) | np.uint16(Flag.DEAD_CHANNEL if absent.any() else 0),
         warnings=tuple(notes + more + jump_notes),
         simulated=simulated,
         truth=truth,
         about=about or {},
         sensor=sensor,
+        labels=labels or {},
         **clean,
     )
 
@@ -198,72 +200,3 @@ def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_wo
             f"at most {MAX_BAD_SHARE:.0%} of the rows",
             "Check the export of this file",
         )
-
-
-def _seconds(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
-    """Return time from the first frame (s), unix start time (s, 0.0 if unknown) and warnings."""
-    stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
-    warnings, missing = [], int(np.isnan(stamps).sum())
-    if missing == len(stamps):
-        warnings.append(f"none of {missing} time stamps is a time; {SAMPLE_RATE:g} Hz assumed")
-    elif missing:
-        warnings.append(f"{missing} of {len(stamps)} time stamps are no times; filled from those around them")
-    stamps = _fill_stamps(stamps)
-    for limit, unit, word in STAMP_UNITS:
-        if np.median(np.abs(stamps)) > limit:
-            stamps = stamps * unit
-            warnings.append(f"time stamps taken as {word} of unix time")
-            break
-    start = float(stamps[0]) if stamps[0] > 1e8 else 0.0  # below: seconds since something else than 1970
-    return stamps - stamps[0], start, warnings
-
-
-def _tell_rate(seconds: np.ndarray) -> list[str]:
-    """Write a sentence on frames that come much faster or slower than those that the filters were made for."""
-    steps = np.diff(seconds)
-    forward = steps[steps > 0]
-    if not len(forward):
-        return []
-    rate = 1.0 / float(np.median(forward))
-    if SAMPLE_RATE / OTHER_RATE <= rate <= SAMPLE_RATE * OTHER_RATE:
-        return []
-    return [
-        f"{rate:.4g} frames a second, where {SAMPLE_RATE:g} are expected: what looks at the frames before and after"
-        f" (glitches, smoothing, following a contact) sees another time; resample to {SAMPLE_RATE:g} Hz to be sure"
-    ]
-
-
-def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
-    """Interpolate missing stamps; at the ends, extrapolate by the median step."""
-    good = np.flatnonzero(np.isfinite(stamps))
-    if len(good) == len(stamps):
-        return stamps
-    if len(good) == 0:
-        return np.arange(len(stamps)) / SAMPLE_RATE
-    index = np.arange(len(stamps))
-    filled = np.interp(index, good, stamps[good])
-    step = float(np.median(np.diff(stamps[good]) / np.diff(good))) if len(good) > 1 else 1.0 / SAMPLE_RATE
-    filled[: good[0]] = stamps[good[0]] + (index[: good[0]] - good[0]) * step
-    filled[good[-1] + 1 :] = stamps[good[-1]] + (index[good[-1] + 1 :] - good[-1]) * step
-    return filled
-
-
-def _time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Find frames before which the stamp went back, stood still or left a gap; and write sentences about them."""
-    steps = np.diff(seconds)
-    forward = steps[steps > 0]
-    usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE
-    backward, gap = steps <= 0, steps > GAP_STEPS * usual
-    sentences = []
-    for what, where in (("do not go forward", backward), ("leave a gap", gap)):
-        frames = np.flatnonzero(where) + 1
-        if len(frames):
-            first = frames[0]
-            worst = frames[np.argmax(np.abs(steps[frames - 1]))]
-            sentences.append(
-                f"time stamps {what} at {len(frames)} place{'s' * (len(frames) > 1)}, first before {row_word}"
-                f" {rows[first]} ({1e3 * steps[first - 1]:.1f} ms), largest before {row_word} {rows[worst]}"
-                f" ({1e3 * steps[worst - 1]:.1f} ms);"
-                " frames stay in file order"
-            )
-    return np.flatnonzero(backward | gap) + 1, sentences

@@ -53,11 +53,12 @@ def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, s
 def _parts(path: str, columns: ColumnMap | None, sensor: str) -> Iterator[Part]:
     with opened(path) as (container, where, finger, file):
         refuse_other(path, container, columns)
-        if container == "csv" and os.path.getsize(where) > TEXT_BYTES:
+        long = columns is not None and columns.channel  # its rows are no frames
+        if container == "csv" and os.fstat(file.fileno()).st_size > TEXT_BYTES and not long:
             reader = table_reader(where, read_header(where, file), columns, sensor, finger)
             for table, repeated in read_tables(where, file, TEXT_BYTES, CONTEXT):
                 yield Part(reader(table), repeated)
-        elif container == "hdf5":
+        elif container == "hdf5" and columns is None:
             with open_hdf5(path) as store:
                 yield from _of_store(store)
         elif container == "bag":

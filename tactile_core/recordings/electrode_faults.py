@@ -2,17 +2,102 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from ..sensors import COUNT_MAX
+from ..errors import TactileError
+from ..sensors import COUNT_MAX, typical_rest
 from .flags import Flag
 from .recording import Recording
+from .repair import END, SHORT
+from .signal_kind import FULL_SCALES, RAW_LEVEL, full_scale
 
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
 # counts that the others' median moves by meanwhile; units with less noise stand still in steady grips, as long as
 # nothing moves: by 4 and less in 36 such grips (PHAC, trials 01 to 03)
 STEADY = 6.0
 NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
+ALIKE = 0.75  # of the electrodes that read the same where a finger does not answer: a dead one may differ (assumed)
+FROZEN = 50  # frames, half a second, of noise that stops in all electrodes (assumed)
+MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
+
+
+def without_absent(
+    path: str, electrodes: np.ndarray, names: Sequence[str], sensor: str
+) -> tuple[np.ndarray, np.ndarray, list[str]]:
+    """Let electrodes of which a file has no reading stand still, where a typical unit rests.
+
+    electrodes : (T, e) float, in the file's unit, with NaN; names : of their columns, empty where there is none
+    Returns the electrodes, which of them are absent (e,) bool, and a sentence on them. Raises TactileError where half
+    of them are.
+    """
+    unread = ~np.isfinite(electrodes)
+    absent = np.array([not name for name in names]) | (unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES))
+    if not absent.any():
+        return electrodes, absent, []
+    named = named_electrodes(absent)
+    if absent.mean() >= MOST_ABSENT:
+        raise TactileError(path, f"no readings of {named}", "most of the electrodes", "Check the export of this file")
+    held, rest = electrodes[np.isfinite(electrodes[:, ~absent]).all(axis=1)][:, ~absent], typical_rest(sensor)
+    unit = full_scale(held) if len(held) else None
+    raw = len(held) and (unit is not None or np.median(held) > RAW_LEVEL)
+    electrodes = np.where(absent, 0.0 if rest is None or not raw else rest / (unit[0] if unit else 1.0), electrodes)
+    return electrodes, absent, [f"the file has no readings of {named}: taken for dead channels"]
+
+
+def silent(electrodes: np.ndarray) -> np.ndarray:
+    """Mark the frames (T,) bool in which a finger does not answer: its electrodes read one end, or none ever changes.
+
+    A few such frames are a glitch, which is interpolated.
+
+    electrodes : (T, e) float, in the file's unit. Real electrodes rest hundreds of counts apart; changes against rest
+    may all be 0, so that equal readings are no answer only beside raw ones. A raw recording whose noise stops in all
+    electrodes for `FROZEN` frames repeats an old answer.
+    """
+    same = _lasting(alike(electrodes))
+    change = np.diff(electrodes, axis=0) != 0
+    if same.all() or (len(electrodes) >= FROZEN and not change.any()):
+        return np.ones(len(electrodes), bool)
+    answers = electrodes[~same]
+    answers = answers[np.isfinite(answers).all(axis=1)]
+    if not len(answers) or not (np.median(answers) > RAW_LEVEL or full_scale(answers)):
+        return np.zeros(len(electrodes), bool)
+    return same | _frozen(change & ~same[1:, None])
+
+
+def alike(electrodes: np.ndarray) -> np.ndarray:
+    """Mark the frames (T,) bool in which most electrodes (T, e) read the same end of the range, in any unit."""
+    middle = np.median(electrodes, axis=1)
+    same = (electrodes == middle[:, None]).mean(axis=1) >= ALIKE
+    return same & ((middle <= 0) | (middle >= COUNT_MAX) | np.isin(middle, list(FULL_SCALES)))
+
+
+def _lasting(same: np.ndarray) -> np.ndarray:
+    """Return the frames (T,) bool of runs that are longer than a glitch may be."""
+    found = same.copy()
+    for first, last in _runs(same):
+        longest = END if first == 0 or last == len(same) else SHORT
+        found[first:last] = last - first > longest or last - first == len(same)
+    return found
+
+
+def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """Return the first frame of each run of a mask (T,), and the one after its last."""
+    bounds = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int))).tolist()
+    return list(zip(bounds[::2], bounds[1::2], strict=True))
+
+
+def _frozen(change: np.ndarray) -> np.ndarray:
+    """Mark the frames (T,) of long runs without a change (T - 1, e) in any electrode, where most are noisy else."""
+    still = np.r_[False, ~change.any(axis=1)]
+    runs = [(first, last) for first, last in _runs(still) if last - first >= FROZEN]
+    found = np.zeros(len(still), bool)
+    for first, last in runs:
+        found[first:last] = True
+    if not runs or found.all() or np.median(change[~found[1:]].mean(axis=0)) < NOISY:
+        return np.zeros(len(still), bool)
+    return found
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:

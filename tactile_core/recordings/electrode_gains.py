@@ -18,6 +18,7 @@ from ..files.toml_text import as_toml
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
+from .answers import unanswered
 from .fingers import FINGERS, short_of
 from .signals import Rest, Signals, doubt_law
 
@@ -109,6 +110,7 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     rest = typical_rest(signals.sensor)
     if signals.kind == "raw" and rest is not None:
         change = divider.of_unit(change, signals.rest, rest)
+    change[unanswered(signals)] = 0.0
     return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
 
 

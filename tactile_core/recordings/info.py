@@ -9,18 +9,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..sensors import electrode_count, title, typical_rest
+from .answers import prepare
 from .biotac_sp import describe_sp
 from .flags import Flag, names
+from .labels import summary
 from .preparer import Preparer
 from .readers import pac_columns, read, sensor_of
 from .recording import Recording
-from .signals import PrepareOptions, Signals, prepare
+from .signals import PrepareOptions, Signals
 from .tables.truncated_cell import listed
 
 if TYPE_CHECKING:
     from .electrode_gains import SensorFile
 
 MOST_NOT_TAKEN = 40  # names that are spelled out; a file may have a thousand
+SHOWN = 5  # texts of a label
 
 
 def describe(
@@ -57,6 +60,7 @@ def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, s
         ("layout", recording.layout),
         ("sensor", f"{title(recording.sensor)}, {electrode_count(recording.sensor)} electrodes; {origin}"),
         ("channels", _channels(recording, pac)),
+        ("labels", _labels(recording)),
         ("frames", f"{len(recording)} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
         ("rate", f"{recording.rate:.2f} Hz (median)" if len(recording) > 1 else "one frame only"),
         ("duration", f"{recording.duration:.2f} s{_start(recording)}"),
@@ -88,6 +92,12 @@ def _channels(recording: Recording, pac: int) -> str:
 
 def _not_taken(recording: Recording) -> list[tuple[str, str]]:
     return [("not taken", listed(recording.not_taken, MOST_NOT_TAKEN))] if recording.not_taken else []
+
+
+def _labels(recording: Recording) -> str:
+    counted = summary(recording.labels).items()
+    held = [f"{name} ({', '.join(word or 'none' for word in list(words)[:SHOWN])})" for name, words in counted]
+    return ", ".join(held) or "none"
 
 
 def _start(recording: Recording) -> str:

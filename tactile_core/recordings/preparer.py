@@ -9,12 +9,13 @@ import numpy as np
 
 from ..sensors.fluid_sensor import FALLS
 from . import electrode_gains
+from .answers import prepare, unanswered
 from .doubt import POLARITY, REST, Doubt, Reason, reason_of, without
 from .electrode_gains import ElectrodeGains
 from .flags import Flag
 from .polarity import AUTO
 from .recording import Recording
-from .signals import EVERY, PrepareOptions, Rest, Signals, prepare
+from .signals import EVERY, PrepareOptions, Rest, Signals
 
 DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 
@@ -93,7 +94,7 @@ class Preparer:
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
-        change = signals.change + sign * (signals.rest - rest)
+        change = np.where(unanswered(signals)[:, None], 0.0, signals.change + sign * (signals.rest - rest))
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
         return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)

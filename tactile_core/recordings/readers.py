@@ -18,16 +18,22 @@ from ..files.hdf5_checked import SIGNATURE
 from ..files.registry import modules_of
 from ..sensors import SOURCE, electrode_count, title
 from . import formats
-from .array_store import Store, open_hdf5, open_npz
+from .array_store import NPY, Store, open_hdf5, open_npz
 from .assemble import check_electrodes
 from .bags.bag import START_BYTES, is_bag_folder, kind_of, open_bag
 from .bags.bag_recordings import names_of, read_bag, streams_of
 from .fingers import Chosen, named, split
-from .matlab import START, START_OF_HDF5, open_matlab
 from .recording import Recording
-from .tables.column_map import ColumnMap, read_mapped, refuse_other
+from .tables.array_table import labels_in
+from .tables.column_map import ColumnMap, refuse_other
+from .tables.json_table import is_json, read_json
+from .tables.mapped import read_mapped
+from .tables.mapped_files import read_by_map
+from .tables.matlab import START, START_OF_HDF5, open_matlab
 from .tables.table import Table, read_header, read_table
+from .tables.table_header import NUMBERED
 from .tables.truncated_cell import shown
+from .tables.unpacked import unpacked
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
@@ -36,9 +42,9 @@ ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 
 
 class Opened(NamedTuple):
-    """Open file of recordings. container : csv, hdf5, npz, mat or bag; path : the file's; finger : requested, or None
+    """Open file of recordings. container : csv, json, hdf5, npz, mat or bag; path : the file's
 
-    file : its bytes from the start; none of a bag that is a folder
+    finger : requested, or None; file : its bytes from the start; none of a bag that is a folder
     """
 
     container: str
@@ -56,11 +62,11 @@ def layouts() -> tuple[ModuleType, ...]:
 def read(
     path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE, lean: bool = False
 ) -> Recording:
-    """Read a recording: CSV, HDF5, NPZ, MATLAB 5 or a ROS bag, detected from the content, not from the name.
+    """Read a recording: CSV, HDF5, NPZ, NPY, MATLAB 5, JSON or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers, ``hands.bag#left/biotac/finger1`` that
         of one topic of a bag
-    columns : which column of a CSV file is what, where no known layout has its names; see ``column_map.read``
+    columns : which column or array of the file is what, where no known layout has its names; see ``column_map.read``
     sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
     lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
         in single precision where that is exact, as it is of counts: a third of the memory
@@ -83,7 +89,10 @@ def read(
 def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Recording:
     """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header."""
     with opened(path) as (container, where, finger, file):
-        refuse_other(path, container, columns)
+        if columns is not None:
+            refuse_other(path, container, columns)
+            _refuse_finger(where, finger)
+            return read_by_map(where, container, file, columns, partial(_unneeded, columns) if lean else None)
         if container == "hdf5":
             with open_hdf5(where) as store:
                 return _noted(layout_of(where, container, names(store)).read(store), store)
@@ -96,17 +105,20 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
         if container == "mat":
             with open_matlab(where, file) as store:
                 return _noted(_read_finger(layout_of(where, container, store.shapes), store, finger), store)
+        if container == "json":
+            layout_of(where, container, read_json(where, file).header)  # which none is
         header = read_header(where, file)
-        reader = table_reader(where, header, columns, sensor, finger)
-        table = read_table(where, file, partial(_unneeded, columns) if lean else None)
+        reader = table_reader(where, header, None, sensor, finger)
+        table = read_table(where, file, partial(_unneeded, None) if lean else None)
         found = reader(table)
-        taken = table.taken | (table.left_out if columns is None else set())
+        taken = table.taken | table.left_out
         return replace(found, not_taken=tuple(name for name in header if name not in taken))
 
 
 def _noted(recording: Recording, store: Store) -> Recording:
-    """Note the arrays of the file that the recording has not."""
-    return replace(recording, not_taken=tuple(name for name in store.shapes if name not in store.taken))
+    """Note the labels of the file, and the arrays that the recording has not; a simulated one has its own about it."""
+    labels = {} if recording.simulated else labels_in(store, len(recording))
+    return replace(recording, labels=labels, not_taken=tuple(name for name in store.shapes if name not in store.taken))
 
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:
@@ -164,10 +176,10 @@ def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -
     return replace(found, warnings=(warning, *found.warnings))
 
 
-def each_finger(path: str | os.PathLike[str]) -> list[str]:
+def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> list[str]:
     """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one.
 
-    Of a bag of several topics, ``path#topic/finger0`` and so on.
+    Of a bag of several topics, ``path#topic/finger0`` and so on. A map picks one finger itself.
 
     Raises TactileError like `read` for a file that is no recording.
     """
@@ -176,7 +188,7 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
         if container == "bag":
             with open_bag(where, file) as bag:
                 return names_of(bag, path, split(path))
-        if finger is not None:
+        if finger is not None or columns is not None:
             return [path]
         known: tuple[int, ...] = ()
         if container == "csv":
@@ -188,12 +200,12 @@ def each_finger(path: str | os.PathLike[str]) -> list[str]:
     return [path] if alone else [f"{path}#{finger}" for finger in known]
 
 
-def list_fingers(paths: Iterable[str | os.PathLike[str]]) -> list[str]:
+def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> list[str]:
     """List the recordings of each file as `each_finger` does; unreadable files are listed too, for `read` to refuse."""
     found = []
     for path in paths:
         try:
-            found += each_finger(path)
+            found += each_finger(path, columns)
         except TactileError:
             found.append(os.fspath(path))
     return found
@@ -240,14 +252,16 @@ def opened(path: str) -> Iterator[Opened]:
             yield Opened("bag", file, finger, io.BytesIO())
             return
         _check_file(file)
-        with outside.open_file(file, "a recording") as stream:
-            container = _container(stream.read(START_BYTES))
-            if finger is not None and container in ("hdf5", "npz"):
-                raise TactileError(file, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+        with outside.open_file(file, "a recording") as stream, unpacked(file, stream) as plain:
+            container = _container(plain.read(START_BYTES))
+            if plain is not stream and container not in ("csv", "json"):
+                raise TactileError(file, f"a gzipped file ({container})", "a gzipped text", "Unpack it: gunzip")
+            if container in ("hdf5", "npz"):
+                _refuse_finger(file, finger)
             if topic and container != "bag":
                 raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
-            stream.seek(0)
-            yield Opened(container, file, finger, stream)
+            plain.seek(0)
+            yield Opened(container, file, finger, plain)
 
 
 def container_of(path: str) -> str:
@@ -263,9 +277,9 @@ def _check_file(path: str) -> None:
         raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
     if not os.path.exists(path):
         advice = "Check the path; to try with a recording that ships: tactile scenes copy press_roll_slide"
-        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT or bag)", advice)
+        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)", advice)
     if not os.path.isfile(path):
-        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT or bag)")
+        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)")
 
 
 def _container(start: bytes) -> str:
@@ -276,7 +290,14 @@ def _container(start: bytes) -> str:
         return "mat"
     if start.startswith(SIGNATURE):
         return "hdf5"
-    return "npz" if start.startswith(ZIP_STARTS) else "csv"
+    if start.startswith((*ZIP_STARTS, NPY)):
+        return "npz"
+    return "json" if is_json(start) else "csv"
+
+
+def _refuse_finger(path: str, finger: int | None) -> None:
+    if finger is not None:
+        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
 
 
 def table_reader(
@@ -294,23 +315,20 @@ def table_reader(
         if _holds_hands(layout):
             return partial(_read_finger, layout, finger=finger)
         reader = layout.read
-    if finger is not None:
-        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+    _refuse_finger(path, finger)
     return reader
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
     """Return the layout that knows most of the file's columns or arrays. Raises TactileError if none does."""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
-    best, layout = max(scored, key=lambda pair: pair[0])
+    best, layout = max(scored, key=lambda pair: pair[0], default=(0.0, formats))
     if best < RECOGNISED:
         held = ", ".join(list(keys)[:6] if container == "csv" else sorted(keys)[:6])
-        word = "columns" if container == "csv" else "arrays"
-        known = " | ".join(layout.NAME for _, layout in scored)
-        raise TactileError(
-            path,
-            f"no known recording: {word} {shown(held)}",
-            known,
-            MAP_ADVICE if container == "csv" else "Compare the names with the layouts in the documentation",
-        )
+        word = {"csv": "columns", "json": "fields"}.get(container, "arrays")
+        known = " | ".join(layout.NAME for _, layout in scored) or "the names that a map gives them"
+        if NUMBERED.format(1) in keys:
+            path, known = f"{path}, line 1", "a header line"
+            raise TactileError(path, "numbers where the column names should be", known, MAP_ADVICE)
+        raise TactileError(path, f"no known recording: {word} {shown(held)}", known, MAP_ADVICE)
     return layout

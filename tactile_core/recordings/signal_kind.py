@@ -4,12 +4,36 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..sensors import COUNT_MAX
+
 KINDS = ("raw", "tared", "scaled", "rectified")
 RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Ruppel), changes stay below (assumed)
 # Larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed).
 SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
+# Readings at the top of the range, of raw readings that are not counts of 12 bit (assumed: the usual exports).
+FULL_SCALES = {
+    1.0: "shares of the range", 3.3: "volts of 3.3 V", 5.0: "volts of 5 V", 100.0: "percent of the range",
+    255.0: "counts of 8 bit", 1023.0: "counts of 10 bit",
+}  # fmt: skip
+AT_REST = 0.55, 0.97  # shares of the range between which a unit's electrodes rest in the median (2,600 to 3,500 counts)
+LEAST_RAW = 0.3  # share of the range below which raw readings of an electrode do not fall (assumed)
+MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assumed)
+
+
+def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
+    """Return counts a unit, and the unit in words, of raw readings that are no counts; None for all others.
+
+    electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0
+    """
+    low, high = np.percentile(electrodes, [1, 99], axis=0)
+    levels = np.median(electrodes, axis=0)
+    for full, words in FULL_SCALES.items():
+        within = (low >= LEAST_RAW * full) & (high <= 1.01 * full)
+        if within.mean() >= MOST_OF and AT_REST[0] <= np.median(levels[within]) / full <= AT_REST[1]:
+            return COUNT_MAX / full, words
+    return None
 
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import SOURCE, contacts_of, divider, typical_rest
+from ..sensors import COUNT_MAX, SOURCE, contacts_of, divider, typical_rest
 from ..sensors.fluid_sensor import FALLS, POLARITIES
 from . import contact_law
-from .assemble import check_electrodes
 from .doubt import LAW, Doubt, Reason, without
 from .electrode_faults import dead, saturated
 from .flags import Flag
@@ -34,7 +33,7 @@ from .rest_level import (
     tare_frames,
     window_frames,
 )
-from .signal_kind import KINDS, detect
+from .signal_kind import KINDS, detect, full_scale
 from .tables.column_map import ColumnMap
 
 LONGEST = 101  # frames, a second, to smooth over: beyond, touch itself is smoothed away (assumed)
@@ -164,19 +163,18 @@ class Signals:
 EVERY = slice(None)  # of a recording's frames
 
 
-def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
-
-    frames : those whose signals are returned; all of the recording decide what they are
-    """
-    options = options or PrepareOptions()
-    options.check()
-    check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)
+def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
+    """Prepare a recording of a finger that answers in all frames; see ``answers.prepare``."""
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
     unit = _counts_per_unit(recording, readings, kind, options, warnings)
-    readings = readings if unit == 1 else readings * unit
+    if unit != 1:
+        readings = readings * unit
+        if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
+            kind, evidence = detect(readings)
+        if kind == "raw" and recording.pdc is not None and np.nanmax(recording.pdc) <= 1.01 * COUNT_MAX / unit:
+            recording = replace(recording, pdc=unit * recording.pdc)
     readings, flags, repaired = _repaired(recording, readings, flags, options, warnings)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
@@ -243,7 +241,8 @@ def _typical_rest(kind: str, sensor: str) -> np.ndarray | None:
 
 def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
     if options.kind is None:
-        return detect(readings)
+        unit = full_scale(readings) if options.counts_per_unit is None else None
+        return ("raw", f"{unit[1]}, all far above any change") if unit else detect(readings)
     return options.kind, f"given by the user (the samples look {detect(readings)[0]})"
 
 
@@ -304,6 +303,11 @@ def _counts_per_unit(
     """Return the factor to counts: 1, the user's, or one that gives scaled recordings a usual press (assumed)."""
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
+    if kind == "raw" and (found := full_scale(readings)):
+        warnings.append(
+            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else)"
+        )
+        return found[0]
     if kind != "scaled":
         return 1.0
     largest = np.abs(readings - np.median(readings, axis=0)).max(axis=1)
@@ -311,7 +315,8 @@ def _counts_per_unit(
     factor = SCALED_PEAK / peak if peak > 1e-12 else 1.0
     warnings.append(
         f"the unit of this scaled recording is not known: stretched by {factor:.4g} to a press's usual {SCALED_PEAK:g}"
-        " counts, so depths and forces are only relative; give counts_per_unit to fix it"
+        " counts, so depths and forces are only relative; counts_per_unit fixes it: 4095 for shares of the range, 1241"
+        " for volts of 3.3 V"
     )
     return factor
 

@@ -91,7 +91,7 @@ def adapt_hand(
     Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
     columns = None if options is None else options.columns
-    every = [one for path in paths for one in each_finger(path)]
+    every = [one for path in paths for one in each_finger(path, columns)]
     found = {sensor_of(one, columns) for one in every}
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")

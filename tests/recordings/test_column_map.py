@@ -10,9 +10,9 @@ from conftest import SLIDE_HEADER
 
 from tactile_core import recordings
 from tactile_core.cli.main import main
-from tactile_core.errors import TactileError
 from tactile_core.recordings import chunks
 from tactile_core.recordings.tables import column_map
+from tactile_core.recordings.tables.map_guess import guess
 
 FRAMES = 120
 
@@ -86,13 +86,6 @@ def test_names_from_a_stranger_stay_in_their_comment(own, tmp_path):
     own.write_text(text, encoding="utf-8")
     map_file = tmp_path / "map.toml"
     held = tuple(text.splitlines()[0].lower().split(";"))
-    columns = column_map.guess(held)
-    column_map.write(map_file, columns, held)
+    columns = guess(held)[0]
+    column_map.write(map_file, [columns], held)
     assert column_map.read(map_file) == columns
-
-
-def test_a_map_is_for_csv_alone(own, tmp_path):
-    columns = column_map.guess(tuple(own.read_text(encoding="utf-8").splitlines()[0].lower().split(";")))
-    np.savez(tmp_path / "arrays.npz", electrodes=np.full((50, 19), 3300.0))
-    with pytest.raises(TactileError, match="a CSV recording"):
-        recordings.read(tmp_path / "arrays.npz", columns)

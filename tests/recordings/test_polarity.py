@@ -50,7 +50,8 @@ def test_it_is_found_and_the_change_is_that_of_a_raw_reading(pdc, sign, name, se
 
 def test_what_shows_nothing_is_taken_to_fall_and_flagged():
     still = pressed(1.0, pdc=True, share=0.05)
-    for recording in (still, dataclasses.replace(still, electrodes=np.full((400, 19), 3300.0), pdc=None)):
+    flicker = 3300.0 + np.arange(400)[:, None] % 2 * np.ones(19)
+    for recording in (still, dataclasses.replace(still, electrodes=flicker, pdc=None)):
         found = recordings.prepare(recording)
         assert found.report["polarity"] == "falls"
         assert (found.flags & Flag.POLARITY_ASSUMED > 0).all()

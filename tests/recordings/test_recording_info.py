@@ -78,9 +78,9 @@ def test_what_is_not_taken_is_named(press, tmp_path, write, slide_lines):
         tmp_path / "touch.mat", {**fingers, "F1pdc": press.pdc[None], "wrench": 1.0, "label": "a", "F3pac": 2}
     )
     for name, left in (
-        ("touch.csv", ("wrench", "label")),
-        ("touch.npz", ("wrench", "label", "notes.txt")),
-        ("touch.h5", ("label", "wrench/data")),
+        ("touch.csv", ("wrench",)),  # labels are kept
+        ("touch.npz", ("wrench", "notes.txt")),
+        ("touch.h5", ("wrench/data",)),
         ("touch.mat#0", ("wrench", "label", "F3pac")),
     ):
         assert recordings.read(tmp_path / name).not_taken == left

@@ -41,7 +41,7 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
     )
     polarity_argument(verb)
     columns_argument(verb)
-    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor from a scaled recording to counts")
+    verb.add_argument("--counts-per-unit", type=float, metavar="X", help="factor from the file's unit to counts")
     verb.add_argument(
         "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
     )
@@ -64,7 +64,7 @@ def columns_argument(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--columns",
         metavar="MAP.toml",
-        help="map of the columns of a CSV file in no known layout; `tactile info --columns` writes one",
+        help="map of the columns, fields or arrays of a file in no known layout; `tactile info --columns` writes one",
     )
 
 

@@ -62,7 +62,7 @@ LEAVES = NOTHING
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument(
-        "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT or bag files, in any known layout"
+        "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT, JSON or bag files, in any known layout"
     )
     verb.add_argument("--out", required=True, metavar="DIR", help="folder for the results; may hold other results")
     verb.add_argument(
@@ -112,7 +112,7 @@ def run(options: argparse.Namespace) -> int:
     budget = None if options.error is None else parse_budget(options.error)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    paths, failed = readers.list_fingers(options.recordings), 0
+    paths, failed = readers.list_fingers(options.recordings, prepare.columns), 0
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     levels = None if budget is None else budget.levels
     preset = presets.FAST if levels is None else variant.fitting(levels)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import complain, say, tell
-from .common import NOTHING, columns_of, polarity_argument
+from .common import NOTHING, prepare_arguments, prepare_words
 
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import SensorFile
@@ -19,8 +19,9 @@ Describe recordings: sensor, channels, rate, duration, polarity, resting frames 
 file of a BioTac SP: finger, lines, labels and the counts of its 24 electrodes; with --sensor also the changes against
 the unit's rest, which recordings that begin in contact do not show.
 
-A CSV file whose column names are of no known layout needs a map: --columns map.toml writes one, guessed from the
-names of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.
+A file whose columns, fields or arrays have names of no known layout needs a map (CSV, also without a header, JSON,
+HDF5, NPZ, NPY, MATLAB, and long tables with a row for each value): --columns map.toml writes one, guessed from names
+and values of the first file, where there is none yet. Check it, then give it to info, convert, batch, adapt and watch.
 
 Without a recording, --sensor NAME describes a sensor: one that ships, or one in the folder $TACTILE_SENSORS."""
 EPILOG = """\
@@ -35,12 +36,9 @@ LEAVES = NOTHING
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="*", metavar="FILE", help="recordings, in any known layout")
-    polarity_argument(verb)
+    prepare_arguments(verb)
     verb.add_argument(
         "--sensor", metavar="FILE|NAME", help="rest and gains of a unit, from `tactile adapt`; or a sensor's name"
-    )
-    verb.add_argument(
-        "--columns", metavar="MAP.toml", help="map of the columns of a CSV file; it is written where there is none yet"
     )
 
 
@@ -54,10 +52,10 @@ def run(options: argparse.Namespace) -> int:
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
     unit = None if options.sensor is None else _unit(options.sensor)
-    prepare, failed = PrepareOptions(polarity=options.polarity, columns=columns_of(options)), 0
+    prepare, failed = PrepareOptions(**prepare_words(options)), 0
     for path in options.recordings:
         try:
-            for finger in each_finger(path):
+            for finger in each_finger(path, prepare.columns):
                 tell(info.describe(finger, prepare, unit))
         except TactileError as error:
             complain(str(error))
@@ -84,15 +82,12 @@ def _unit(path: str) -> SensorFile:
 
 
 def _write_columns(options: argparse.Namespace) -> None:
-    """Write the map that the first recording's column names suggest."""
+    """Write the map that the first recording suggests."""
     from ...recordings.readers import opened
     from ...recordings.tables import column_map
-    from ...recordings.tables.table import read_header
+    from ...recordings.tables.mapped_files import guess_map
 
-    path = options.recordings[0]
-    with opened(path) as (container, where, _, file):
-        if container != "csv":
-            raise TactileError("--columns", f"given for {path} ({container})", "a CSV recording", "Leave it out")
-        held = read_header(where, file)
-    column_map.write(options.columns, column_map.guess(held), held)
-    say(f"{options.columns}: written, guessed from the names of the columns; check it")
+    with opened(options.recordings[0]) as (container, where, _, file):
+        guessed, held = guess_map(where, container, file)
+    column_map.write(options.columns, guessed, held)
+    say(f"{options.columns}: written, guessed from names and values; check it")

@@ -122,10 +122,13 @@ def run(options: argparse.Namespace) -> int:
 
 def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[Output]) -> None:
     """Show, and report, until the rows end or an output does."""
-    reported, failed, lost = time.perf_counter(), False, False
+    reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
         for rows, came in source:
             shown = None if rows is None else view.show(rows, came)
+            if view.silent != silent:
+                silent = view.silent
+                say("the finger does not answer: no contact" if silent else "the finger answers")
             if shown is not None:
                 seen = {"picture": shown.picture}
                 if camera is not None:

@@ -94,13 +94,15 @@ class FrameServer:
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
     """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
 
-    Of the header: frame, its index; force_n; latency_s, from the newest row to the picture; arrays, a name, a type of
+    Of the header: frame, its index; force_n; flags, bits of
+    ``recordings.flags``; latency_s, from the newest row to the picture; arrays, a name, a type of
     numpy's and a shape each.
     """
     header = {
         "format": FORMAT,
         "frame": shown.frame,
         "force_n": shown.newtons if math.isfinite(shown.newtons) else None,  # JSON has no NaN
+        "flags": shown.flags,
         "latency_s": shown.latency,
         "arrays": [[name, array.dtype.str, array.shape] for name, array in arrays.items()],
     }

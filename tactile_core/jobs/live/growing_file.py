@@ -14,7 +14,8 @@ from ...recordings.fingers import split
 from ...recordings.readers import table_reader
 from ...recordings.recording import Recording
 from ...recordings.tables.column_map import ColumnMap
-from ...recordings.tables.table import Header, read_lines
+from ...recordings.tables.table import read_lines, text_lines
+from ...recordings.tables.table_header import Header
 from ...sensors import SOURCE
 
 MOST = 2**24  # bytes taken at a time, so that a file that is long already costs bounded memory
@@ -52,7 +53,11 @@ class Growing:
         if not end:
             return None
         if self._header is None:
-            self._header = Header.parse(str(self._path), whole + end)
+            lines = text_lines(str(self._path), whole + end)
+            if sum(bool(line.strip()) for line in lines) < 2:  # a comment, perhaps: the next line shows what this is
+                self._rest = whole + end + self._rest
+                return None
+            self._header = Header.parse(str(self._path), lines)
         table = read_lines(str(self._path), self._header, whole + end, self._lines)
         self._lines += whole.count(b"\n") + 1
         if table is None:

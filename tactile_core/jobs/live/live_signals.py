@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...recordings.electrode_faults import alike
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, TOUCHING, Basis, Polarity, polarity_of, polarity_of_sensor
 from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
-from ...recordings.signal_kind import detect
+from ...recordings.signal_kind import detect, full_scale
 from ...recordings.signals import Rest, Signals
 from ...sensors import SAMPLE_RATE, SOURCE, contacts_of, electrode_count
 from ...sensors.fluid_sensor import FALLS, POLARITIES
@@ -47,6 +48,9 @@ class LiveSignals:
         self.polarity = _stated_polarity(polarity, "as given")
         self.rest: np.ndarray | None = None
         self.kind, self.found = "raw", ""
+        self._factor: float | None = None  # counts a unit of the file
+        self._unheard = 0  # frames so far whose electrodes all read the same
+        self.silent = False
 
     def learn(self, electrodes: np.ndarray, pdc: np.ndarray | None = None, polarity: str = AUTO) -> bool:
         """Look at frames (T, 19) counts for rest, and for their polarity; returns true once rest is known.
@@ -55,9 +59,13 @@ class LiveSignals:
         """
         if not self.polarity.sure and polarity in POLARITIES:
             self.polarity = _stated_polarity(polarity, "as the file says")
+        same = alike(electrodes)
+        self.silent = bool(len(same)) and bool(same[-1]) and self.kind == "raw"
         if self.rest is not None and self.polarity.sure:
             return True
-        whole = np.isfinite(electrodes).all(axis=1)
+        whole = np.isfinite(electrodes).all(axis=1) & ~same
+        self._unheard += int(same.sum())
+        electrodes = electrodes * (self._factor or 1.0)
         pdc = np.full(len(electrodes), np.nan) if pdc is None else pdc
         most = round(LONGEST * self._rate)
         self._seen = np.concatenate([self._seen, electrodes[whole]])[:most]
@@ -71,12 +79,12 @@ class LiveSignals:
     def _find_rest(self) -> None:
         """Take the first quiet part for rest, or the calmest one when LONGEST has passed."""
         if self._tare is not None and len(self._seen) >= self._tare.stop:
-            self.kind, _ = detect(self._seen)
+            self._find_kind()
             first, last = self._tare.start, self._tare.stop
             self.rest, self.found = level(self._seen[first:last]), f"frames {first}:{last}, as given"
         if self._tare is not None or len(self._seen) < window_frames(self._rate):
             return
-        self.kind, _ = detect(self._seen)
+        self._find_kind()
         if self._zero:
             self.rest, self.found = np.zeros(self._seen.shape[1]), "the file's own zero, as asked for"
             return
@@ -92,6 +100,18 @@ class LiveSignals:
             spread = [self._seen[i : i + n].std(axis=0).max() for i in range(0, len(self._seen) - n, n)]
             first = n * int(np.argmin(spread))
             self.rest, self.found = level(self._seen[first : first + n]), f"no quiet part: a guess, {first}:{first + n}"
+
+    def _find_kind(self) -> None:
+        """Detect unit and kind of the frames so far; changes that were all 0 at first were no silence, but rest."""
+        if self._factor is None:
+            unit = full_scale(self._seen)
+            self._factor = unit[0] if unit else 1.0
+            self._seen = self._seen * self._factor
+        self.kind, _ = detect(self._seen)
+        if self.kind != "raw" and self._unheard:
+            count = min(self._unheard, window_frames(self._rate))
+            self._seen = np.concatenate([np.zeros((count, self._seen.shape[1])), self._seen])
+            self._pdc, self._unheard = np.concatenate([np.full(count, np.nan), self._pdc]), 0
 
     def _agrees(self, known: Rest, first: int, last: int) -> bool:
         """Return true if these calm frames are at the unit's rest."""
@@ -121,12 +141,16 @@ class LiveSignals:
 
     def signals(self, electrodes: np.ndarray) -> Signals:
         """Return the signals of frames (T, 19) counts; call when rest is known."""
-        flags = Flag.RECTIFIED if self.kind == "rectified" else 0
         count, rest = len(electrodes), self._known_rest()
+        silent = alike(electrodes) & (self.kind == "raw")
+        flags = np.full(count, Flag.RECTIFIED if self.kind == "rectified" else 0, np.uint16)
+        flags[silent] |= np.uint16(Flag.DEAD_CHANNEL)
+        electrodes = electrodes * (self._factor or 1.0)
+        change = np.where(silent[:, None], 0.0, self.polarity.sign * (electrodes - rest))
         signals = Signals(
-            change=self.polarity.sign * (electrodes - rest), rest=rest, drift=np.zeros_like(rest),
+            change=change, rest=rest, drift=np.zeros_like(rest),
             electrodes=electrodes, kind=self.kind,
-            quiet=np.zeros(count, bool), flags=np.full(count, flags, np.uint16), pdc=np.full(count, np.nan),
+            quiet=np.zeros(count, bool), flags=flags, pdc=np.full(count, np.nan),
             warnings=(), report={}, sensor=self._sensor,
         )  # fmt: skip
         if self._unit is None:

@@ -29,7 +29,8 @@ REMEMBERED = 1000  # latencies whose quantiles are reported
 class Shown:
     """Picture on display.
 
-    frame : its index; picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
+    frame : its index; flags : bits of ``recordings.flags.Flag``
+    picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
     latency : s from rows to picture; work : s of them
     """
 
@@ -38,6 +39,7 @@ class Shown:
     force: np.ndarray
     latency: float
     work: float
+    flags: int = 0
 
     @property
     def newtons(self) -> float:
@@ -74,6 +76,11 @@ class View:
         """Source of the rest level; empty while it is not known."""
         return self._signals.found
 
+    @property
+    def silent(self) -> bool:
+        """Return true while the finger does not answer: its electrodes all read the same."""
+        return self._signals.silent
+
     def show(self, rows: Recording, came: float) -> Shown | None:
         """Translate and draw the last row that came at `came` (time.perf_counter); None before rest is known."""
         began = time.thread_time()
@@ -81,14 +88,16 @@ class View:
         if not self._signals.learn(rows.electrodes, rows.pdc, rows.about.get("polarity", AUTO)):
             return None
         self.passed += len(rows) - 1
-        translation = self._translation(self._signals.signals(newest(rows)[None]))
+        signals = self._signals.signals(newest(rows)[None])
+        translation = self._translation(signals)
         drawer = self._tools.drawer
         gel = drawer.gel(vars(translation))["displacement_digit"]
         with folds_counted():  # a line for each such picture would hide the latencies
             heights = drawer.height_map(gel)
         picture = drawer.draw(heights[0], gel[0])
         latency, work = time.perf_counter() - came, time.thread_time() - began
-        shown = Shown(self.frames - 1, picture, translation.force[0], latency, work)
+        flags = int(translation.flags[0] | signals.flags[0])
+        shown = Shown(self.frames - 1, picture, translation.force[0], latency, work, flags)
         self.latencies.append((latency, work))
         return shown
 

@@ -33,24 +33,26 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
     """Build the recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
 
-    Channels that the table leaves out are None. Raises TactileError for a missing column, and the errors of
-    ``assemble``.
+    Channels that the table leaves out are None, electrodes that it has not are dead channels. Raises TactileError for
+    another missing column, and the errors of ``assemble``.
     """
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)
         for channel, names in channels.items()
         if not table.left_out.issuperset(names)
     }
+    used = ["pdc", "tac", "tdc", *(name for names in channels.values() for name in names)]
     return assemble(
         table.path,
         layout,
         electrodes=table.counts(electrodes),
         stamps=table.column(time),
         rows=table.lines,
-        problems=table.essential([time, *electrodes]),
+        problems=table.essential([time, *electrodes], used),
         row_word="line",
         warnings=table.warnings,
-        names=electrodes,
+        names=[name if table.has(name) else "" for name in electrodes],
+        labels=table.labels({time, *electrodes, *used}),
         pdc=table.column("pdc"),
         tac=table.column("tac"),
         tdc=table.column("tdc"),
@@ -89,11 +91,12 @@ def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: 
         electrodes=table.columns(names),
         stamps=None,
         rows=table.lines,
-        problems=[problem for problem in table.essential(names) if problem.essential],
+        problems=table.essential(names),
         row_word="line",
         about={"finger": tuple(HAND)[finger], "labels": [name for name in table.header if name not in electrodes]},
         warnings=table.warnings,
         names=names,
+        labels=table.labels(electrodes),
         sensor="biotac_sp",
         snapshots=snapshots,
     )

@@ -60,6 +60,6 @@ def read(table: Table) -> Recording:
     held = sum(name.startswith("electrodes") for name in names)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")
-    table.columns(COLUMNS)  # names the first column that is missing
+    table.columns([name for name in COLUMNS if name not in ELECTRODE_NAMES])  # names the first that is missing
     vectors = {"position": VECTORS[:3], "force": VECTORS[3:]}
     return of_table(table, NAME, "time", ELECTRODE_NAMES, pac=["pac0", "pac1"], **vectors)

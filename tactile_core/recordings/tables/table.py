@@ -1,9 +1,9 @@
-"""Parse a text table with one header line; every bad cell is reported by line and column."""
+"""Parse a text table; every bad cell is reported by line and column."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain, islice, pairwise
 from typing import BinaryIO
@@ -12,11 +12,13 @@ import numpy as np
 
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
+from ..labels import labels_of
+from .cells import LABEL, MISSING, Cells, Words, number, unquoted
+from .table_header import Header, split
 from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
-MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
 WHOLE = 8 * 2**20  # bytes of text up to which a file is parsed at once; of a longer one BLOCK at a time
 BLOCK = 2 * 2**20
 OVERLAP = 200  # rows of the block before by which the last cell of a file is judged
@@ -32,6 +34,8 @@ class Table:
     start : line after which the rows begin
     left_out : columns that the file has, which were parsed and are not held
     taken : names of the columns that were read so far, or that belong to another recording of the file
+    words : texts of the columns that hold texts, of which values has the numbers
+    texts : name -> (T,) further labels, which the file holds beside its columns
     """
 
     path: str
@@ -44,10 +48,12 @@ class Table:
     start: int = 0
     left_out: frozenset[str] = frozenset()
     taken: set[str] = field(default_factory=set)
+    words: dict[str, Words] = field(default_factory=dict)
+    texts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
         """Return the values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
-        missing = [name for name in names if name not in self.header and name not in self.left_out]
+        missing = [name for name in names if not self.has(name)]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
             raise TactileError(
@@ -60,12 +66,44 @@ class Table:
         found: np.ndarray = np.empty((len(self.values), len(names)), dtype)
         with np.errstate(over="ignore"):
             for place, column in enumerate(self.header.index(name) for name in names):
-                found[:, place] = self.exact.get(column, self.values[:, column])
+                values = self.exact.get(column, self.values[:, column])
+                words = self.words.get(self.header[column])
+                found[:, place] = values if words is None else self._numbers_of(names[place], words, values)
         return found
 
+    def _numbers_of(self, name: str, words: Words, values: np.ndarray) -> np.ndarray:
+        """Return the numbers (T,) in a column of texts. Raises TactileError where none of them is a number."""
+        found, told = words.values(values), [word for word in words if word.lower() not in MISSING]
+        if told and not np.isfinite(found).any():
+            expected = "numbers, or times as 2012-11-08 17:12:03.45"
+            advice = "Leave the column out in a map: tactile info FILE --columns map.toml writes one"
+            held = f"{shown(told[0])} is {_no_number(told[0])}"
+            raise TactileError(f"{self.path}, column {name!r}", held, expected, advice)
+        return found
+
+    def labels(self, used: Collection[str]) -> dict[str, np.ndarray]:
+        """Return the texts (T,) of columns that are not used, and of numbers whose name says that they are labels."""
+        found = dict(self.texts)
+        for column, name in enumerate(self.header):
+            values = self.exact.get(column, self.values[:, column])
+            if name in self.words and name not in used:
+                found[name] = self.words[name].texts(values)
+            elif name not in used and LABEL.search(name):
+                found[name] = np.array(["" if np.isnan(value) else f"{value:.10g}" for value in values], dtype=object)
+        self.taken.update(found)
+        return labels_of(found)
+
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64."""
+        """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64.
+
+        Columns that the table has not are NaN, unless half of them are missing.
+        """
         self.taken.update(names)
+        held = [name for name in names if self.has(name)]
+        if len(held) < len(names) and len(held) > len(names) / 2:
+            found = np.full((len(self.values), len(names)), np.nan)
+            found[:, [names.index(name) for name in held]] = self.columns(held)
+            return found
         places = [self.header.index(name) for name in names if name in self.header]
         if not self.left_out or any(place in self.exact for place in places):
             return self.columns(names)
@@ -73,46 +111,33 @@ class Table:
             return self.values[:, places[0] : places[0] + len(names)]  # no copy: it may be most of the table
         return self.columns(names, np.float32)
 
+    def has(self, name: str) -> bool:
+        """Return true if the file has the column."""
+        return name in self.header or name in self.left_out
+
     def column(self, name: str) -> np.ndarray:
         """Return the values (T,) float of a column."""
         return self.columns([name])[:, 0]
 
-    def essential(self, names: list[str]) -> list[Problem]:
-        """Return the table's problems, with those outside these columns marked as not essential."""
-        keep = {*names, "row"}
-        return [p if p.field in keep else Problem(p.frame, p.row, p.field, p.found, False) for p in self.problems]
-
-
-@dataclass(frozen=True)
-class Header:
-    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells."""
-
-    names: tuple[str, ...]
-    lines: int
-    separator: str
-
-    @classmethod
-    def parse(cls, path: str, start: bytes) -> Header:
-        """Parse the header of a text that starts with these whole lines. Raises TactileError."""
-        return cls(*_header(path, _text(path, start)))
+    def essential(self, names: Iterable[str], also: Iterable[str] = ()) -> list[Problem]:
+        """Return the problems in these columns, and those in others that are read, marked as not essential."""
+        keep, read = {*names, "row"}, {*names, "row", *also}
+        return [replace(p, essential=p.field in keep) for p in self.problems if p.field in read]
 
 
 def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
     """Parse whole lines of a growing file, after `before` earlier lines; None if they hold no data row."""
-    lines = _text(path, data)
+    lines = text_lines(path, data)
     skipped = max(0, header.lines - before)
     if not any(line.strip(" \t") for line in lines[skipped:]):
         return None
-    return _parsed(path, header.names, header.separator, lines[skipped:], before + skipped, last=False)
+    return _parsed(path, header, lines[skipped:], before + skipped, last=False)
 
 
 def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
-    """Read the lower-case column names of the first line that is not empty, in the file's first megabyte."""
+    """Read the lower-case column names in the file's first megabyte."""
     file.seek(0)
-    lines = _text(path, _whole_lines(path, file, file.read(MAX_LINE)))
-    if not any(line.strip() for line in lines):
-        raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
-    return _header(path, lines)[0]
+    return Header.parse(path, text_lines(path, _whole_lines(path, file, file.read(MAX_LINE)))).names
 
 
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
@@ -135,7 +160,7 @@ def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_o
     size : bytes of the whole file, from which the number of rows is guessed; left_out : columns that are not held
     """
     path = first.path
-    held = [column for column, name in enumerate(first.header) if not left_out(name)]
+    held = [column for column, name in enumerate(first.header) if name in first.words or not left_out(name)]
     header = tuple(first.header[column] for column in held)
     guess = int(1.05 * len(first.values) * size / BLOCK) + 1000
     values, lines = np.empty((guess, len(header)), np.float32), np.empty(guess, int)
@@ -169,8 +194,9 @@ def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_o
             columns[column][start : start + len(part)] = part
     blank = _tell_blank_lines(first.start, lines)
     return Table(
-        path, header, values, lines, tuple(problems), blank, columns, left_out=frozenset({*first.header} - {*header})
-    )
+        path, header, values, lines, tuple(problems), blank, columns,
+        left_out=frozenset({*first.header} - {*header}), words=first.words,
+    )  # fmt: skip
 
 
 def _check_problems(path: str, problems: list[Problem], line: int) -> None:
@@ -190,19 +216,20 @@ def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Ite
     """
     file.seek(0)
     data = _whole_lines(path, file, file.read(part_bytes))
-    lines = _text(path, data)
-    header, first, separator = _header(path, lines)
+    lines = text_lines(path, data)
+    header = Header.parse(path, lines)
+    first = header.lines
     lines, repeated = lines[first:], 0
     while True:
         data = _whole_lines(path, file, file.read(part_bytes))
         last = not data
-        table = _parsed(path, header, separator, lines, first, last)
+        table = _parsed(path, header, lines, first, last)
         yield table, repeated
         if last:
             return
         repeated = min(context, len(table.lines))
         kept = int(table.lines[-repeated]) - first - 1
-        lines, first = lines[kept:-1] + _text(path, data), first + kept
+        lines, first = lines[kept:-1] + text_lines(path, data), first + kept
 
 
 def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
@@ -214,9 +241,7 @@ def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
     return data
 
 
-def _parsed(
-    path: str, header: tuple[str, ...], separator: str, lines: list[str], first: int, last: bool = True
-) -> Table:
+def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool = True) -> Table:
     """Parse the lines after line `first` to a table; last : the file ends with them."""
     ended = not lines or not lines[-1]
     if ended:
@@ -228,15 +253,17 @@ def _parsed(
         )
     if len(kept) > MAX_FRAMES:
         raise TactileError(path, f"{len(kept):,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
-    values = np.empty((len(kept), len(header)))
+    values = np.empty((len(kept), len(header.names)))
     problems: list[Problem] = []
-    for frame, (number, line) in enumerate(kept):
-        values[frame] = _row(line, header, separator, frame, number, problems)
-        _check_problems(path, problems, number)
-    if last and not ended:
-        doubt_last_cell(kept, header, separator, values, problems)
-    rows = np.array([number for number, _ in kept])
-    return Table(path, header, values, rows, tuple(problems), _tell_blank_lines(first, rows), start=first)
+    cells = header.cells([line for _, line in kept])
+    for frame, (line_number, line) in enumerate(kept):
+        values[frame] = _row(line, header, cells, frame, line_number, problems)
+        _check_problems(path, problems, line_number)
+    if last and not ended and header.names[-1] not in cells.words:
+        doubt_last_cell(kept, header.names, header.separator, values, problems)
+    rows = np.array([line_number for line_number, _ in kept])
+    blank = _tell_blank_lines(first, rows)
+    return Table(path, header.names, values, rows, tuple(problems), blank, start=first, words=cells.words)
 
 
 def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
@@ -252,14 +279,14 @@ def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
     return (f"lines {where}: blank ({count} in all); no frames are made of them",)
 
 
-def _text(path: str, data: bytes) -> list[str]:
+def text_lines(path: str, data: bytes) -> list[str]:
     """Split a text into lines, with an empty one after its last newline."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:
         raise TactileError(f"{path}, byte {data.index(0)}", "binary data", "a CSV, HDF5, NPZ or MATLAB 5 recording")
     try:
-        text = data.decode("utf-8-sig").replace('"', "")
+        text = unquoted(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise TactileError(
             f"{path}, byte {error.start}",
@@ -273,89 +300,45 @@ def _text(path: str, data: bytes) -> list[str]:
     return lines
 
 
-def _header(path: str, lines: list[str]) -> tuple[tuple[str, ...], int, str]:
-    """Return column names, number of lines up to and with the header, and separator."""
-    first = next((i for i, line in enumerate(lines) if line.strip()), None)
-    if first is None:
-        raise TactileError(path, "no text", "a header line", "Check that the recording was written to its end")
-    line = lines[first]
-    separator = max(",;\t", key=line.count)
-    if line.count(separator) >= MAX_COLUMNS:
-        found = f"{line.count(separator) + 1:,} columns"
-        raise TactileError(f"{path}, line {first + 1}", found, f"at most {MAX_COLUMNS:,}", "Export it again")
-    cells = [cell.strip().lower() for cell in line.split(separator)]
-    while len(cells) > 1 and not cells[-1]:
-        cells.pop()
-    if all(_number(cell) is not None for cell in cells):
-        raise TactileError(
-            f"{path}, line {first + 1}",
-            "numbers where the column names should be",
-            "a header line",
-            "Add the header line, so that no column is guessed",
-        )
-    for i, cell in enumerate(cells):
-        if cell and cell in cells[:i]:
-            raise TactileError(f"{path}, line {first + 1}", f"column {shown(cell)} is there twice", "each column once")
-    return tuple(cells), first + 1, separator
-
-
-def _number(cell: str) -> float | None:
-    """Parse the cell as a finite number; None for text, NaN, infinity and Python's 1_000."""
-    if "_" in cell:
-        return None
-    try:
-        value = float(cell)
-    except ValueError:
-        return None
-    return value if np.isfinite(value) else None
-
-
 def _no_number(cell: str) -> str:
     """Say what a cell is that is no number: one with a decimal comma is mended by another setting of the export."""
-    comma = cell.count(",") == 1 and _number(cell.replace(",", ".")) is not None
+    comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
     return "a number with a decimal comma, where a point is expected" if comma else "not a number"
 
 
-def _row(
-    line: str, header: tuple[str, ...], separator: str, frame: int, number: int, problems: list[Problem]
-) -> list[float]:
+def _row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]) -> list[float]:
     """Parse the row's values; its errors are added to problems."""
-    cells = line.split(separator)
-    if len(cells) > len(header) and not "".join(cells[len(header) :]).strip():
-        cells = cells[: len(header)]  # a separator at the end of each row, as the slide set has
-    if len(cells) == len(header) and "_" not in line:
+    width = len(header.names)
+    cells = split(line, header.separator)
+    if len(cells) > width and not "".join(cells[width:]).strip():
+        cells = cells[:width]  # a separator at the end of each row, as the slide set has
+    if len(cells) == width and (kinds.words or "_" not in line):
         try:
-            values = [float(cell) for cell in cells]
+            values = kinds.values(cells)
         except ValueError:
             values = []
         if values and all(-1e300 < value < 1e300 for value in values):  # false for NaN and infinity
             return values
-    return _bad_row(cells, header, frame, number, problems)
+    return _bad_row(cells, header.names, kinds, frame, line_number, problems)
 
 
 def _bad_row(
-    cells: list[str], header: tuple[str, ...], frame: int, number: int, problems: list[Problem]
+    cells: list[str], names: tuple[str, ...], kinds: Cells, frame: int, line_number: int, problems: list[Problem]
 ) -> list[float]:
-    width = len(header)
+    width = len(names)
     if len(cells) > width:
-        problems.append(Problem(frame, number, "row", f"{len(cells)} cells where the header has {width}"))
+        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width}"))
         return [np.nan] * width
-    cut = len(cells) < width
-    if cut:  # the last cell that is there may be cut in its middle
-        problems.append(Problem(frame, number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
+    if len(cells) < width:  # the last cell that is there may be cut in its middle
+        problems.append(Problem(frame, line_number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
         cells = cells[:-1]
     values = []
-    for name, cell in zip(header, cells, strict=False):
-        value = _number(cell.strip())
+    for place, (name, cell) in enumerate(zip(names, cells, strict=False)):
+        value = kinds.value(place, cell)
         if value is None or not -1e300 < value < 1e300:
-            problems.append(
-                Problem(
-                    frame,
-                    number,
-                    name,
-                    f"{shown(cell.strip())} is {_no_number(cell.strip())}" if cell.strip() else "an empty cell",
-                )
-            )
+            plain = cell.strip()
+            found = f"{shown(plain)} is {_no_number(plain)}" if plain else "an empty cell"
+            problems.append(Problem(frame, line_number, name, found))
             value = np.nan
         values.append(value)
     return values + [np.nan] * (width - len(values))

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.translation import prints
 
 from tactile_core import recordings
-from tactile_core.recordings.signals import prepare
+from tactile_core.recordings import prepare
 from tactile_core.translation.translate import load_translator
 from tactile_core.translation.translator import Translator
 

@@ -11,9 +11,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..errors import TactileError
-from ..files import installed
-from .array_store import Store, damage_reported
+from ...errors import TactileError
+from ...files import installed
+from ..array_store import Store, damage_reported
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
 CLASSES = {

@@ -1,0 +1,111 @@
+"""Named arrays of HDF5, NPZ and MATLAB files as a table: row i of an array (T, n) is its columns ``name[0]`` on."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from itertools import product
+from math import prod
+
+import numpy as np
+
+from ...errors import TactileError
+from ...sensors import ELECTRODES
+from ..array_store import Store
+from ..assemble import MAX_FRAMES
+from ..labels import labels_of
+from .cells import LABEL
+from .table import Table
+from .table_header import MAX_COLUMNS
+
+INDEX = re.compile(r"(.*?)((?:\[\d+\])*)$", re.DOTALL)
+
+
+def names_of(store: Store) -> dict[str, int]:
+    """Return the names of the file's columns, in lower case, each with its number of rows."""
+    found: dict[str, int] = {}
+    for name, (shape, kind) in store.shapes.items():
+        rows, inner = _rows(shape)
+        if rows > 1 and kind.kind in "iufb" and len(found) + prod(inner) <= MAX_COLUMNS:
+            for index in product(*map(range, inner)):
+                found[name.lower() + "".join(f"[{place}]" for place in index)] = rows
+    return found
+
+
+def _rows(shape: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
+    """Return the number of rows of an array and the shape of one; MATLAB and some loggers write (19, T), or (1, T)."""
+    if _is_turned(shape):
+        shape = shape[::-1]
+    if len(shape) == 2 and shape[1] == 1:
+        shape = shape[:1]
+    return (shape[0], shape[1:]) if shape else (0, ())
+
+
+def _is_turned(shape: tuple[int, ...]) -> bool:
+    return len(shape) == 2 and shape[1] > shape[0] and shape[1] != ELECTRODES
+
+
+def table_of(store: Store, wanted: Iterable[str]) -> Table:
+    """Read the wanted columns, and the file's labels, to a table.
+
+    wanted : names as of `names_of`; an array's name stands for all its columns. Raises TactileError for one that is
+    missing, and for arrays of other lengths than the first.
+    """
+    called = {name.lower(): name for name in store.shapes}
+    columns: dict[str, np.ndarray] = {}
+    held: dict[str, np.ndarray] = {}
+    for name in dict.fromkeys(wanted):
+        found = INDEX.match(name)
+        array = called.get(found[1] if found else name)
+        if array is None:
+            expected = ", ".join(list(names_of(store))[:8])
+            raise TactileError(f"{store.path}, {name}", "this array is missing", expected, "Change the map")
+        if array not in held:
+            held[array] = _read(store, array)
+        columns |= _columns_of(array.lower(), held[array])
+    lengths = {name: len(values) for name, values in held.items()}
+    frames = next(iter(lengths.values()), 0)
+    for name, length in lengths.items():
+        if length != frames:
+            expected = f"{frames:,} as of {next(iter(lengths))}"
+            raise TactileError(f"{store.path}, {name}", f"{length:,} rows", expected, "Map arrays of one recording")
+    labels = labels_in(store, frames)
+    values = np.column_stack(list(columns.values())) if columns else np.empty((0, 0))
+    return Table(store.path, tuple(columns), values, np.arange(frames), (), texts=labels)
+
+
+def _columns_of(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    inner = product(*map(range, values.shape[1:]))
+    return {name + "".join(f"[{place}]" for place in index): values[:, *index] for index in inner}
+
+
+def _read(store: Store, name: str) -> np.ndarray:
+    """Return an array with its rows first."""
+    shape = store.shapes[name][0]
+    frames = _rows(shape)[0]
+    if frames > MAX_FRAMES:
+        expected, advice = f"at most {MAX_FRAMES:,}", "Split the recording"
+        raise TactileError(f"{store.path}, {name}", f"{frames:,} rows", expected, advice)
+    found = store.array(name, shape)
+    found = found.T if _is_turned(shape) else found
+    return found[:, 0] if found.ndim == 2 and found.shape[1] == 1 else found
+
+
+def labels_in(store: Store, frames: int) -> dict[str, np.ndarray]:
+    """Return the texts (T,) of a file's arrays of texts, and of numbers and attributes whose names are of labels."""
+    found = {
+        name: np.full(frames, value, dtype=object)
+        for name, value in store.attributes.items()
+        if isinstance(value, str | int | float) and LABEL.search(name.lower())
+    }
+    for name, (shape, kind) in store.shapes.items():
+        if _rows(shape)[0] not in (frames, 0, 1) or prod(_rows(shape)[1]) != 1:
+            continue
+        if kind.kind in "iufb" and LABEL.search(name.lower()):
+            texts = [f"{value:.10g}" for value in np.ravel(store.array(name, shape))]
+        elif store.is_text(name):
+            texts = store.texts(name)
+        else:
+            continue
+        found[name] = np.array(texts * (frames if len(texts) == 1 else 1), dtype=object)
+    return labels_of({name: map(str, column) for name, column in found.items()})

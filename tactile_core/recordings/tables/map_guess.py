@@ -1,0 +1,175 @@
+"""Guess the map of a recording's columns: from their names, and where they have none, from what they hold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from typing import Any, cast
+
+import numpy as np
+
+from ...sensors import COUNT_MAX, ELECTRODES
+from ..time_stamps import Unit, is_likely, unit_of
+from .column_map import CHANNELS, ColumnMap
+from .table import Table
+
+NUMBERED = re.compile(r"(.*?)(\d+)(\D*)$", re.DOTALL)
+NUMBER = re.compile(r"\d+")
+TIME = re.compile(r"time|stamp|^t$|^t\W|sec")
+UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
+ELECTRODE = re.compile(r"electrode|(?:^|[^a-z])(?:elec|ele|el|e)[^a-z]*$")
+NOT_READ = re.compile(r"offset|time|stamp|pac|temp|force|joint")  # series of these are no electrodes
+VALUE = re.compile(r"value|reading|count|data|signal")
+RAW = 0.35 * COUNT_MAX  # least counts at rest (docs/sources.md, BioTac read-out: from 2,000 on)
+SLIDE = 45  # columns of the slide set's layout, of which some files have lost the header
+# Numbers of channels in the logs of the sensor's own driver, beside 17 to 35 of the electrodes (SynTouch's C example).
+DRIVER = {"17": {"pdc": "1", "tac": "2", "tdc": "3"}}
+
+
+def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]:
+    """Guess the maps of a file's fingers, of which the first is to be read; without electrodes where none are found.
+
+    names : of the columns, in lower case; of arrays with their lengths, of which those of the electrodes' are taken
+    table : some of the columns' rows
+    """
+    found = []
+    for each in _series(names):
+        near = _as_long(names, each)
+        found.append(_timed(_beside(each, near), near, table))
+    if not found and table is not None:
+        found = [_timed(each, names, table) for each in _long(table) or _by_values(table)]
+    return found or [_timed(_beside((), names), names, table)]
+
+
+def with_unit(columns: ColumnMap, table: Table) -> ColumnMap:
+    """Return the map with the unit of its time, by the name or by the stamps in a table."""
+    unit = UNIT.search(columns.time.rpartition("/")[2].replace("_", " "))
+    stamps = table.column(columns.time)
+    stamps = stamps[np.isfinite(stamps)]
+    found = cast(Unit, unit[1]) if unit else unit_of(stamps) if len(stamps) else "s"
+    return replace(columns, time_unit=found)
+
+
+def _as_long(names: Collection[str], electrodes: tuple[str, ...]) -> Collection[str]:
+    """Return the names of arrays as long as the electrodes'; all of columns, which are."""
+    if not isinstance(names, dict):
+        return names
+    frames = names[next(filter(None, electrodes))]
+    return [name for name, each in names.items() if each == frames]
+
+
+def _series(names: Collection[str]) -> list[tuple[str, ...]]:
+    """List runs of 19 names that differ in one number alone: those called electrodes, of which some may be missing.
+
+    Where none are so called, any.
+    """
+    series: dict[tuple[str, str], dict[int, str]] = {}
+    for name in names:
+        for found in NUMBER.finditer(name):
+            if len(found[0]) < 4:
+                series.setdefault((name[: found.start()], name[found.end() :]), {})[int(found[0])] = name
+    runs = []
+    for (before, after), each in series.items():
+        if NOT_READ.search(before + after):
+            continue
+        called = bool(ELECTRODE.search(before + after) or ELECTRODE.search(before.rstrip("[_ .")))
+        for first, last in _consecutive(sorted(each)):
+            if last - first == ELECTRODES - 1:
+                runs.append((not called, tuple(each[number] for number in range(first, first + ELECTRODES))))
+        least = 0 if 0 in each else 1
+        partial = ELECTRODES // 2 < len(each) < ELECTRODES and max(each) < least + ELECTRODES and min(each) >= least
+        if partial and called:
+            runs.append((False, tuple(each.get(number, "") for number in range(least, least + ELECTRODES))))
+    best = min((other for other, _ in runs), default=True)
+    return [names for other, names in runs if other == best]
+
+
+def _consecutive(numbers: list[int]) -> list[tuple[int, int]]:
+    """Return the first and last number of each run of consecutive ones."""
+    breaks = [place for place in range(1, len(numbers)) if numbers[place] != numbers[place - 1] + 1]
+    starts, ends = [0, *breaks], [*breaks, len(numbers)]
+    return [(numbers[start], numbers[end - 1]) for start, end in zip(starts, ends, strict=True) if end > start]
+
+
+def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
+    """Return the map of electrodes and of the channels whose names begin most like theirs."""
+    like = next(filter(None, electrodes), "")
+    channels: dict[str, Any] = {
+        word: _nearest((name for name in names if _is_called(word, name)), like) for word in CHANNELS
+    }
+    stem = like.rpartition("[")[0]
+    if stem and electrodes == tuple(f"{stem}[{place}]" for place in range(ELECTRODES)):
+        electrodes = (stem,)
+    return ColumnMap(electrodes, **channels)
+
+
+def _is_called(word: str, name: str) -> bool:
+    """Return true for a column of that channel, and not of an array of them."""
+    return word in name.rpartition("/")[2] and not name.endswith("]")
+
+
+def _nearest(names: Iterable[str], like: str) -> str:
+    """Return the name that begins with most of another one, the first of such; empty where there is none."""
+    return max(names, key=lambda name: _alike(name, like), default="")
+
+
+def _alike(name: str, other: str) -> int:
+    """Count the characters with which both names begin."""
+    pairs = zip(name, other, strict=False)
+    return next((place for place, (one, two) in enumerate(pairs) if one != two), min(len(name), len(other)))
+
+
+def _timed(columns: ColumnMap, names: Collection[str], table: Table | None) -> ColumnMap:
+    """Return the map with the time's column and unit."""
+    like = next(filter(None, columns.electrodes), "")
+    taken = columns.names()
+    timed = [name for name in names if TIME.search(name.rpartition("/")[2]) and name not in taken]
+    if table is not None:
+        timed = [name for name in timed if name not in table.words]
+        timed += [name for name in names if name.startswith("column") and name not in taken and _rises(table, name)]
+    found = replace(columns, time=_nearest(timed, like))
+    return with_unit(found, table) if found.time and table is not None else found
+
+
+def _rises(table: Table, name: str) -> bool:
+    return name not in table.words and is_likely(table.column(name))
+
+
+def _long(table: Table) -> list[ColumnMap]:
+    """Return the maps of a long table: the column that names 19 channels in turn, and each that has their values."""
+    for place, name in enumerate(table.header):
+        if name in table.words:
+            held = [word.lower() for word in table.words[name]]
+        else:
+            numbers = np.unique(table.values[:, place])
+            held = [f"{number:g}" for number in numbers] if len(numbers) < len(table.values) / 2 else []
+        series = _series(held) if len(held) < 1000 else []
+        if not series:
+            continue
+        channels: dict[str, Any] = DRIVER.get(series[0][0], {}) or {
+            word: next((each for each in held if word in each), "") for word in CHANNELS
+        }
+        values = [each for each in table.header if VALUE.search(each) and each not in table.words and each != name]
+        values = values or [each for each in table.header[place + 1 :] if _is_raw(table, each)]
+        return [ColumnMap(series[0], channel=name, value=value, **channels) for value in values]
+    return []
+
+
+def _is_raw(table: Table, name: str) -> bool:
+    values = table.column(name)
+    return bool(RAW < np.nanmedian(values) <= COUNT_MAX)
+
+
+def _by_values(table: Table) -> list[ColumnMap]:
+    """Return the map of columns without names: electrodes are the 19 in a row with the highest counts."""
+    names = table.header
+    if not names[0].startswith("column") or len(names) < ELECTRODES:
+        return [_beside((), names)]
+    medians = np.array([0.0 if name in table.words else np.nanmedian(table.column(name)) for name in names])
+    medians[(medians < RAW) | (medians > COUNT_MAX)] = 0.0
+    starts = range(len(names) - ELECTRODES + 1)
+    fits = [start for start in starts if (medians[start : start + ELECTRODES] > 0).sum() > ELECTRODES // 2]
+    best = max(fits, key=lambda start: medians[start : start + ELECTRODES].sum(), default=len(names) - ELECTRODES)
+    found = ColumnMap(tuple(names[best : best + ELECTRODES]))
+    return [replace(found, tdc=names[1], tac=names[2], pdc=names[3]) if len(names) == SLIDE else found]

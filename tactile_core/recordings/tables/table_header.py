@@ -1,0 +1,103 @@
+"""Header of a text table: names, separator, and the comments before it; columns of a table without one are numbered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from ...errors import TactileError
+from .cells import LOOKED_AT, OUTSIDE, Cells, number
+from .truncated_cell import shown
+
+MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
+COMMENTS = "#", "%", "//"
+SPACE = " "  # stands for any white space between cells
+MANY = 10  # cells: a first line of less than half as many as one soon after it is a title, no header (assumed)
+NUMBERED = "column{}"  # names of columns without a header, from 1
+
+
+@dataclass
+class Header:
+    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells."""
+
+    names: tuple[str, ...]
+    lines: int
+    separator: str
+    _cells: Cells | None = field(default=None, init=False)
+
+    @classmethod
+    def parse(cls, path: str, lines: Sequence[str]) -> Header:
+        """Parse the header of a text that starts with these lines.
+
+        Lines that begin with a comment's mark are passed over, but the last, where it names as many columns as follow,
+        as of ``np.savetxt`` and ``rostopic echo -p``. Raises TactileError for a text without a line, and for two
+        columns of one name.
+        """
+        first, comment = _first_row(lines)
+        if first is None:
+            raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
+        separator = _separator(lines[first])
+        cells = _cells(lines[first], separator)
+        if len(cells) > MAX_COLUMNS:
+            found = f"{len(cells):,} columns"
+            raise TactileError(f"{path}, line {first + 1}", found, f"at most {MAX_COLUMNS:,}", "Export it again")
+        if comment is not None and len(above := _cells(lines[comment].lstrip("#%/ \t"), separator)) == len(cells) > 1:
+            return cls(_names(path, above, comment), first, separator)
+        if _is_data(cells):
+            return cls(tuple(NUMBERED.format(place + 1) for place in range(len(cells))), first, separator)
+        return cls(_names(path, cells, first), first + 1, separator)
+
+    def cells(self, rows: Sequence[str]) -> Cells:
+        """Return what the columns hold, which the first rows decide for all."""
+        if self._cells is None:
+            self._cells = Cells(self.names, [split(row, self.separator) for row in rows[:LOOKED_AT]])
+        return self._cells
+
+
+def split(line: str, separator: str) -> list[str]:
+    """Split a line into cells."""
+    return line.split() if separator == SPACE else line.split(separator)
+
+
+def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
+    """Return the place of the first line that is no comment or title, and of the comment before it."""
+    told = [place for place, line in enumerate(lines) if line.strip()]
+    first = next((place for place in told if not lines[place].lstrip().startswith(COMMENTS)), None)
+    if first is None:
+        first = told[0] if told else None
+        return first, None
+    comment = max((place for place in told if place < first), default=None)
+    widths = {place: _width(lines[place]) for place in told if first <= place <= first + LOOKED_AT}
+    wide = (place for place, width in widths.items() if width >= max(MANY, 2 * widths[first] + 1))
+    return next(wide, first), comment
+
+
+def _width(line: str) -> int:
+    return len(_cells(line, _separator(line)))
+
+
+def _separator(line: str) -> str:
+    found = max(",;\t", key=line.count)
+    return found if found in line else SPACE
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    cells = [cell.strip() for cell in split(line, separator)]
+    while len(cells) > 1 and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def _is_data(cells: Sequence[str]) -> bool:
+    """Return true for a row that holds numbers, unless they count from 0 or 1, as pandas names columns."""
+    values = [value for cell in cells if (value := number(cell)) is not None]
+    counts = len(values) > 1 and values[0] in (0, 1) and values == [values[0] + step for step in range(len(values))]
+    return len(values) > len([cell for cell in cells if cell]) // 2 and not (counts and len(values) >= MANY)
+
+
+def _names(path: str, cells: Sequence[str], line: int) -> tuple[str, ...]:
+    names = tuple(cell.translate(OUTSIDE).lower() for cell in cells)
+    for place, name in enumerate(names):
+        if name and name in names[:place]:
+            raise TactileError(f"{path}, line {line + 1}", f"column {shown(name)} is there twice", "each column once")
+    return names

@@ -1,0 +1,277 @@
+"""Files of other programs, a row a kind: read as the same recording, by their map or without, or refused in words."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from tactile_core import recordings
+from tactile_core.cli.main import main
+from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.readers import opened
+from tactile_core.recordings.tables import column_map
+from tactile_core.recordings.tables.mapped_files import guess_map
+
+NAMES = ["pdc_raw", *(f"E{i}" for i in range(1, 20))]
+START = 1_352_394_723.123
+
+
+def table(press, header=True, separator=",", stamp="{:.3f}", top="", end="\n", extra=None):
+    """Rows of time, PDC and the electrodes as text."""
+    lines = [separator.join(["time", *NAMES, *([extra[0]] if extra else [])])] if header else []
+    for i, time in enumerate(press.time):
+        cells = [stamp.format(START + time), f"{press.pdc[i]:g}", *(f"{each:g}" for each in press.electrodes[i])]
+        lines.append(separator.join([*cells, *([extra[1][i]] if extra else [])]))
+    return top + end.join([*lines, ""])
+
+
+def stamped(stamp):
+    """Rows whose stamp is written by a function of the seconds since the first."""
+
+    def write(press):
+        lines = [",".join(["when_stamp", *NAMES])]
+        for time, pdc, row in zip(press.time, press.pdc, press.electrodes, strict=True):
+            lines.append(",".join([stamp(float(time)), f"{pdc:g}", *(f"{each:g}" for each in row)]))
+        return "\n".join([*lines, ""])
+
+    return write
+
+
+def clock(form):
+    """Rows with times of day."""
+    return stamped(lambda time: (datetime.fromtimestamp(START, UTC) + timedelta(seconds=time)).strftime(form))
+
+
+def units(unit, start):
+    """Rows with whole stamps of a unit."""
+    return stamped(lambda time: f"{round((start + time) * unit):d}")
+
+
+def records(press):
+    """Records of a driver's messages."""
+    return [
+        {
+            "header": {"seq": i, "stamp": {"secs": int(START + t), "nsecs": round((START + t) % 1 * 1e9)}},
+            "hand": "left", "bt": [{"pdc": float(p), "electrodes": row.tolist(), "pac": [2000] * 22}],
+        }
+        for i, (t, p, row) in enumerate(zip(press.time, press.pdc, press.electrodes, strict=True))
+    ]  # fmt: skip
+
+
+def long(press, by_channel=False, stamped=True):
+    """A row for each value of a channel."""
+    rows = [
+        (f"{t:.2f}" if stamped else "0.00", name, f"{value:g}")
+        for t, p, row in zip(press.time, press.pdc, press.electrodes, strict=True)
+        for name, value in zip(NAMES, [p, *row], strict=True)
+    ]
+    if by_channel:
+        rows.sort(key=lambda row: NAMES.index(row[1]))
+    return "\n".join(["time,channel,value", *(",".join(row) for row in rows), ""])
+
+
+TEXTS = {
+    "plain.csv": table,
+    "tabs.txt": lambda press: table(press, separator="\t"),
+    "spaces.txt": lambda press: table(press, separator="  "),
+    "no_header.csv": lambda press: table(press, header=False),
+    "no_header_spaces.txt": lambda press: table(press, header=False, separator=" "),
+    "comments.csv": lambda press: table(press, top="# recorded 2012\n% by hand, in a hurry\n"),
+    "title.csv": lambda press: table(press, top="Logger 3 of Bob\nrate,100\n"),
+    "header_in_comment.csv": lambda press: table(press, top="# "),
+    "windows.csv": lambda press: table(press, end="\r\n"),
+    "quoted.csv": lambda press: table(press, extra=("object", ['"a, b"'] * len(press.time))),
+    "iso.csv": clock("%Y-%m-%d %H:%M:%S.%f"),
+    "iso_t.csv": clock("%Y-%m-%dT%H:%M:%S.%fZ"),
+    "iso_zone.csv": clock("%Y/%m/%d %H:%M:%S.%f+00:00"),
+    "time_of_day.csv": clock("%H:%M:%S.%f"),
+    "ms.csv": units(1e3, 0), "us.csv": units(1e6, 0), "ns.csv": units(1e9, 0),
+    "unix_ms.csv": units(1e3, START), "unix_ns.csv": units(1e9, START),
+    "coarse.csv": stamped(lambda time: f"{np.floor(10 * time + 0.3) / 10:.1f}"),  # a program that reads a buffer
+    "long.csv": long,
+    "long_by_channel.csv": lambda press: long(press, by_channel=True),
+    "records.json": lambda press: json.dumps(records(press)),
+    "records_lines.jsonl": lambda press: "\n".join(map(json.dumps, records(press))) + "\n",
+    "arrays.json": lambda press: json.dumps({
+        "t": press.time.tolist(), "pdc": press.pdc.tolist(), "elec": press.electrodes.tolist(), "object": "foam",
+    }),
+    "frames.json": lambda press: json.dumps({"subject": "a", "frames": records(press)}),
+}  # fmt: skip
+
+
+def write_arrays(path: Path, press) -> None:
+    """The press in an HDF5, NPZ, NPY or MATLAB file of other names."""
+    stamps = np.rint(1e9 * (START + press.time)).astype(np.int64)
+    if path.suffix == ".h5":
+        with h5py.File(path, "w") as file:
+            for trial, frames in (("b", slice(0, 400)), ("a", slice(None))):
+                for finger in (0, 1):
+                    file[f"{trial}/finger_{finger}/electrode_data"] = press.electrodes[frames] + finger
+                    file[f"{trial}/finger_{finger}/pdc_data"] = press.pdc[frames]
+                file[f"{trial}/stamps"] = stamps[frames]
+            file["a/object"] = ["foam"] * len(stamps)
+    elif path.suffix == ".npz":
+        np.savez(path, hand=np.stack([press.electrodes, press.electrodes + 1], axis=1), t_ns=stamps, pdc=press.pdc)
+    elif path.suffix == ".npy":
+        np.save(path, press.electrodes)
+    else:
+        scipy_io = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]")
+        scipy_io.savemat(path, {"elec": press.electrodes.T, "time_s": press.time[None], "pdc": press.pdc[None]})
+
+
+def read_by_guess(path):
+    with opened(str(path)) as (container, where, _, file):
+        guessed, held = guess_map(where, container, file)
+    map_file = path.parent / "map.toml"
+    column_map.write(map_file, guessed, held)
+    return recordings.read(path, column_map.read(map_file))
+
+
+@pytest.mark.parametrize("name", [*TEXTS, "plain.csv.gz", "two.h5", "hand.npz", "plain.npy", "own.mat"])
+def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
+    path = tmp_path / name
+    if name.endswith(".gz"):
+        path.write_bytes(gzip.compress(table(press).encode()))
+    elif name in TEXTS:
+        path.write_text(TEXTS[name](press), encoding="utf-8", newline="")
+    else:
+        write_arrays(path, press)
+    found = read_by_guess(path)
+    np.testing.assert_array_equal(found.electrodes, press.electrodes)
+    assert not (found.flags & Flag.REPAIRED).any()
+    if "npy" not in name and "no_header" not in name:
+        np.testing.assert_array_equal(found.pdc, press.pdc)
+    if name == "coarse.csv":
+        np.testing.assert_allclose(found.time, press.time, atol=0.01)  # a step of the finer clock
+        assert any("spread evenly" in text for text in found.warnings)
+    else:
+        np.testing.assert_allclose(found.time, press.time, atol=1e-5)
+    assert not (found.flags & Flag.TIME_JUMP).any()
+
+
+def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines):
+    objects = ["foam" if i < 300 else "steel, polished" for i in range(len(press.time))]
+    lines = [slide_lines[0] + ",object,trial,note"]
+    lines += [f'{line}"{each}",7,' for line, each in zip(slide_lines[1:], objects, strict=True)]
+    path = write(lines)
+    found = recordings.read(path)
+    assert not found.flags.any() and not found.warnings
+    assert {name: column.tolist() for name, column in found.labels.items()} == {"object": objects, "trial": ["7"] * 700}
+    assert main(["convert", path, "--out", str(tmp_path / "out"), "--frames", "290:310", "--keep", "latent"]) == 0
+    with h5py.File(tmp_path / "out" / "touch" / "frames.h5") as file:
+        assert file["labels/object"].asstr()[()].tolist() == objects[290:310]
+        assert not (file["flags"][()] & Flag.REPAIRED).any()
+    note = json.loads((tmp_path / "out" / "touch" / "note.json").read_text(encoding="utf-8"))
+    assert set(note["recording"]["labels"]["object"]) == {"foam", "steel, polished"}
+
+
+@pytest.mark.parametrize("absent", ["missing", "empty"])
+def test_an_electrode_that_is_not_there_is_a_dead_channel(absent, press, slide_lines, write):
+    place = slide_lines[0].split(",").index("ele7")
+    lines = [line.split(",") for line in slide_lines]
+    for row in lines[(absent == "empty") :]:
+        if absent == "missing":
+            del row[place]
+        else:
+            row[place] = ""
+    found = recordings.read(write([",".join(row) for row in lines]))
+    np.testing.assert_array_equal(np.delete(found.electrodes, 6, axis=1), np.delete(press.electrodes, 6, axis=1))
+    signals = recordings.prepare(found)
+    assert (signals.flags & Flag.DEAD_CHANNEL > 0).all() and not signals.change[:, 6].any()
+    assert any("no readings of E7" in text for text in signals.warnings)
+
+
+@pytest.mark.parametrize(
+    ("top", "words"),
+    [
+        (1.0, "shares"),
+        (3.3, "volts of 3.3 V"),
+        (5.0, "volts of 5 V"),
+        (100.0, "percent"),
+        (255.0, "8 bit"),
+        (1023.0, "10 bit"),
+    ],
+)
+def test_readings_in_other_units_are_counts(top, words, press, tmp_path):
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes * top / 4095, time=press.time, pdc=press.pdc)
+    found = recordings.prepare(recordings.read(tmp_path / "a.npz"))
+    counts = recordings.prepare(recordings.read(_saved(tmp_path / "b.npz", press)))
+    assert found.kind == "raw" and any(words in text for text in found.warnings)
+    np.testing.assert_allclose(found.change, counts.change, atol=1e-6)
+    np.testing.assert_allclose(found.pdc, counts.pdc)
+
+
+def test_counts_per_unit_makes_readings_raw(press, tmp_path):
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes * 3 / 4095, time=press.time, pdc=press.pdc)
+    options = recordings.PrepareOptions(counts_per_unit=4095 / 3)
+    found = recordings.prepare(recordings.read(tmp_path / "a.npz"), options)
+    assert found.kind == "raw"
+    counts = recordings.prepare(recordings.read(_saved(tmp_path / "b.npz", press)))
+    np.testing.assert_allclose(found.change, counts.change, atol=1e-6)
+
+
+def _saved(path, press):
+    np.savez(path, electrodes=press.electrodes, time=press.time, pdc=press.pdc)
+    return path
+
+
+SILENT = {
+    "zeros": lambda counts: np.zeros_like(counts), "full": lambda counts: np.full_like(counts, 4095),
+    "one value": lambda counts: np.full_like(counts, 2048),
+    "constant": lambda counts: np.tile(counts[0], (len(counts), 1)),
+    "zeros until it starts": lambda counts: np.where(np.arange(len(counts))[:, None] < 120, 0, counts),
+    "ends in the contact": lambda counts: np.where(np.arange(len(counts))[:, None] > 350, 0, counts),
+    "hangs in the contact": lambda counts: counts[np.minimum(np.arange(len(counts)), 350)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", SILENT)
+def test_a_finger_that_does_not_answer_touches_nothing(how, press, tmp_path):
+    silent = SILENT[how](press.electrodes)
+    np.savez(tmp_path / "a.npz", electrodes=silent, time=press.time, pdc=press.pdc)
+    found = recordings.prepare(recordings.read(tmp_path / "a.npz"))
+    dead = found.flags & Flag.DEAD_CHANNEL > 0
+    expected = np.ones(700, bool)
+    if how == "zeros until it starts":
+        expected = np.arange(700) < 120
+    elif "contact" in how:
+        expected = np.arange(700) > 350
+    np.testing.assert_array_equal(dead, expected)
+    assert not found.change[dead].any() and any("does not answer" in text for text in found.warnings)
+    if how == "zeros until it starts":
+        np.testing.assert_allclose(found.change[180:520].min(), press.change.min(), rtol=0.2)  # trembles, with noise
+
+
+OUTSIDE = Path(os.environ.get("TACTILE_TEST_DATA", "")) / "outside"
+MAPPED = [
+    "ns.csv",
+    "wallclock.csv",
+    "pandas_E.csv",
+    "biotac_pub.csv",
+    "biotac_log.hdf5",
+    "logger.npz",
+    "trial_001.json",
+]
+KNOWN = ["label.csv", "no_ele7.csv", "norm.csv", "volts.csv", "ms.csv", "space.csv", "comment.csv", "plain.csv.gz"]
+
+
+@pytest.mark.skipif(not OUTSIDE.is_dir(), reason="set TACTILE_TEST_DATA to a folder with outside")
+@pytest.mark.parametrize("name", [*MAPPED, *KNOWN, "output.txt", "electrodes.npy", "trial_001.json"])
+def test_files_of_other_programs_are_read(name, tmp_path):
+    if name in KNOWN:
+        found = recordings.read(OUTSIDE / name)
+    else:
+        link = tmp_path / name
+        link.symlink_to(OUTSIDE / name)
+        found = read_by_guess(link)
+    signals = recordings.prepare(found)
+    assert signals.kind == "raw" and found.rate == pytest.approx(100, rel=1e-3)
+    assert not (found.flags & (Flag.REPAIRED | Flag.TIME_JUMP)).any()
+    assert np.abs(signals.change).max() < 100  # of steady grips and untouched fingers; rest is 3,000 counts away
