@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.jobs import frame_range
+from ...tactile_core.jobs import results
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
 from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.translation.translate import PreparedRows, load_translator, translated
@@ -94,7 +94,7 @@ def _translated(
     if np.isnan(recording.time).all():
         found, advice = "snapshots, which do not follow each other", "Use `tactile convert --frames-apart`"
         raise TactileError(path, found, "frames in order", advice)
-    chosen = frame_range.select(frame_range.parse_frames(frames), len(recording))
+    chosen = results.select(results.parse_frames(frames), len(recording))
     options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
     rows = PreparedRows(recording, chosen, translator.answer, options)
     translation = translated(translator, rows, chosen, progress)

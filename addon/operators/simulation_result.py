@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...tactile_core.translation import contact_patch
+from ...tactile_core.translation import gel_place
 from ..objects import axes, curves, custom_properties, frame_attribute, motion
 from ..settings import properties
 from . import pictures, set_style, view
@@ -73,7 +73,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
         custom_properties.write(sensor, {"force": force}, frames)
         if sensor.tactile.role == "DIGIT":
-            patch = contact_patch.contact_patch(moved[sample], surface)
+            patch = gel_place.contact_patch(moved[sample], surface)
             frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
         set_style.follow(sensor, before)
         if sensor == properties.gel_of(scene):

@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.translation import contact_patch, gel_place
+from ...tactile_core.translation import gel_place
 from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
@@ -89,7 +89,7 @@ class TACTILE_OT_translate(JobOperator):
         surface, before = properties.surface_of(gel), gel.tactile.largest
         summary = motion.animate(gel, surface.rest, self._moved, frames, how)
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
-        patch = contact_patch.contact_patch(self._moved, surface)
+        patch = gel_place.contact_patch(self._moved, surface)
         frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
         set_style.follow(gel, before)
         values = self._found.columns()

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..recordings import flags
 from ..sensors import PRESSURE_PER_COUNT
-from ..translation.card_errors import doubt
+from ..translation.card import doubt
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frame_pass import FramePass, Tools
 from .frames_file import described

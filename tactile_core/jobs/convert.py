@@ -20,15 +20,14 @@ from . import results, sampling_error
 from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
-from .frame_range import frames_text, select
-from .results import SOLVED, TRANSLATED, Gel
+from .results import SOLVED, TRANSLATED, Gel, frames_text, select
 
 if TYPE_CHECKING:
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
     from ..translation.answer import Answer
     from ..translation.translator import Translator
-    from .error_budget import Budget
+    from .sampling_error import Budget
 
 
 @dataclasses.dataclass(frozen=True)
@@ -236,7 +235,7 @@ def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, st
 
 def weights_entry(translator: Translator) -> dict:
     """Return the hash of the weights' card, and the error and baseline, um, that the card states."""
-    from ..translation.card_errors import chain_error
+    from ..translation.card import chain_error
 
     found = chain_error(translator.card)
     errors = {} if found is None else {"kept_apart_rms_um": found[0], "baseline_rms_um": found[1]}

@@ -20,14 +20,11 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files.installed import require
-from ..files.short_text import Summary
 from ..geometry.indenters import Indenter, Pose, as_indenter
-from ..geometry.indenters.rigid_pose import rigid_pose
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.first_touch import first_touch_on_line
-from ..mechanics.force_search import MOST_FORCE
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import FRICTION
@@ -38,23 +35,10 @@ from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
+from .gel_contact import PUSH, GelContact, given, matrix_of, not_negative, too_far
 
 _log = logging.getLogger(__name__)
-PUSH = np.array([0.0, 1.0, 0.0])  # into the gel: along +y of the sensors' frame
-FLAGS = {
-    "refused": "in follow: what was given is no pose or force; the values are those of the contact before",
-    "unsolved": "no equilibrium was found; the values are those of the contact before",
-    "too deep": "the pose lies deeper than 60 % of the thickness; the values are those at that depth",
-    "force not reached": "no depth bears the force; the values are those of the nearest contact that was solved",
-    "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
-    "too large": "so many nodes touch that the step's work was used up; the values are those of the nearest contact "
-    "that was found, and the next step goes on from there",
-    "friction forgotten": "no equilibrium was found on the path; the indenter was taken to come straight in along +y",
-    "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
-}
-# Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
-_LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
-_LEAST_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
+_NO_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
 _LARGEST_DROP = 1e3  # of the force, in one search: larger ones go by way of a force between (assumed)
 _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
 # The cube of the unknowns for each iteration: 5 to 10 s on a core, and the solve begun then (assumed). From nothing, a
@@ -62,30 +46,6 @@ _SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to sta
 _WORK = 1e12
 _ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class GelContact(Summary):
-    """A contact of a ``Gel``, SI units, in the sensor's frame; n surface nodes.
-
-    force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the surface
-    traction : (n, 3) Pa; times the nodes' areas (n,) m2, ``Gel.areas``, and added up it is the force
-    patch : (n,) bool, the nodes that carry force; slipping : share of them whose friction is spent
-    depth : m, past first touch along +y; below zero the indenter stands in front of the sensor
-    pressure : Pa, rise of the BioTac's fluid pressure; 0 for the DIGIT
-    pose : (4, 4), where the indenter stands, deeper than the pose given where a force was asked for
-    flags : names out of ``FLAGS`` of what is wrong with it, none for a sound contact
-    """
-
-    force: np.ndarray
-    displacement: np.ndarray
-    traction: np.ndarray
-    patch: np.ndarray
-    slipping: float
-    depth: float
-    pressure: float
-    pose: np.ndarray
-    flags: tuple[str, ...] = ()
 
 
 class Gel:
@@ -108,21 +68,16 @@ class Gel:
     """
 
     def __init__(
-        self,
-        sensor: str = "digit",
-        indenter: Any = None,
-        *,
-        friction: float = FRICTION,
-        calibration: Calibration | None = None,
-        preset: str = FAST,
-    ) -> None:
+        self, sensor: str = "digit", indenter: Any = None, *,
+        friction: float = FRICTION, calibration: Calibration | None = None, preset: str = FAST,
+    ) -> None:  # fmt: skip
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
         require("fem", "scipy")
         if preset != FAST:
             require("render", "mitsuba")
         self.sensor, self.preset = sensor, preset
-        self.friction = _not_negative(friction, "Gel, friction", "a coefficient of zero or more")
+        self.friction = not_negative(friction, "Gel, friction", "a coefficient of zero or more")
         self.indenter: Indenter = as_indenter(indenter)
         self.surface = sensors.sensor_surface(sensor)
         if calibration is not None and calibration.camera.sensor != sensor:
@@ -140,7 +95,7 @@ class Gel:
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
         self._touch: tuple[Pose, float] | None = None  # the first touch found last, and the greatest depth there, m
-        self._contact = self._untouched(Pose(np.zeros(3), np.eye(3), PUSH))
+        self._contact = GelContact.untouched(len(self.surface.rest), Pose(np.zeros(3), np.eye(3), PUSH))
 
     def press(self, pose: Any, force: float | None = None) -> GelContact:
         """Move the indenter to a pose, along a straight line from the last one, and return the contact there.
@@ -150,18 +105,18 @@ class Gel:
         Raises TactileError for what is no pose or force, and above 500 N; the contact before then stays. Whatever
         else happens is said in ``flags``.
         """
-        return self._step(*_given(pose, force))
+        return self._step(*given(pose, force))
 
     def _step(self, here: Pose, force: float | None) -> GelContact:
         """Do as ``press`` does, to a pose and force that were checked."""
         flags: list[str] = []
         self._work.left = _WORK
-        jumps = self._press is not None and self._touches and self._too_far(here)
+        jumps = self._press is not None and self._contact.patch.any() and too_far(self._pose, here)
         if jumps:
             self._press = None
         before, self._pose = self._pose, here
-        if force is not None and force < _LEAST_FORCE:
-            self._press, self._contact = None, self._untouched(here)
+        if force is not None and force < _NO_FORCE:
+            self._press, self._contact = None, GelContact.untouched(len(self.surface.rest), here)
             return self._contact
         try:
             found = self._solved_at(here, force, flags, began=before is None)
@@ -191,11 +146,11 @@ class Gel:
     def _press_or_keep(self, pose: Any, force: float | None = None) -> GelContact:
         """The contact at a pose, or the one before, flagged, where that is no pose or force."""
         try:
-            given = _given(pose, force)
+            asked = given(pose, force)
         except TactileError as error:
             _log.warning("%s", error)
             return dataclasses.replace(self._contact, flags=("refused",))
-        return self._step(*given)
+        return self._step(*asked)
 
     @property
     def contact(self) -> GelContact:
@@ -234,7 +189,7 @@ class Gel:
         """
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
-        return _matrix(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
+        return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
 
     def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
         """Return the pose at first touch and the greatest depth, m: as before where the pose differs in depth alone."""
@@ -250,17 +205,6 @@ class Gel:
     @functools.cached_property
     def _compliance(self) -> Compliance:
         return compliance_of(self.sensor)
-
-    @property
-    def _touches(self) -> bool:
-        return bool(self._contact.patch.any())
-
-    def _too_far(self, pose: Pose) -> bool:
-        if self._pose is None:
-            return False
-        moved = pose.apex - self._pose.apex
-        turn = np.arccos(np.clip((np.trace(pose.axes.T @ self._pose.axes) - 1) / 2, -1, 1))
-        return bool(np.linalg.norm(moved) > _LONGEST_STEP or turn > _LARGEST_TURN)
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
         """See ``_moved_to``; where the path leads to no contact, the one of an indenter that comes straight in."""
@@ -341,9 +285,9 @@ class Gel:
 
     def _described(self, found: FastContact | None, pose: Pose, flags: list[str]) -> GelContact:
         if "unsolved" in flags:
-            return dataclasses.replace(self._contact, pose=_matrix(pose), flags=tuple(flags))
+            return dataclasses.replace(self._contact, pose=matrix_of(pose), flags=tuple(flags))
         if found is None:
-            return dataclasses.replace(self._untouched(pose), flags=tuple(flags))
+            return dataclasses.replace(GelContact.untouched(len(self.surface.rest), pose), flags=tuple(flags))
         linear, nodes = found.linear, self._compliance.touchable[found.linear.nodes]
         pressed = traction(self.sensor, nodes, found.corrected.factor * linear.nodal_force)
         patch = np.zeros(len(pressed), bool)
@@ -351,37 +295,5 @@ class Gel:
         slipping = float(linear.slipping.mean()) if len(nodes) and self.friction else 0.0
         return GelContact(
             found.force, found.corrected.displacement, pressed, patch, slipping, found.depth, found.pressure,
-            _matrix(linear.pose), tuple(flags),
+            matrix_of(linear.pose), tuple(flags),
         )  # fmt: skip
-
-    def _untouched(self, pose: Pose) -> GelContact:
-        none = np.zeros_like(self.surface.rest)
-        patch = np.zeros(len(none), bool)
-        return GelContact(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, _matrix(pose))
-
-
-def _given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Return where an indenter is to stand, and with which force, N. Raises TactileError for no pose or force."""
-    if force is not None:
-        force = _not_negative(force, "Gel, force", "newtons, zero or more, and finite")
-        if force > MOST_FORCE:
-            found = f"at most {MOST_FORCE:g} N, more than a plate bears at the greatest depth"
-            raise TactileError("Gel, force", f"{force:g} N", found, "Press less, or to a pose")
-    return Pose(*rigid_pose(pose), PUSH), force
-
-
-def _not_negative(value: Any, where: str, expected: str) -> float:
-    """Return the value as a float; raises TactileError unless it is a finite number of zero or more."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number >= 0):
-        raise TactileError(where, repr(value), expected)
-    return number
-
-
-def _matrix(pose: Pose) -> np.ndarray:
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = pose.axes, pose.apex
-    return matrix

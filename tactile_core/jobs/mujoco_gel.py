@@ -11,7 +11,8 @@ from ..errors import TactileError
 from ..geometry.indenters import Box, Cylinder, Indenter, LyingCylinder, MeshIndenter, Sphere
 from ..mechanics.placement import FRICTION
 from ..pictures.presets import FAST
-from .gel import Gel, GelContact
+from .gel import Gel
+from .gel_contact import GelContact
 
 if TYPE_CHECKING:
     import mujoco

@@ -30,9 +30,9 @@ from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import SHIPPED, load_calibration
 from . import results, sampling_error
-from .error_budget import Budget
-from .frame_range import frames_text, select
 from .gel_frames import is_scene, read_frames
+from .results import frames_text, select
+from .sampling_error import Budget
 
 EXR, EXR_NAME, REST, CAMERA = "exr", "{:05d}.exr", "rest.exr", "camera.exr"
 UNITS = (
@@ -42,10 +42,6 @@ UNITS = (
 )
 
 Progress = Callable[[int, int], None]
-
-
-def _silent(text: str) -> None:
-    """Do nothing, for callers that do not ask what was picked."""
 
 
 MAKER = "tactile render"  # in the note
@@ -78,15 +74,14 @@ def render(
     out: str | os.PathLike,
     options: Options,
     progress: Callable[[str], Any],
-    say: Callable[[str], None] = _silent,
+    say: Callable[[str], None] = lambda words: None,
 ) -> Path:
     """Render an input into the folder `out`, which appears whole or not at all; returns it.
 
     progress : given a word, a context that yields a callback (done, in all); say : receives what was picked, and why
     Raises TactileError for a bad input, calibration or option, and a disk that cannot be written.
     """
-    clock = Stopwatch()
-    out = Path(out)
+    clock, out = Stopwatch(), Path(out)
     gel = load_calibration(options.calibration).camera.sensor
     preset = claimed(out, options)
     bound = options.error or Budget()
@@ -109,11 +104,8 @@ def render(
     if isinstance(about, dict):
         by = about["corrects_lights_by"]
         say(f"at rest: {about['photograph']}, {by['mean_levels']:g} levels from the lights' own picture in the mean")
-    with (
-        atomic.writing(out),
-        atomic.new_folder(out, overwrite=options.overwrite) as folder,
-        progress(preset) as shown,
-    ):
+    new = atomic.new_folder(out, overwrite=options.overwrite)
+    with atomic.writing(out), new as folder, progress(preset) as shown:
         made.begin(folder)
         made.write_rest(folder)
         if options.scene_out is not None:
@@ -269,8 +261,7 @@ def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
     """Return the origin of a result, fit for JSON: only what the same input reproduces."""
-    path = Path(path)
-    file = path / "scene.toml" if path.is_dir() else path
+    file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or SHIPPED)
     about = PRESETS[preset] if preset != FAST else None
     return {
@@ -293,9 +284,9 @@ def note_of(
 def background_of(renderer: Renderer) -> dict[str, Any] | str:
     """Describe what makes the picture at rest, and by how much a photograph corrects the lights'."""
     photograph = renderer.calibration.photograph
-    return (
-        {"photograph": Path(photograph).name, "corrects_lights_by": renderer.correction()} if photograph else "lights"
-    )
+    if not photograph:
+        return "lights"
+    return {"photograph": Path(photograph).name, "corrects_lights_by": renderer.correction()}
 
 
 def _mitsuba_versions(variant: str | None) -> dict[str, str]:

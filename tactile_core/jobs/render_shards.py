@@ -23,8 +23,8 @@ from .engine.job import Job
 from .engine.kinds import InputFacts
 from .engine.recipes import Render
 from .engine.run import Place
-from .frame_range import frames_text
 from .render import Options, Pictures, claimed, note_of, pictures
+from .results import frames_text
 from .translate_shards import check_unit
 
 GROWS = False
@@ -87,8 +87,8 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
     """Read the input, simulating a scene; keep the values to be rendered."""
-    from .frame_range import parse_frames, select
     from .gel_frames import read_frames
+    from .results import parse_frames, select
 
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)

@@ -13,8 +13,8 @@ from ..files.hdf5_writer import Disk
 from ..sensors import title
 from ..translation.translate import CHUNK
 from ..translation.translator import Translator
-from .frame_range import select
 from .gel_frames import read_frames
+from .results import select
 
 FORMAT = "tactile-reverse-1"
 # dataset -> (unit, meaning); T is the number of frames

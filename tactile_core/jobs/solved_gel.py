@@ -26,7 +26,7 @@ from ..mechanics.node_areas import node_areas
 from ..recordings.flags import Flag
 from ..sensors import TARGET
 from ..sensors.unrolling import node_normals
-from ..translation.contact_patch import contact_patch
+from ..translation.gel_place import contact_patch
 
 ERRORS = "expected_error_digit", "error_bound_digit"
 OUTWARD = np.array([0.0, -1.0, 0.0])  # of the gel, which is nearly flat

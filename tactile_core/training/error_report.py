@@ -13,8 +13,9 @@ from .. import accuracy
 from ..accuracy import Row
 from ..translation import error_bounds
 from ..translation.error_bounds import KINDS
+from ..translation.layers import DISTANCES
 from ..translation.network_sizes import SURFACES
-from ..translation.networks import DISTANCES, Networks
+from ..translation.networks import Networks
 from ..translation.translator import silent_level
 from ..translation.weights import write_bytes
 from .data import Contacts

@@ -12,7 +12,7 @@ from ..files.version import __version__
 from ..sensors import places_of
 from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
-from ..translation.card_sensors import NODES, REST
+from ..translation.card import NODES, REST
 from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes

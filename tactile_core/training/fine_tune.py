@@ -22,8 +22,9 @@ from ..accuracy import Row, row
 from ..files import outside
 from ..translation import networks, reference_signals
 from ..translation.gel_place import on_gel
+from ..translation.layers import COMPRESSED_LIMIT
 from ..translation.network_sizes import NETS, PLACE, STATE
-from ..translation.networks import COMPRESSED_LIMIT, Networks
+from ..translation.networks import Networks
 from ..translation.posterior import FORCE_SCALE
 from ..translation.weights import CARD_NAME, card_bytes, read_bytes, sha256, to_safetensors, write_bytes
 from .export_weights import versions

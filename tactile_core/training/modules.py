@@ -9,9 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from ..sensors import ELECTRODES
-from ..translation.layers import NORM_EPSILON
+from ..translation.layers import COUNT_SCALE, NORM_EPSILON
 from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
-from ..translation.networks import COUNT_SCALE, LEAST_SPREAD, SPREAD_LIMITS
+from ..translation.networks import LEAST_SPREAD, SPREAD_LIMITS
 from ..translation.posterior import LEAST_FORCE, MEAN_SHIFTS
 from .surface_codec import SurfaceCodec
 
@@ -193,7 +193,7 @@ def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
 
 
 def compress(signal: Tensor) -> Tensor:
-    """Convert changes in counts and whether they are rectified, (B, 20), to SVB's input; see `networks.compress`."""
+    """Convert changes in counts and whether they are rectified, (B, 20), to SVB's input; see `layers.compress`."""
     return torch.cat([torch.asinh(signal[:, :-1] / COUNT_SCALE), signal[:, -1:]], -1)
 
 

@@ -11,7 +11,7 @@ from .. import accuracy, sensors
 from ..geometry.lattice import Lattice
 from ..sensors import SOURCE, TARGET, unrolling
 from ..simulation.pairs_file import Pairs
-from ..translation.contact_patch import contact_patch
+from ..translation.gel_place import contact_patch
 from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks
 from ..translation.translator import contact_center

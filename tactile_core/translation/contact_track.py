@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .layers import COMPRESSED_LIMIT
 from .network_sizes import PLACE, STATE
-from .networks import COMPRESSED_LIMIT
-from .posterior import LEAST_FORCE, Posterior, touches
+from .posterior import LEAST_TOUCH, Posterior, touches
 
 # Standard deviation of what a state changes by in 10 ms. Places are in tens of cells of the gel, 0.4 mm each: 0.18 mm;
 # asinh of force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with
@@ -181,7 +181,7 @@ def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.nd
 
 def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Logarithm of forces, given on their asinh scale, over signals' sizes, counts."""
-    return np.log(np.sinh(np.clip(force, LEAST_FORCE, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
+    return np.log(np.sinh(np.clip(force, LEAST_TOUCH, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
 
 
 def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
@@ -229,7 +229,7 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
     far = now.mean[..., None, :, :] - before.mean[..., :, None, :]
     known = np.square(now.spread[..., None, :, :]) + np.square(before.spread[..., :, None, :])
     lightest = np.minimum(now.mean[..., None, :, PLACE], before.mean[..., :, None, PLACE])
-    untouched = lightest < LEAST_FORCE
+    untouched = lightest < LEAST_TOUCH
     off = np.square(far) / (known + step[..., None, None, :])
     off[..., :PLACE] *= ~untouched[..., None]
     price = 0.5 * off.sum(axis=-1)

@@ -1,11 +1,52 @@
-"""The building blocks of the networks in numpy, float32: each with the tensor names and the arithmetic of torch."""
+"""The scale that networks see signals on, and their building blocks in numpy, float32: names and sums as torch has."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
 import numpy as np
 
+from ..errors import TactileError
+
+Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
+BLOCK = 64  # frames a block: enough for matrix products at full speed
 Tensors = dict[str, np.ndarray]
+COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
+COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
 NORM_EPSILON = 1e-5  # torch.nn.LayerNorm's default
+
+
+@dataclass(frozen=True)
+class SignalDistance:
+    """Distances of signals from the training signals; the card holds quantiles of each.
+
+    mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
+    residual : (T,) float32, error of SVB's reconstruction, rms over the electrodes in units of its residual in
+        validation
+    largest : (T,) float32, counts, largest absolute change of an electrode
+    """
+
+    mahalanobis: np.ndarray
+    residual: np.ndarray
+    largest: np.ndarray
+
+
+DISTANCES = tuple(field.name for field in fields(SignalDistance))
+
+
+def compress(change: np.ndarray) -> np.ndarray:
+    """Convert counts to the networks' scale: arcsinh(change / 15 counts).
+
+    A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
+    variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one.
+    """
+    return np.arcsinh(np.asarray(change, np.float32) / np.float32(COUNT_SCALE))
+
+
+def expand(compressed: np.ndarray) -> np.ndarray:
+    """Convert back to counts: inverse of `compress`."""
+    return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
 
 
 def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
@@ -69,3 +110,23 @@ def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: in
         shapes |= {f"{block}.up.weight": (width, width), f"{block}.down.weight": (width, width)}
         vectors += [f"{block}.{part}" for part in ("norm.weight", "norm.bias", "up.bias", "down.bias")]
     return shapes | {vector: (width,) for vector in vectors}
+
+
+def in_blocks(function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
+    x = np.asarray(x, np.float32)
+    if x.shape[1:] != shape:
+        expected = "(T, " + ", ".join(map(str, shape)) + ")"
+        raise TactileError(f"networks, {name}", f"array of shape {x.shape}", expected, "Give frames first")
+    if len(x) == 1:
+        return function(x)
+    out = np.empty(0, np.float32)
+    for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still gives a result its shape
+        part = x[start : start + BLOCK]
+        if len(part) < BLOCK:
+            part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
+        result = function(part)[: len(x) - start]
+        if start == 0:
+            out = np.empty((len(x), *result.shape[1:]), np.float32)
+        out[start : start + BLOCK] = result
+    return out

@@ -17,8 +17,6 @@ equal to 1e-5 of the largest number). A frame alone goes by itself, in a twentie
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -26,17 +24,13 @@ import numpy as np
 from ..errors import TactileError
 from ..files.shipped import shipped
 from ..sensors import SOURCE, electrode_count
-from .card_sensors import pair_of
+from .card import pair_of
 from .contact_frame import ContactFrame
-from .layers import Tensors, plain, residual
+from .layers import COMPRESSED_LIMIT, SignalDistance, Tensors, compress, expand, in_blocks, plain, residual
 from .network_sizes import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
 from .posterior import FORCE_SCALE, Posterior
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
-Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
-BLOCK = 64  # frames a block: enough for matrix products at full speed
-COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
-COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow
 # Of a posterior's components, in units of the state: no place is known to .2 cells, no force to 2 % (assumed).
 LEAST_SPREAD = 0.02
 SPREAD_LIMITS = -8.0, 2.0  # of the logarithm of what a network adds to it
@@ -45,38 +39,6 @@ ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = shipped("weights")
 # The card names the hash of every file of weights; this names the card that ships.
 SHIPPED_CARD_SHA256 = "7f13305fccd835b7f6d2a514a2daa29183864ca1f429fb08e979586d946ad456"
-
-
-@dataclass(frozen=True)
-class SignalDistance:
-    """Distances of signals from the training signals; the card holds quantiles of each.
-
-    mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
-    residual : (T,) float32, error of SVB's reconstruction, rms over the electrodes in units of its residual in
-        validation
-    largest : (T,) float32, counts, largest absolute change of an electrode
-    """
-
-    mahalanobis: np.ndarray
-    residual: np.ndarray
-    largest: np.ndarray
-
-
-DISTANCES = tuple(field.name for field in fields(SignalDistance))
-
-
-def compress(change: np.ndarray) -> np.ndarray:
-    """Convert counts to the networks' scale: arcsinh(change / 15 counts).
-
-    A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
-    variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one.
-    """
-    return np.arcsinh(np.asarray(change, np.float32) / np.float32(COUNT_SCALE))
-
-
-def expand(compressed: np.ndarray) -> np.ndarray:
-    """Convert back to counts: inverse of `compress`."""
-    return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
 
 
 class Networks:
@@ -104,12 +66,12 @@ class Networks:
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Encode change (T, 19) counts from rest, as `sensors.COUNT_SIGN`, rectified or not, to SVB's mean (T, K)."""
-        return self._blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
+        return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
         """Decode latent_signal (T, K) to change (T, 19) counts: SVB's reconstruction."""
         size = self.sizes["SVB"]["latent"]
-        return self._blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
+        return in_blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""
@@ -164,7 +126,7 @@ class Networks:
 
         rectified : (T,) bool, or one for all
         """
-        return self._blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
+        return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
         """Encode displacement (T, N, 3) m of the BioTac's outer skin as latent_biotac (T, L)."""
@@ -184,7 +146,7 @@ class Networks:
 
     def force(self, latent_biotac: np.ndarray) -> np.ndarray:
         """Return the force (T, 3) N exerted by the object, sensor frame, from latent_biotac (T, L)."""
-        return self._blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
+        return in_blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
 
     def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
         """Return the force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
@@ -199,11 +161,11 @@ class Networks:
         Rectified ones' is proportional to the sum of their changes: where the gains are not known and a real finger
         shares its changes out among the electrodes otherwise than a simulated one, their pattern misleads.
         """
-        return self._blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
+        return in_blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
         """Return each frame's distances from the training signals, of change (T, 19) counts, rectified (T,) or one."""
-        distances = self._blocks(self._distance, *self._signal(change, rectified), "signal_distance")
+        distances = in_blocks(self._distance, *self._signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
     def _encode_signal(self, signal: np.ndarray) -> np.ndarray:
@@ -253,13 +215,13 @@ class Networks:
     def _map(self, net: str, latent: np.ndarray, part: str = "map") -> np.ndarray:
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = tensors[f"{part}.first.weight"].shape[1]
-        return self._blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
+        return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
         """Apply a map whose input is the latent and the remainder of its place after rounding to whole cells."""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
-        return self._blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
+        return in_blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Append to a latent its place's remainder after rounding to cells: (B, L + 2); also returns the cells."""
@@ -280,7 +242,7 @@ class Networks:
             code = residual(seen, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
             return np.concatenate([place, code], -1)
 
-        return self._blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
+        return in_blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
 
     def _decode_mesh(self, net: str, latent: np.ndarray) -> np.ndarray:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
@@ -293,10 +255,10 @@ class Networks:
             windows = (near @ tensors["near"]).reshape(len(block), frame.width, frame.width, 3)
             return frame.to_shared(frame.add(local, windows, cells))
 
-        return self._blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
+        return in_blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
 
     def _signal(self, change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
-        """Build SVB's input (T, 20) and the shape of one frame of it; `_blocks` reports wrong shapes."""
+        """Build SVB's input (T, 20) and the shape of one frame of it; `in_blocks` reports wrong shapes."""
         change = np.asarray(change, np.float32)
         if change.shape[1:] != (self.electrodes,):
             return change, (self.electrodes,)
@@ -304,25 +266,6 @@ class Networks:
         # A rectified change is read as one that falls, as most do; less its level at rest it may lie below zero.
         change = np.where(mark > 0, -np.abs(change), change)
         return np.concatenate([change, mark], -1), (self.electrodes + 1,)
-
-    def _blocks(self, function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-        """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
-        x = np.asarray(x, np.float32)
-        if x.shape[1:] != shape:
-            expected = "(T, " + ", ".join(map(str, shape)) + ")"
-            raise TactileError(f"networks, {name}", f"array of shape {x.shape}", expected, "Give frames first")
-        if len(x) == 1:
-            return function(x)
-        out = np.empty(0, np.float32)
-        for start in range(0, max(len(x), 1), BLOCK):  # an empty recording still gives a result its shape
-            part = x[start : start + BLOCK]
-            if len(part) < BLOCK:
-                part = np.concatenate([part, np.zeros((BLOCK - len(part), *shape), np.float32)])
-            result = function(part)[: len(x) - start]
-            if start == 0:
-                out = np.empty((len(x), *result.shape[1:]), np.float32)
-            out[start : start + BLOCK] = result
-        return out
 
 
 def shipped_folder(source: str | None = None) -> Path:

@@ -11,7 +11,7 @@ from .network_sizes import PLACE
 FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 DEPTH_SCALE = 20e-6  # m, likewise, of the depth in a contact's state (assumed)
 # Of a contact's state, below which nothing touches: half the force of the lightest contact that training knows, 0.06 N.
-LEAST_FORCE = float(np.arcsinh(0.03 / FORCE_SCALE))
+LEAST_TOUCH = float(np.arcsinh(0.03 / FORCE_SCALE))
 MEAN_SHIFTS = 3  # the last moves the places of 90 of 100 test contacts by less than 0.02 mm
 
 
@@ -64,4 +64,4 @@ class Posterior:
 
 def touches(state: np.ndarray) -> np.ndarray:
     """Mark states (..., STATE) of contacts; others are of no contact."""
-    return state[..., PLACE] >= LEAST_FORCE
+    return state[..., PLACE] >= LEAST_TOUCH

@@ -17,8 +17,8 @@ from ..recordings.gain_matching import match
 from ..sensors import electrode_count
 from ..sensors.readout import NOISE
 from . import weights
-from .card_sensors import pair_of
-from .networks import compress, expand
+from .card import pair_of
+from .layers import compress, expand
 
 FILE = "signals.safetensors"
 COUNT = 512  # typical signals; fewer are worse (gains of 30 % found to 16-20 % with 256, to 10-12 % with 512 and more)

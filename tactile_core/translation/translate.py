@@ -18,9 +18,10 @@ from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
 from . import error_bounds, networks, reference_signals
 from .answer import Answer
-from .card_sensors import NODES, pair_of
+from .card import NODES, pair_of
 from .contact_track import Evidence, Tracker, needed
 from .error_bounds import KINDS
+from .layers import DISTANCES
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
 from .weights import ADVICE
@@ -170,7 +171,7 @@ def _check_quantiles(card: dict, where: str) -> None:
     distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
         table: Any = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
-        _check_table({"levels": distance.get("levels"), **table}, networks.DISTANCES, f"{where}, distance.{kind}")
+        _check_table({"levels": distance.get("levels"), **table}, DISTANCES, f"{where}, distance.{kind}")
 
 
 def _check_table(table: Any, names: tuple[str, ...], where: str) -> None:

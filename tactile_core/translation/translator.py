@@ -13,18 +13,17 @@ from ..files.short_text import Summary
 from ..recordings import Signals
 from ..recordings.flags import Flag
 from ..sensors import unrolling as surface
-from . import error_bounds, gel_place, networks
+from . import error_bounds, gel_place
 from .answer import MEAN, Answer
-from .card_errors import doubt
-from .card_sensors import REST
+from .card import REST, doubt
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence
 from .error_bounds import KINDS
-from .lost_signs import recovered
+from .layers import COMPRESSED_LIMIT, DISTANCES
 from .network_sizes import PLACE, STATE, SURFACES
-from .networks import COMPRESSED_LIMIT, Networks
+from .networks import Networks
 from .posterior import FORCE_SCALE, Posterior, touches
-from .simulated_likeness import Patterns, residual_shares, two_contacts, unlike
+from .simulated_likeness import Patterns, recovered, residual_shares, two_contacts, unlike
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED_CONFIDENCE = 0.2  # assumed
@@ -179,8 +178,7 @@ class Translator:
         state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
             says
         """
-        nets = self.nets
-        rectified, alone = evidence.rectified, state is None
+        nets, rectified, alone = self.nets, evidence.rectified, state is None
         change = np.asarray(self._typical(signals), np.float32)
         latent_signal, unsigned = evidence.latent, evidence.unsigned
         if state is None:
@@ -261,7 +259,7 @@ class Translator:
         or the card that the networks hardly translate.
         Not a calibrated probability: that is what bounds are for.
         """
-        usual, far = (self._quantile(rectified, **dict.fromkeys(networks.DISTANCES, level)) for level in (0.95, 1.0))
+        usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         untrained = flags & np.uint16(
             Flag.NO_QUIET_PART
@@ -276,17 +274,15 @@ class Translator:
         return confidence.astype(np.float32)
 
     def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Stack the distances (distances, T) of `networks.SignalDistance`."""
+        """Stack the distances (distances, T) of `layers.SignalDistance`."""
         distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
-        return np.stack([getattr(distance, name) for name in networks.DISTANCES])
+        return np.stack([getattr(distance, name) for name in DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
         """Quantiles (distances, T) or (distances, 1) at each distance's level over like validation frames."""
         table = self.card["distance"]
         limits = {
-            kind: np.array(
-                [[np.interp(level[name], table["levels"], table[kind][name])] for name in networks.DISTANCES]
-            )
+            kind: np.array([[np.interp(level[name], table["levels"], table[kind][name])] for name in DISTANCES])
             for kind in KINDS
         }
         return np.where(rectified, limits["rectified"], limits["signed"])

@@ -19,10 +19,10 @@ from plain_unit import plain_unit
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs import convert, frame_range, results, sampling_error
-from tactile_core.jobs.error_budget import Budget
+from tactile_core.jobs import convert, results, sampling_error
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.jobs.frames_file import ALWAYS, KEPT
+from tactile_core.jobs.sampling_error import Budget
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.pictures import presets, renderer
 from tactile_core.pictures.marker_field import MarkerField
@@ -204,19 +204,19 @@ def test_a_recording_of_one_frame_converts(run, slide_csv):
     [(":", slice(None)), ("3:", slice(3, None)), ("::7", slice(None, None, 7)), ("-9:-1:2", slice(-9, -1, 2))],
 )
 def test_frames_are_read_as_python_reads_them(text, expected):
-    assert frame_range.parse_frames(text) == expected
-    assert frame_range.parse_frames(frame_range.frames_text(expected).replace("all", ":")) == expected
+    assert results.parse_frames(text) == expected
+    assert results.parse_frames(results.frames_text(expected).replace("all", ":")) == expected
 
 
 @pytest.mark.parametrize("text", ["", "5", "1:2:3:4", "a:b", "::0", "::-1", "1.5:", "1 :2", "9999999999:"])
 def test_other_selections_are_refused(text):
     with pytest.raises(TactileError, match="--frames"):
-        frame_range.parse_frames(text)
+        results.parse_frames(text)
 
 
 def test_a_selection_without_frames_is_refused():
     with pytest.raises(TactileError, match=r"--frames: 200:300 takes none of the 150 frames; expected indices from 0"):
-        frame_range.select(slice(200, 300), 150)
+        results.select(slice(200, 300), 150)
 
 
 def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_path, tools, monkeypatch):

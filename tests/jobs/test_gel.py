@@ -10,7 +10,8 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Sphere
 from tactile_core.jobs import gel as gel_module
-from tactile_core.jobs.gel import FLAGS, Gel, GelContact
+from tactile_core.jobs.gel import Gel
+from tactile_core.jobs.gel_contact import FLAGS, GelContact
 from tactile_core.mechanics.fast.active_set import UnsolvedError
 from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.placement import Placement

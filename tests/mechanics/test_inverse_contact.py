@@ -16,7 +16,7 @@ from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.sensors.unrolling import node_normals
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import true_displacement
-from tactile_core.translation.contact_patch import contact_patch
+from tactile_core.translation.gel_place import contact_patch
 
 CONTACTS = Path(__file__).resolve().parents[2] / "scenes" / "training" / "test_contacts.h5"
 

@@ -14,8 +14,9 @@ from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
 from tactile_core.translation.contact_frame import ContactFrame  # noqa: E402
+from tactile_core.translation.layers import compress  # noqa: E402
 from tactile_core.translation.network_sizes import NETS, SURFACES  # noqa: E402
-from tactile_core.translation.networks import Networks, compress  # noqa: E402
+from tactile_core.translation.networks import Networks  # noqa: E402
 from tactile_core.translation.posterior import FORCE_SCALE  # noqa: E402
 
 OPTIONS = Options()

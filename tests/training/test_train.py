@@ -26,6 +26,7 @@ from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import STAGES  # noqa: E402
 from tactile_core.training.train import deterministic, train  # noqa: E402
 from tactile_core.translation import error_bounds, network_sizes, networks, weights  # noqa: E402
+from tactile_core.translation.layers import DISTANCES  # noqa: E402
 
 BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
 # The small surfaces have no mirror images.
@@ -76,7 +77,7 @@ def test_result_is_complete_and_loads(quick, pairs):
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}
         assert shapes == entry["shapes"]
-    for kind, name in itertools.product(("signed", "rectified"), networks.DISTANCES):
+    for kind, name in itertools.product(("signed", "rectified"), DISTANCES):
         assert (np.diff(card["distance"][kind][name]) >= 0).all()
         assert len(card["distance"][kind][name]) == len(card["distance"]["levels"])
     for name in ("biotac_m", "digit_m", "force_N"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.recordings.polarity import contact_signals
-from tactile_core.translation.lost_signs import recovered
+from tactile_core.translation.simulated_likeness import recovered
 
 
 @pytest.fixture(scope="module")

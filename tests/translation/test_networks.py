@@ -91,7 +91,7 @@ def calls(nets, count):
     }
 
 
-@pytest.mark.parametrize("count", [0, 1, networks.BLOCK, 2 * networks.BLOCK + 3])
+@pytest.mark.parametrize("count", [0, 1, layers.BLOCK, 2 * layers.BLOCK + 3])
 def test_shapes_and_dtype(nets, count):
     for name, (function, x, shape) in calls(nets, count).items():
         result = function(x)
@@ -110,7 +110,7 @@ def test_pressure_of_rectified_changes_grows_with_their_sum_whatever_their_patte
 
 
 def test_a_frame_does_not_depend_on_its_neighbours(nets):
-    count = 3 * networks.BLOCK + 1
+    count = 3 * layers.BLOCK + 1
     for name, (function, x, _) in calls(nets, count).items():
         together = function(x)
         for start, stop in ((0, 1), (5, 6), (7, 30)):
@@ -130,10 +130,8 @@ def test_wrong_input_says_what_is_expected(nets):
 
 def test_compress_and_expand_are_inverse():
     change = np.array([-3300, -15, -1, 0, 1, 15, 795, 4095], np.float32)
-    np.testing.assert_allclose(
-        networks.expand(networks.compress(change)), change, rtol=1e-5
-    )  # float32, exp of up to 6.3
-    assert np.isfinite(networks.expand(np.float32([1e9, -1e9]))).all()
+    np.testing.assert_allclose(layers.expand(layers.compress(change)), change, rtol=1e-5)  # float32, exp of up to 6.3
+    assert np.isfinite(layers.expand(np.float32([1e9, -1e9]))).all()
 
 
 def test_silu_does_not_overflow():

@@ -14,7 +14,7 @@ from tactile_core.errors import TactileError
 from tactile_core.jobs.frames_file import described, named
 from tactile_core.sensors import descriptor
 from tactile_core.translation import networks, translate, translator
-from tactile_core.translation.card_sensors import pair_of
+from tactile_core.translation.card import pair_of
 
 NAME = "finger"
 

@@ -9,7 +9,7 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.translation import networks, reference_signals
-from tactile_core.translation.card_errors import chain_error, doubt
+from tactile_core.translation.card import chain_error, doubt
 from tactile_core.translation.translate import load_translator
 
 NAME, MOST = "biotac_sp", 8e6  # bytes

@@ -16,10 +16,10 @@ from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
 from tactile_core.translation.gel_place import on_gel
-from tactile_core.translation.lost_signs import recovered
 from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import Networks
 from tactile_core.translation.posterior import FORCE_SCALE, Posterior, touches
+from tactile_core.translation.simulated_likeness import recovered
 
 from .gel_force import carried_force
 

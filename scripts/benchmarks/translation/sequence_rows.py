@@ -17,7 +17,7 @@ from tactile_core.accuracy import Row, row
 from tactile_core.sensors import SAMPLE_RATE
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import LEAST_PATCH
-from tactile_core.translation.contact_patch import contact_patch
+from tactile_core.translation.gel_place import contact_patch
 from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translation, Translator
 

@@ -99,8 +99,8 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     if options.reverse:
         return _reverse(options)
-    from ...jobs import convert, frame_range, results
-    from ...jobs.error_budget import parse_budget
+    from ...jobs import convert, results
+    from ...jobs.sampling_error import parse_budget
     from ...pictures import presets
     from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
@@ -108,7 +108,7 @@ def run(options: argparse.Namespace) -> int:
     from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
-    keep, frames = results.parse_keep(options.keep), frame_range.parse_frames(options.frames)
+    keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
     budget = None if options.error is None else parse_budget(options.error)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
@@ -121,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
         from ...jobs import plan
 
         counts = [len(readers.read(path, prepare.columns, source or SOURCE, lean=True)) for path in paths]
-        chosen = sum(len(frame_range.select(frames, count)) for count in counts)
+        chosen = sum(len(results.select(frames, count)) for count in counts)
         tell("\n".join(plan.of_frames(chosen, keep, preset).lines()))
         return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
@@ -162,12 +162,12 @@ def run(options: argparse.Namespace) -> int:
 
 def _reverse(options: argparse.Namespace) -> int:
     """Translate one gel's frames back; returns the exit status."""
-    from ...jobs import frame_range, reverse
+    from ...jobs import results, reverse
     from ...translation.translate import load_translator
 
     if len(options.recordings) > 1:
         raise TactileError("--reverse", f"{len(options.recordings)} inputs", "one", "Give each a file of its own")
-    frames = frame_range.parse_frames(options.frames)
+    frames = results.parse_frames(options.frames)
     translator = load_translator(options.weights, None, options.target if options.weights is None else None, None)
     with bar("reverse", "frame", options.progress) as shown:
         reverse.reverse(options.recordings[0], options.out, translator, frames, shown, overwrite=options.overwrite)

@@ -82,8 +82,8 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     engine.check_counts(options, "workers", "restart")
     size = _size(options.size)
-    from ...jobs import frame_range, render
-    from ...jobs.error_budget import parse_budget
+    from ...jobs import render, results
+    from ...jobs.sampling_error import parse_budget
     from ...pictures.mitsuba import variant
 
     wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
@@ -92,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
         error=None if options.error is None else parse_budget(options.error),
         calibration=_calibration(options.calibration, options.gel),
         size=size,
-        frames=frame_range.parse_frames(options.frames),
+        frames=results.parse_frames(options.frames),
         exr=options.exr,
         variant=wanted,
         noise=options.noise,

@@ -109,7 +109,7 @@ def _keep(text: str | None) -> tuple[str, ...]:
 
 
 def _bound(text: str) -> float:
-    from ...jobs.error_budget import parse_budget
+    from ...jobs.sampling_error import parse_budget
 
     return parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
 

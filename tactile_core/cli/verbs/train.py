@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
 
 def _say_error(card: dict) -> None:
     """Print the error of the weights on held-out presses, and a warning where it is hardly below the baseline."""
-    from ...translation.card_errors import chain_error, doubt
+    from ...translation.card import chain_error, doubt
 
     found = chain_error(card)
     if found is not None:

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import dataclasses
 import math
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
@@ -19,12 +17,9 @@ from .common import NOTHING, columns_argument, columns_of, polarity_argument, un
 if TYPE_CHECKING:
     import numpy as np
 
-    from ...jobs.live import DigitCamera, Shown, View
-    from ...recordings import Recording
+    from ...jobs.live import Shown
     from ...recordings.electrode_gains import ElectrodeGains
-    from ...recordings.tables.column_map import ColumnMap
 
-    Rows = Iterator[tuple[Recording | None, float]]  # new rows and when they came; None now and then without any
     Output = Callable[[Shown, dict[str, np.ndarray]], bool]  # takes a frame and its pictures; false: it has ended
 
 BRIEF = "show a recording live while it is being written"
@@ -43,9 +38,6 @@ examples:
   tactile watch touch.csv --serve 7311 --camera 0
   tactile watch --rosbag-play touch.bag --speed 2"""
 LEAVES = NOTHING
-POLL = 0.002  # s between two looks at the file
-LONGEST_WAIT = 10.0  # s without a frame that are played; a longer gap is skipped
-REPORT_EVERY = 1.0  # s between two lines of numbers
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -106,7 +98,10 @@ def run(options: argparse.Namespace) -> int:
     sensor = None if options.weights else sensor_of_first([path], columns)
     tools = load_tools(options.weights, options.calibration, target=options.target, source=sensor)
     sensor = tools.translator.source
-    source = _played(path, speed, columns, sensor) if playing else _followed(options, columns, sensor)
+    if playing:
+        source = live.played(path, speed, say, columns, sensor)
+    else:
+        source = live.followed(path, options.idle, say, columns, sensor)
     tare = None if options.tare == "auto" else options.tare
     unit = _unit(options.sensor, path, sensor)
     view = live.View(tools, options.rate, options.polarity, tare, unit)
@@ -116,39 +111,8 @@ def run(options: argparse.Namespace) -> int:
         camera = None
         if options.camera is not None:
             camera = opened.enter_context(contextlib.closing(live.DigitCamera(options.camera)))
-        _follow(source, view, camera, _outputs(options, path, opened))
+        live.watch(source, view, camera, _outputs(options, path, opened), say, tell)
     return 0
-
-
-def _follow(source: Rows, view: View, camera: DigitCamera | None, outputs: list[Output]) -> None:
-    """Show, and report, until the rows end or an output does."""
-    reported, failed, lost, silent = time.perf_counter(), False, False, False
-    try:
-        for rows, came in source:
-            shown = None if rows is None else view.show(rows, came)
-            if view.silent != silent:
-                silent = view.silent
-                say("the finger does not answer: no contact" if silent else "the finger answers")
-            if shown is not None:
-                seen = {"picture": shown.picture}
-                if camera is not None:
-                    seen["camera"] = camera.picture(shown.picture.shape)
-                if not all(output(shown, seen) for output in outputs):
-                    break
-            if camera is not None and camera.lost and not lost:
-                lost = True
-                say("the camera gives no more pictures; watching goes on without it")
-            if time.perf_counter() - reported >= REPORT_EVERY:
-                reported = time.perf_counter()
-                say(view.describe_latency() + (f"; force {shown.newtons:.2f} N" if shown else ""))
-    except TactileError:
-        failed = not view.frames
-        raise
-    finally:
-        if not failed:
-            say(f"rest from {view.rest_source}" if view.rest_source else "rest was not found")
-            say(f"counts that {view.polarity.name[:-1]}: {view.polarity.evidence}")
-            tell(f"{view.frames} frames: {view.describe_latency()}")
 
 
 def _check(options: argparse.Namespace) -> None:
@@ -197,53 +161,6 @@ def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
     from ...recordings.fingers import split
 
     return electrode_gains.read(sensor).gains_for(path, split(path).section, sensor, of)
-
-
-def _followed(options: argparse.Namespace, columns: ColumnMap | None, sensor: str) -> Rows:
-    """Yield new rows of a growing file and their arrival time, s; None now and then while no row comes."""
-    from ...jobs.live import Growing
-
-    growing, last, bad = Growing(options.recording, columns, sensor), time.perf_counter(), 0
-    while options.idle is None or time.perf_counter() - last < options.idle:
-        came = time.perf_counter()
-        rows = growing.poll()
-        if growing.bad > bad:
-            bad = growing.bad
-            say(f"{bad} of {growing.rows} rows were bad and are passed over")
-        if rows is None:
-            time.sleep(POLL)
-        else:
-            last = came
-        yield rows, came
-
-
-def _played(path: str, speed: float, columns: ColumnMap | None, sensor: str) -> Rows:
-    """Yield the rows of a finished recording at their times, one part in memory at a time; speed 0: without waiting."""
-    from ...recordings.chunks import read_parts
-
-    began = time.perf_counter()
-    for part in read_parts(path, columns, sensor):
-        recording, done = part.recording, part.repeated
-        for warning in recording.warnings if not done else ():
-            say(f"warning: {warning}")
-        while done < len(recording):
-            ahead = recording.time[done] / speed - (time.perf_counter() - began) if speed else 0.0
-            if ahead > LONGEST_WAIT:
-                say(f"nothing for {ahead:.0f} s before frame {done}: skipped")
-                began -= ahead
-            due = done + 1 if speed == 0 else _due(recording, speed * (time.perf_counter() - began))
-            if due <= done:
-                time.sleep(POLL)
-                continue
-            pdc = None if recording.pdc is None else recording.pdc[done:due]
-            rows = dataclasses.replace(recording, electrodes=recording.electrodes[done:due], pdc=pdc)
-            yield rows, time.perf_counter()
-            done = due
-
-
-def _due(recording: Recording, passed: float) -> int:
-    """Return the number of frames whose time is within `passed` s of the first."""
-    return int(recording.time.searchsorted(passed, side="right"))
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:

@@ -5,5 +5,6 @@ from .frame_server import FrameServer
 from .growing_file import Growing
 from .live_signals import LiveSignals
 from .live_view import Shown, View
+from .playback import followed, played, watch
 
-__all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View"]
+__all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View", "followed", "played", "watch"]

@@ -17,7 +17,7 @@ from tactile_core.accuracy import COSTS
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training import error_summary
 from tactile_core.training.step_errors import error_columns, translation_metrics, true_displacement
-from tactile_core.translation.contact_patch import contact_patch
+from tactile_core.translation.gel_place import contact_patch
 
 
 @pytest.fixture(scope="module")

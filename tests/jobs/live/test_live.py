@@ -12,9 +12,9 @@ from PIL import Image
 
 from tactile_core import recordings
 from tactile_core.cli.main import main
-from tactile_core.cli.verbs import watch
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, live
+from tactile_core.jobs.live import playback
 from tactile_core.recordings import electrode_gains, polarity
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
 
@@ -97,7 +97,7 @@ def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     electrodes = recordings.read(slide_csv(frames=40)).electrodes
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
-    monkeypatch.setattr(watch, "time", clock := Clock())
+    monkeypatch.setattr(playback, "time", clock := Clock())
     assert main(["watch", str(tmp_path / "gap.npz"), "--play", "--out", str(tmp_path / "now.png")]) == 0
     said = capsys.readouterr()
     assert "before frame 1: skipped" in said.err and said.out.startswith("40 frames: ")
@@ -123,7 +123,7 @@ def test_without_a_quiet_part_rest_is_guessed_in_the_end():
 
 def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
-    monkeypatch.setattr(watch, "time", Clock())
+    monkeypatch.setattr(playback, "time", Clock())
     for more in (["--idle", "0.2"], ["--play"], ["--play", "--speed", "4"], ["--play", "--speed", "0"]):
         out = tmp_path / "now.png"
         path = str(slide_csv(frames=90))
@@ -164,7 +164,7 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
 
 def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
-    monkeypatch.setattr(watch, "time", Clock())
+    monkeypatch.setattr(playback, "time", Clock())
     own, columns, sensor = tmp_path / "own.csv", tmp_path / "map.toml", tmp_path / "sensor.toml"
     own.write_text(slide_csv(frames=90).read_text(encoding="utf-8").replace("ele", "taxel "), encoding="utf-8")
     assert main(["info", str(own), "--columns", str(columns)]) == 0
@@ -221,7 +221,7 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
     press = SimpleNamespace(time=np.arange(60) / 100, electrodes=electrodes, pdc=still, tac=still, tdc=still)
     bags.write_bag(tmp_path / "touch.bag", press, "ros1", "hand")
     words = ["watch", "--rosbag-play", str(tmp_path / "touch.bag"), "--out", str(tmp_path / "now.png")]
-    monkeypatch.setattr(watch, "time", clock := Clock())
+    monkeypatch.setattr(playback, "time", clock := Clock())
     assert main(words) == 0
     assert clock.slept > 0.5  # s: at its own pace, 60 frames of 10 ms
     assert capsys.readouterr().out.startswith("60 frames: ")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core import recordings, sensors
-from tactile_core.translation import contact_patch, translate
+from tactile_core.translation import gel_place, translate
 from tactile_core.translation.contact_track import Tracker
 
 
@@ -24,7 +24,7 @@ def dent(gel, depth):
 
 @pytest.mark.parametrize(("depth", "touched"), [(0.9, False), (1.2, True), (20, True)])
 def test_a_dent_is_a_contact_from_an_absolute_depth_on(gel, depth, touched):
-    patch = contact_patch.contact_patch(dent(gel, depth * contact_patch.FLOOR), gel)
+    patch = gel_place.contact_patch(dent(gel, depth * gel_place.FLOOR), gel)
     assert patch.any() == touched
 
 
@@ -41,4 +41,4 @@ def test_what_the_networks_make_of_noise_alone_shows_no_contact(request, gel):
 
     every = np.arange(len(recording))
     moved = translator(silent, Tracker(posteriors, len(recording))(every)[1]).displacement_digit
-    assert not contact_patch.contact_patch(moved, gel).any()
+    assert not gel_place.contact_patch(moved, gel).any()
