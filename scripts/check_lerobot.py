@@ -19,10 +19,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 PACKAGES = ("lerobot[dataset,training,diffusion]", "lerobot-doctor")
-CONVERTERS = (
-    "lerobot.scripts.convert_dataset_v21_to_v30",
-    "lerobot.datasets.v30.convert_dataset_v21_to_v30",
-)  # 0.6, 0.4
+CONVERTER = "convert_dataset_v21_to_v30"
+CONVERTERS = {f"lerobot.scripts.{CONVERTER}": ".", f"lerobot.datasets.v30.{CONVERTER}": ".."}  # LeRobot 0.6's, 0.4's
 
 
 def main(arguments: list[str] | None = None) -> int:
