@@ -275,3 +275,16 @@ def test_files_of_other_programs_are_read(name, tmp_path):
     assert signals.kind == "raw" and found.rate == pytest.approx(100, rel=1e-3)
     assert not (found.flags & (Flag.REPAIRED | Flag.TIME_JUMP)).any()
     assert np.abs(signals.change).max() < 100  # of steady grips and untouched fingers; rest is 3,000 counts away
+
+
+def test_a_live_view_knows_a_finger_that_does_not_answer(press):
+    from tactile_core.jobs.live.live_signals import LiveSignals
+
+    live = LiveSignals()
+    zeros = np.zeros((120, 19))
+    assert not live.learn(zeros) and live.silent
+    assert live.learn(press.electrodes[:150]) and not live.silent
+    np.testing.assert_allclose(live.rest, press.electrodes[:150].mean(axis=0), atol=2)  # nothing was learnt from zeros
+    signals = live.signals(np.stack([press.electrodes[350], zeros[0]]))
+    assert signals.change[0].any() and not signals.change[1].any()
+    assert (signals.flags & Flag.DEAD_CHANNEL > 0).tolist() == [False, True]

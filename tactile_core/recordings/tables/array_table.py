@@ -75,8 +75,9 @@ def table_of(store: Store, wanted: Iterable[str]) -> Table:
 
 
 def _columns_of(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    columns = values.reshape(len(values), -1)
     inner = product(*map(range, values.shape[1:]))
-    return {name + "".join(f"[{place}]" for place in index): values[:, *index] for index in inner}
+    return {name + "".join(f"[{at}]" for at in index): columns[:, place] for place, index in enumerate(inner)}
 
 
 def _read(store: Store, name: str) -> np.ndarray:
