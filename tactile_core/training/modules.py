@@ -12,7 +12,7 @@ from ..sensors import ELECTRODES
 from ..translation.layers import COUNT_SCALE, NORM_EPSILON
 from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
 from ..translation.networks import LEAST_SPREAD, SPREAD_LIMITS
-from ..translation.posterior import LEAST_FORCE, MEAN_SHIFTS
+from ..translation.posterior import LEAST_TOUCH, MEAN_SHIFTS
 from .surface_codec import SurfaceCodec
 
 
@@ -101,7 +101,7 @@ class ContactPosterior(nn.Module):
         weight, mean, spread = self.mixture(latent)
         state = mean[torch.arange(len(mean)), weight.argmax(-1)]
         place, spread = mean[..., :PLACE], spread[..., :PLACE]
-        other = (mean[..., PLACE] >= LEAST_FORCE) != (state[:, None, PLACE] >= LEAST_FORCE)
+        other = (mean[..., PLACE] >= LEAST_TOUCH) != (state[:, None, PLACE] >= LEAST_TOUCH)
         known = (weight - spread.log().sum(-1)).masked_fill(other, -math.inf)
         for _ in range(MEAN_SHIFTS):
             share = (known - 0.5 * ((state[:, None, :PLACE] - place) / spread).square().sum(-1)).softmax(-1)
