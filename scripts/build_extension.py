@@ -6,7 +6,8 @@
 
 What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
 simulating and rendering need: about 180 MB a platform and Python (Windows and macOS: 160), so each has a zip of its
-own. Blender 4.2 to 5.0 run Python 3.11, 5.1 and later 3.13, Debian's 5.2 3.14. The same commit, platform and wheels give the same bytes.
+own. Blender 4.2 to 5.0 run Python 3.11, 5.1 and later 3.13, Debian's 5.2 3.14. The same commit, platform and wheels
+give the same bytes.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ PLATFORMS = {
 PYTHONS = ("3.11", "3.13", "3.14")
 # Never torch (users translate with numpy), never numpy (Blender ships it).
 WHEELS = (
-    "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit", "threadpoolctl",
+    "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit",
+    "threadpoolctl",
 )  # fmt: skip
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
