@@ -38,9 +38,10 @@ from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import PATHS_A_PASS, GelLight
+from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
 from tactile_core.pictures.presets import FAST, NAMES, PRESETS, QUALITY, REFERENCE, STANDARD, TABLE, Preset
-from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration, Coating
 from tactile_core.sensors.calibration_file import load_calibration
 
@@ -164,7 +165,7 @@ def converge(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Change of the picture of each field, grey levels (H, W, 3): by direct light alone, and by the full model."""
     rest = of_unit(rest_height_map(unit.camera), unit)
-    light = MitsubaLight(unit, truth, variant, rest, seed)
+    light = MatteLight(unit, truth, variant, rest, seed)
     resting, seen = light.direct(rest)
     whole = light.completed(rest, resting, seen)
     for number, height in enumerate(heights, 1):

@@ -15,23 +15,19 @@ from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS
 from .background import correction, raised_light, resting_picture
 from .coating_spread import CoatingSpread
-from .direct_light import Hits, direct_light
 from .height_map import gel_mapper, of_unit, rest_height_map
 from .marker_field import MarkerField
-from .mitsuba.gel_light import ASIDE, GelLight
-from .mitsuba.gel_mesh import GelMesh
-from .mitsuba.interreflection import interreflection
-from .mitsuba.light_samples import light_points, sphere_points
+from .mitsuba.gel_light import GelLight
+from .mitsuba.matte_light import MatteLight
 from .mitsuba.surroundings import NOTHING, Surroundings
-from .mitsuba.tracer import make_tracer
 from .mitsuba.variant import LLVM, choose_variant
-from .mitsuba.window import through_window
-from .perspective import Perspective, slopes
-from .presets import DEFAULT, FAST, Preset, preset_named
+from .perspective import Perspective
+from .presets import DEFAULT, FAST, preset_named
 from .shading import Shader, camera_array, check_reach, in_picture
 
-# Steps of the additive recurrence that fills four dimensions evenly (M. Roberts, 2018: powers of 1 / g, g^5 = g + 1).
-_EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
+# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
+# over squares of 4 px by 0.75, 0.5, 0.25, 0.
+GRAIN = 4
 
 
 class Light(Protocol):
@@ -90,7 +86,7 @@ class Renderer:
             if self.variant == LLVM:
                 self._light = GelLight(calibration, chosen, resting, seed, surroundings)
             else:
-                self._light = MitsubaLight(calibration, chosen, self.variant, resting, seed)
+                self._light = MatteLight(calibration, chosen, self.variant, resting, seed)
         if surroundings and self.variant != LLVM:
             found = f"{len(surroundings.lamps)} more lamps and {len(surroundings.occluders)} bodies in the light's way"
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
@@ -193,54 +189,6 @@ class Renderer:
         for channel, row in enumerate(self._response):
             levels[..., channel] = sum(part * radiance[..., led] for led, part in enumerate(row))
         return levels
-
-
-class MitsubaLight:
-    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; arguments checked by the caller."""
-
-    def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
-        self.unit, self.preset = unit, preset
-        self._tracer = make_tracer(GelMesh(unit.camera, preset.spacing, square=True), rest, variant)
-        self._start = np.random.default_rng(seed).random(4)
-
-    def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels, of heights (H, W) m."""
-        height = np.asarray(height_map, np.float32)
-        return self.completed(height, *self.direct(height))
-
-    def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
-        """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W), and what the first pass saw."""
-        self._tracer.load(height)
-        tilt = slopes(height, self.unit.camera)
-        total, first = self._one_pass(0, tilt)
-        for number in range(1, self.preset.passes):
-            total += self._one_pass(number, tilt)[0]
-        return total / np.float32(self.preset.passes), first
-
-    def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
-        """Return the direct light with the preset's other effects: interreflection, and the window's refraction."""
-        radiance, preset = direct, self.preset
-        if preset.gather and any(self.unit.coating.albedo):
-            radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
-        return through_window(radiance, hits.height, self.unit) if preset.window else radiance
-
-    def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Hits]:
-        """Direct light (H, W, 3) and what pixels saw."""
-        leds, count = self.unit.leds, self.preset.points
-        if self.preset.passes == 1:
-            shift, points = ASIDE, [light_points(led, count) for led in leds]
-        else:
-            right, down, turn, depth = (self._start + number * _EVEN) % 1
-            shift = (right - 0.5, down - 0.5)
-            points = [sphere_points(led, count, turn, depth) for led in leds]
-        place, seen = self._tracer.trace(np.concatenate(points), shift)
-        hits = Hits.on_map(place, tilt, self.unit.camera)
-        return direct_light(hits, seen, points, self.unit, soften=self.preset.passes == 1), hits
-
-
-# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
-# over squares of 4 px by 0.75, 0.5, 0.25, 0.
-GRAIN = 4
 
 
 def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..sensors import electrode_count, title, typical_rest
 from .answers import prepare
-from .biotac_sp import describe_sp
 from .flags import Flag, names
 from .labels import summary
 from .preparer import Preparer
@@ -21,6 +20,14 @@ from .tables.truncated_cell import listed
 
 if TYPE_CHECKING:
     from .electrode_gains import SensorFile
+from typing import TYPE_CHECKING
+
+from ..sensors import SAMPLE_RATE
+from .formats import HAND
+from .signal_kind import detect
+
+if TYPE_CHECKING:
+    from .electrode_gains import ElectrodeGains
 
 MOST_NOT_TAKEN = 40  # names that are spelled out; a file may have a thousand
 SHOWN = 5  # texts of a label
@@ -149,3 +156,66 @@ def _electrode_table(signals: Signals) -> list[str]:
     head = "  electrode " + "".join(f"{j + 1:>6}" for j in range(len(signals.rest)))
     rows = [("rest", signals.rest), ("least", signals.change.min(axis=0)), ("largest", signals.change.max(axis=0))]
     return [head] + [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in rows]
+
+
+TRANSLATED_BY = "`tactile convert RECORDING --sensor FILE`, with the unit's rest by `tactile adapt` (docs/extend.md)"
+ADVICE = (
+    "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
+)
+
+
+def describe_sp(
+    path: str, recording: Recording, unit: ElectrodeGains | None, channels: str, not_taken: list[tuple[str, str]]
+) -> str:
+    """Describe sensor, channels, frames, rest and counts as a short table.
+
+    unit : with the rest against which changes are taken; channels, not_taken : rows of the table, in words
+    """
+    count, electrodes = len(recording), recording.electrodes
+    finger = recording.about.get("finger")
+    name = f", {HAND[finger]} ({finger})" if finger else ""
+    whole = electrodes[np.isfinite(electrodes).all(axis=1)]
+    kind, evidence = detect(whole) if len(whole) else ("unknown", "no line has a reading of every electrode")
+    rows = [
+        ("layout", recording.layout),
+        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes{name}"),
+        ("channels", ", ".join([channels, *recording.about.get("labels", ())])),
+        ("frames", f"{count} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
+        ("time", _time(recording)),
+        ("kind", f"{kind}: {evidence}"),
+        ("rest", ADVICE if unit is None else unit.note),
+        ("use", TRANSLATED_BY),
+        *not_taken,
+    ]
+    lines = [path, *(f"  {label:<11}{text}" for label, text in rows), ""]
+    lines += _counts(electrodes) if unit is None else _changes(electrodes, np.array(unit.rest_counts))
+    if recording.warnings:
+        lines += ["", "warnings"] + [f"  - {warning}" for warning in recording.warnings]
+    return "\n".join(lines)
+
+
+def _time(recording: Recording) -> str:
+    if np.isnan(recording.time).all():
+        return "none: snapshots, one a line"
+    if recording.start_time:
+        return f"{recording.duration:.2f} s, {recording.rate:.2f} Hz (median)"
+    return f"no time stamps; {len(recording) / SAMPLE_RATE:.2f} s at the sensor's {SAMPLE_RATE:g} Hz (assumed)"
+
+
+def _counts(counts: np.ndarray) -> list[str]:
+    """Lines on counts (T, 24): each electrode's median, least and largest."""
+    of = ("median", np.nanmedian(counts, axis=0)), ("least", np.nanmin(counts, axis=0)), (
+        "largest", np.nanmax(counts, axis=0),
+    )  # fmt: skip
+    return _table(counts.shape[1], of)
+
+
+def _changes(counts: np.ndarray, rest: np.ndarray) -> list[str]:
+    """Lines on counts (T, 24) against counts at rest (24,)."""
+    of = ("rest", rest), ("least", np.nanmin(counts - rest, axis=0)), ("largest", np.nanmax(counts - rest, axis=0))
+    return _table(counts.shape[1], of)
+
+
+def _table(count: int, rows: tuple[tuple[str, np.ndarray], ...]) -> list[str]:
+    head = ("electrode", np.arange(1, count + 1))
+    return [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in (head, *rows)]

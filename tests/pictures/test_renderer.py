@@ -10,10 +10,11 @@ from gel_pictures import Press, levels, with_leds, works
 
 from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
+from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 from tactile_core.pictures.perspective import Perspective
 from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
-from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Coating
 
 SHORT = dataclasses.replace(REFERENCE, name="short", passes=2)
@@ -208,7 +209,7 @@ def test_memory_stays_flat(any_variant, small, press):
     resource = pytest.importorskip("resource", reason="the system counts no memory for a process")
     del resource
     unit = small.at_size(30, 40)
-    light = MitsubaLight(unit, PRESETS["standard"], any_variant, rest_height_map(unit.camera), 0)
+    light = MatteLight(unit, PRESETS["standard"], any_variant, rest_height_map(unit.camera), 0)
     height = press.on(unit.camera)
     for _ in range(50):
         light.radiance(height)

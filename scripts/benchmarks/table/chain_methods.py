@@ -11,9 +11,10 @@ from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
+from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE
-from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import true_displacement
@@ -72,6 +73,6 @@ def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001
     variant = choose_variant().name
     one_thread(variant)
     rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
-    light = MitsubaLight(unit, dataclasses.replace(REFERENCE, passes=passes), variant, rest, 0)
+    light = MatteLight(unit, dataclasses.replace(REFERENCE, passes=passes), variant, rest, 0)
     resting, true = light.radiance(rest), true_displacement(pairs, "digit", np.arange(len(pairs.press)))
     np.savez(file, pictures=[in_levels(light.radiance(of_unit(height, unit)) - resting) for height in mapper(true)])

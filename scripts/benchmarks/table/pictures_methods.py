@@ -11,9 +11,10 @@ from benchmarks.measure_presets import QUICK_PASSES, fields, one_thread, rms
 from tactile_core.accuracy import row
 from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import of_unit, rest_height_map
+from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE, preset_named
-from tactile_core.pictures.renderer import MitsubaLight, Renderer
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
@@ -65,7 +66,7 @@ def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
     rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
     pictures, ms = [], []
     for seed in (0, 1):
-        light = MitsubaLight(unit, preset, variant, rest, seed)
+        light = MatteLight(unit, preset, variant, rest, seed)
         resting = light.radiance(rest)
         for height in heights if seed == 0 else heights[:1]:
             began = time.process_time()

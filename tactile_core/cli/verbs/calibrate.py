@@ -120,10 +120,10 @@ def _sheet_beside(out: str) -> Path:
 
 
 def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
+    from ...pictures.calibrate.evaluate import rows_of, write_sheet
     from ...pictures.calibrate.fit import calibrate
     from ...pictures.calibrate.held_out import check_worth, cross_validated
     from ...pictures.calibrate.orientation import check_orientation
-    from ...pictures.calibrate.report import rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration, write_calibration
 
     start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter[0]
@@ -155,8 +155,7 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
 
 def _test(options: argparse.Namespace, photographs: Photographs) -> int:
     from ...files import atomic
-    from ...pictures.calibrate.evaluate import evaluate_unit
-    from ...pictures.calibrate.report import rows_by_press, rows_of, write_sheet
+    from ...pictures.calibrate.evaluate import evaluate_unit, rows_by_press, rows_of, write_sheet
     from ...sensors.calibration_file import load_calibration
 
     calibration = load_calibration(options.test)

@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 
 from .ball_pictures import BallPictures, smaller, working_factor
-from .contact_light import contact_disc, fitted_light
 from .levenberg_marquardt import minimise
 from .photo_metrics import windowed
 from .photographs import Press, dilated
@@ -117,3 +116,25 @@ class _PressProblem:
         last = self._last
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last
+
+
+CONTACT_SHARE = 0.8  # radius of the contact over sqrt(2 R depth), by the table of prints
+SOFT = 0.25e-3  # m, over which the light falls off at the contact's edge (assumed)
+LIKELY = 20.0  # grey levels, how large it is (assumed): holds it near none where few pixels tell
+
+
+def contact_radius(depth: float, radius: float) -> float:
+    """Return the radius, m, of the contact of a ball of a radius pressed so deep, m."""
+    return float(min(CONTACT_SHARE * np.sqrt(2 * radius * depth), radius))
+
+
+def contact_disc(bench: BallPictures, ball: tuple[float, float, float, float]) -> np.ndarray:
+    """Return the share (H, W), 0..1, of each pixel that shows the contact of a ball (right, down, depth, radius), m."""
+    right, down, depth, radius = ball
+    distance = np.hypot(bench.right - right, bench.down - down)
+    return 1 / (1 + np.exp((distance - contact_radius(depth, radius)) / SOFT))
+
+
+def fitted_light(left: np.ndarray, disc: np.ndarray, model_error: float) -> np.ndarray:
+    """Fit a disc's (n,) light (3,), grey levels, to the residual ``left`` (n, 3) of a picture, by least squares."""
+    return disc @ left / (disc @ disc + (model_error / LIKELY) ** 2)

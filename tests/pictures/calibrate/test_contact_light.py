@@ -9,9 +9,9 @@ from plain_unit import plain_unit
 from pressed_unit import BALL, write_photographs
 
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
-from tactile_core.pictures.calibrate.contact_light import contact_disc
 from tactile_core.pictures.calibrate.evaluate import evaluate_unit
 from tactile_core.pictures.calibrate.photographs import read_photographs
+from tactile_core.pictures.calibrate.press_fit import contact_disc
 
 PLACE = (0.5, -0.4, 1.3)  # mm
 

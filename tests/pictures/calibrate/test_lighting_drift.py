@@ -7,8 +7,7 @@ from plain_unit import plain_unit
 from pressed_unit import BALL, PLACES, write_photographs
 
 from tactile_core.pictures.calibrate.evaluate import evaluate_unit
-from tactile_core.pictures.calibrate.lighting_drift import lighting_drift
-from tactile_core.pictures.calibrate.photographs import read_photographs
+from tactile_core.pictures.calibrate.photographs import lighting_drift, read_photographs
 
 DOWN, RIGHT = np.meshgrid(np.linspace(-1, 1, 320), np.linspace(-1, 1, 240), indexing="ij")
 # Grey levels, a channel each: more than the 18 that count as a press, over a third of the picture.

@@ -14,10 +14,10 @@ from tactile_core.accuracy import order
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_mesh import MM, GelMesh
 from tactile_core.pictures.mitsuba.interreflection import irradiance
+from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.perspective import slopes
 from tactile_core.pictures.presets import REFERENCE, STANDARD, Gather
-from tactile_core.pictures.renderer import MitsubaLight
 from tactile_core.pictures.shading import Shader
 from tactile_core.sensors.calibration import Coating
 
@@ -79,7 +79,7 @@ def test_direct_light_is_that_of_mitsubas_path_tracer(any_variant, small, press)
     """Each pixel's z-test with Sidak's correction for their number; Gauss's tails need some twenty renders."""
     height = press.on(small.camera)
     mean, variance = path_traced(small, height, any_variant, depth=2, spp=16, renders=24)
-    ours = MitsubaLight(small, DIRECT, any_variant, rest_height_map(small.camera), 0).radiance(height)
+    ours = MatteLight(small, DIRECT, any_variant, rest_height_map(small.camera), 0).radiance(height)
     # Pixels of 0.2 mm: triangles' normals against the map's slopes, and our own rest of noise, half a per cent.
     deviation = np.sqrt(variance + (0.005 * ours) ** 2 + (1e-3 * LEVELS) ** 2)
     z = np.abs(ours - mean) / deviation
@@ -113,7 +113,7 @@ def test_one_bounce_is_that_of_mitsubas_path_tracer(small):
     fine = dataclasses.replace(STANDARD, gather=Gather(step=1, azimuths=24, growth=0.1, bounces=1))
     found = []
     for preset in (fine, UNBOUNCED):
-        found.append(MitsubaLight(unit, preset, llvm, rest_height_map(unit.camera), 0).radiance(height))
+        found.append(MatteLight(unit, preset, llvm, rest_height_map(unit.camera), 0).radiance(height))
     ours = found[0] - found[1]
     expected, ours = (values.reshape(8, 10, 6, 10, 3).mean((1, 3)) for values in (light, ours))
     print(expected.mean((0, 1)), ours.mean((0, 1)))
@@ -158,10 +158,10 @@ def test_light_is_never_made(any_variant, small, press):
     totals = []
     for bounces in (1, 2, 3):
         preset = dataclasses.replace(STANDARD, gather=Gather(4, 12, 0.3, bounces))
-        totals.append(MitsubaLight(small, preset, any_variant, rest, 0).radiance(height).sum())
+        totals.append(MatteLight(small, preset, any_variant, rest, 0).radiance(height).sum())
     black = dataclasses.replace(small, coating=Coating(albedo=(0.0, 0.0, 0.0)))
-    direct = MitsubaLight(small, UNBOUNCED, any_variant, rest, 0).radiance(height).sum()
-    assert not MitsubaLight(black, preset, any_variant, rest, 0).radiance(height).any()
+    direct = MatteLight(small, UNBOUNCED, any_variant, rest, 0).radiance(height).sum()
+    assert not MatteLight(black, preset, any_variant, rest, 0).radiance(height).any()
     steps = np.diff([direct, *totals])
     assert (steps > 0).all()
     assert (steps[1:] < 0.3 * steps[:-1]).all()  # albedo 0.5 times the small part of the gel that sees gel
@@ -171,11 +171,11 @@ def test_noise_falls_with_the_order_of_monte_carlo_or_faster(any_variant, small,
     """Half an order for numbers drawn one by one; these are spread evenly, which gains up to as much again."""
     height, rest = press.on(small.camera), rest_height_map(small.camera)
     passes, seeds = [2, 4, 8, 16], range(4)
-    truth = MitsubaLight(small, dataclasses.replace(DIRECT, passes=96), any_variant, rest, 99).radiance(height)
+    truth = MatteLight(small, dataclasses.replace(DIRECT, passes=96), any_variant, rest, 99).radiance(height)
     noise = []
     for count in passes:
         preset = dataclasses.replace(DIRECT, passes=count)
-        drawn = [MitsubaLight(small, preset, any_variant, rest, seed).radiance(height) for seed in seeds]
+        drawn = [MatteLight(small, preset, any_variant, rest, seed).radiance(height) for seed in seeds]
         noise.append(float(np.sqrt(np.mean((np.array(drawn) - truth) ** 2))))
     assert -1.2 < order(passes, noise) < -0.45
 
@@ -183,7 +183,7 @@ def test_noise_falls_with_the_order_of_monte_carlo_or_faster(any_variant, small,
 def test_the_seed_matters_to_the_reference_alone(any_variant, small, press):
     height, rest = press.on(small.camera), rest_height_map(small.camera)
     for preset, same in ((STANDARD, True), (dataclasses.replace(DIRECT, passes=2), False)):
-        one, other = (MitsubaLight(small, preset, any_variant, rest, seed).radiance(height) for seed in (1, 2))
+        one, other = (MatteLight(small, preset, any_variant, rest, seed).radiance(height) for seed in (1, 2))
         assert np.array_equal(one, other) == same
 
 
@@ -192,7 +192,7 @@ def test_fast_is_the_reference_within_half_a_level_on_ten_random_contacts(any_va
     unit = plain_unit().at_size(120, 160)
     rest = rest_height_map(unit.camera)
     few = dataclasses.replace(DIRECT, passes=6 if any_variant == LLVM else 2)
-    reference, shader = MitsubaLight(unit, few, any_variant, rest, 0), Shader(unit, rest=rest)
+    reference, shader = MatteLight(unit, few, any_variant, rest, 0), Shader(unit, rest=rest)
     resting = reference.radiance(rest), shader.radiance(rest)
     random = np.random.default_rng(zlib.crc32(b"ten random contacts"))
     squares = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_core.pictures.mitsuba.light_samples import light_points, sphere_points
+from tactile_core.pictures.mitsuba.matte_light import light_points, sphere_points
 from tactile_core.sensors.camera import Led
 
 LED = Led("green", (-13.3e-3, -8.5e-3, 7.6e-3), 1.0e-3, 1.0)
