@@ -181,7 +181,7 @@ def describe_sp(
         ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes{name}"),
         ("channels", ", ".join([channels, *recording.about.get("labels", ())])),
         ("frames", f"{count} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
-        ("time", _time(recording)),
+        ("time", _time_of_sp(recording)),
         ("kind", f"{kind}: {evidence}"),
         ("rest", ADVICE if unit is None else unit.note),
         ("use", TRANSLATED_BY),
@@ -194,7 +194,7 @@ def describe_sp(
     return "\n".join(lines)
 
 
-def _time(recording: Recording) -> str:
+def _time_of_sp(recording: Recording) -> str:
     if np.isnan(recording.time).all():
         return "none: snapshots, one a line"
     if recording.start_time:
