@@ -180,7 +180,7 @@ def _result(folder: Path, sensor: str, picked: list[str]) -> None:
     columns = [(p.time_s, p.x_mm, p.z_mm) for p in spec.points]
     times, x, z = np.array(columns).T
     rest = sensors.sensor_surface(sensor).rest
-    apex, axes = [], []
+    poses = []
     for k, second in enumerate(seconds):
         at = Placement(
             np.interp(second, times, x) * 1e-3, np.interp(second, times, z) * 1e-3, np.radians(spec.tilt_deg)
@@ -189,8 +189,9 @@ def _result(folder: Path, sensor: str, picked: list[str]) -> None:
         nodes = rest + moved[sensor][k]
         for _ in range(STEPS if truth.force[k].any() else 0):
             pose = pose.moved(float(pose.distance(indenter, nodes)[0].min()))
-        apex.append(pose.apex), axes.append(pose.axes)
-    arrays = {"apex": np.array(apex), "axes": np.array(axes), "seconds": seconds, "force": truth.force}
+        poses.append(pose)
+    arrays = {"apex": np.array([pose.apex for pose in poses]), "axes": np.array([pose.axes for pose in poses])}
+    arrays |= {"seconds": seconds, "force": truth.force}
     arrays["picked"] = np.array(picked, np.str_)
     np.savez(folder / "result.npz", **arrays, **{f"moved {name}": values for name, values in moved.items()})
 
@@ -241,13 +242,14 @@ def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
     say(stage="Solving the contacts, 2 of 2", done=0, total=1)
     with np.load(folder / "frames.npz") as stored:
         arrays = dict(stored)
-    count, moved, flags = len(arrays["flags"]), [], []
+    count, parts = len(arrays["flags"]), []
     for start in range(0, count, BLOCK):
         part = {name: values[start : start + BLOCK] for name, values in arrays.items()}
         found = solved_gel.solved(part, job["gel"], job["found_on"])
-        moved.append(found["displacement_digit"]), flags.append(found["flags"])
+        parts.append((found["displacement_digit"], found["flags"]))
         progress(min(start + BLOCK, count), count)
-    np.savez(folder / "gel.npz", displacement=np.concatenate(moved), flags=np.concatenate(flags))
+    moved, flags = map(np.concatenate, zip(*parts, strict=True))
+    np.savez(folder / "gel.npz", displacement=moved, flags=flags)
 
 
 def variant(folder: Path, job: dict, progress: Progress) -> None:

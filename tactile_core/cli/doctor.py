@@ -61,37 +61,38 @@ LIBRARIES = (
 )
 
 
+MISSING, BROKEN = "missing", "broken"  # in place of a version
+
+
 def report() -> Iterator[str]:
     """Return the lines to print; raises nothing."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         tried = list(pool.map(try_library, LIBRARIES))
-    for library, (version, trouble) in zip(LIBRARIES, tried, strict=True):
-        found[library.module] = not trouble
-        state = "missing" if trouble.startswith("missing") else "broken" if trouble else version or "works"
-        words = trouble.removeprefix("missing, ")  # which the column before says
+    for library, (state, words) in zip(LIBRARIES, tried, strict=True):
+        found[library.module] = state not in (MISSING, BROKEN)
         yield f"  {library.package:<22} {state:<12} {library.use}" + (f": {words}" if words else "")
     yield from _mitsuba(found["mitsuba"])
 
 
 def try_library(library: Library) -> tuple[str, str]:
-    """Import a library; returns (version, "") if it imports, or ("", what is wrong, in words)."""
+    """Import a library; returns its version, MISSING or BROKEN, and what is wrong, in words; "" where nothing is."""
     install = advice(library.extra) if library.extra else f"python -m pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:
-            return "", f"missing, {install}"
+            return MISSING, install
     except (ImportError, ValueError, AttributeError):
-        return "", f"missing, {install}"
+        return MISSING, install
     command = [sys.executable, "-P", "-c", _TRY, library.module, library.package]
     try:
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=TRY_SECONDS)
     except (OSError, subprocess.TimeoutExpired) as error:
-        return "", f"could not be tried ({type(error).__name__})"
+        return BROKEN, f"could not be tried ({type(error).__name__})"
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
-        return "", f"{last[:100]}"
-    return (done.stdout.split() or [""])[-1], ""
+        return BROKEN, last[:100]
+    return (done.stdout.split() or ["works"])[-1], ""
 
 
 def _mitsuba(works: bool) -> Iterator[str]:

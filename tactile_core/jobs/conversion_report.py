@@ -10,6 +10,7 @@ import numpy as np
 from ..recordings import flags
 from ..sensors import PRESSURE_PER_COUNT
 from ..translation.card import doubt
+from ..translation.trust_words import SENTENCES
 from .contact_sheet import Contents, choose_frames, contact_sheet
 from .frame_pass import FramePass, Tools
 from .frames_file import described
@@ -24,16 +25,6 @@ SHEET_ARRAYS = (
     "contact_center",
 )  # fmt: skip
 LEFT = ("expected_error_digit", "error_bound_digit")
-# Flags that the translation sets, which no warning of the recording mentions.
-REMARKABLE = {
-    "out_of_range": "signals unlike those the networks were trained on",
-    "beyond_digit": "the contact has no counterpart on the DIGIT's gel",
-    "beyond_picture": "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
-    "undecided_place": "by its own signals the contact may as well lie elsewhere",
-    "two_contacts": "the signals look like two contacts at once; the translation shows one",
-    "unexplained": "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
-    "gel_not_solved": "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
-}
 
 
 class ConversionReport:
@@ -81,7 +72,8 @@ class ConversionReport:
             *filter(None, [doubt(translator.card)]),
         ]
         found += drawer.describe_gel()
-        for name, words in REMARKABLE.items():
+        for flag, words in SENTENCES.items():
+            name = str(flag.name).lower()
             if self.flagged[name]:
                 meaning = described(words, self._tools.pair)
                 found.append(f"{self.flagged[name]} of {len(self._frames)} frames: {meaning} (flag {name})")

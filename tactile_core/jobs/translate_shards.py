@@ -17,7 +17,6 @@ from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import open_plain
 from . import prepared_signals
-from .convert import load_tools
 from .engine import job as jobs
 from .engine.inputs import unit_hash
 from .engine.kinds import InputFacts
@@ -113,6 +112,8 @@ def _tools(
     target: str,
 ) -> Tools:
     """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
+    from .convert import load_tools
+
     check_unit(calibration, unit_sha256)
     tools = load_tools(weights, calibration, preset, variant or None, answer, gel, target, source)
     if tools.translator.sha256 != sha256:

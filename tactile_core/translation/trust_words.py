@@ -1,4 +1,4 @@
-"""Describe in one line how far a frame's translation can be trusted, for contact sheets and panels alike."""
+"""Words for flags: a line on how far a frame's translation can be trusted, and sentences on whole recordings."""
 
 from __future__ import annotations
 
@@ -31,6 +31,17 @@ _REMARKS = {
     Flag.POLARITY_ASSUMED: "polarity assumed",
     Flag.REPAIRED: "repaired sample",
     Flag.TIME_JUMP: "jump in time",
+}
+
+# Of the flags that the translation sets, which no warning of the recording mentions: so many of its frames.
+SENTENCES = {
+    Flag.OUT_OF_RANGE: "signals unlike those the networks were trained on",
+    Flag.BEYOND_DIGIT: "the contact has no counterpart on the DIGIT's gel",
+    Flag.BEYOND_PICTURE: "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
+    Flag.UNDECIDED_PLACE: "by its own signals the contact may as well lie elsewhere",
+    Flag.TWO_CONTACTS: "the signals look like two contacts at once; the translation shows one",
+    Flag.UNEXPLAINED: "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
+    Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
 
 

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 import pytest
 
 from tactile_core.cli.main import main
+from tactile_core.jobs import convert
 from tactile_core.jobs.engine import inputs, local, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
-from tactile_core.translation import translate
 
 WORKER = Path(__file__).parent / "fake_worker.py"
 COMMAND = (sys.executable, str(WORKER))
@@ -86,7 +86,7 @@ def finished(finished_once, tmp_path) -> tuple[Path, jobs.Job]:
 def command(monkeypatch, capsys):
     """command("day1", "--out", "job") -> status and output of `tactile batch` in this process, with fake workers."""
     networks = SimpleNamespace(sha256="0" * 64, source="biotac", target="digit")
-    monkeypatch.setattr(translate, "load_translator", lambda *words: networks)
+    monkeypatch.setattr(convert, "load_translator", lambda *words: networks)
     monkeypatch.setattr(local, "WORKER_COMMAND", COMMAND)
 
     def call(*words):

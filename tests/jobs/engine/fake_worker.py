@@ -40,7 +40,7 @@ def killing(make):
 
 
 if __name__ == "__main__":
-    translate_shards.load_tools = lambda *words: fake_tools.tools()
+    convert.load_tools = lambda *words: fake_tools.tools()
     convert.load_translator = lambda *words: fake_tools.Networks()
     translate_shards.make = killing(translate_shards.make)
     local.WORKER_COMMAND = COMMAND

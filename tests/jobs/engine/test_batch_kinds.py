@@ -60,7 +60,6 @@ def test_a_grid_is_refused_before_any_work(scene, tmp_path, capsys):
     for words, said in (
         (["--grid", "recording.tilt=1"], "no such field"),
         (["--grid", "force_n=1", "--error", "5um"], "one of the two"),
-        (["--plan"], "without --grid"),
         (["--workers", "2"], "without --grid"),
     ):
         assert main(["simulate", str(scene), "--out", str(tmp_path / "out"), *words]) == 2
