@@ -72,8 +72,8 @@ def touch_at_force(
         else:
             high = (depth, _root(found))
         depth = _next_depth(low, high, goal, limit, halve=attempt % 3 == 2)
-    found = f"force {force:g} N, between depths {low[0] * 1e3:.4f} and {depth * 1e3:.4f} mm"
-    raise TactileError(where, found, "one that a search finds", "Give a depth")
+    between = f"force {force:g} N, between depths {low[0] * 1e3:.4f} and {depth * 1e3:.4f} mm"
+    raise TactileError(where, between, "one that a search finds", "Give a depth")
 
 
 def unreachable(where: str, force: float, limit: float) -> UnreachableError:

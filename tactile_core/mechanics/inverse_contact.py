@@ -12,8 +12,7 @@ import numpy as np
 from .. import sensors
 from .fast.compliance import compliance_of
 from .fast.compliance_rows import ComplianceRows
-from .node_areas import node_areas
-from .rest_normals import rest_normals
+from .node_areas import node_areas, rest_normals
 
 # Of the sensor's thickness over its modulus: the layer's give under a pressure. On gels solved at finite strain, nine
 # indenters, the sum missed the force by 6.0 % in the median, with 0.01 by 7.5 %, 0.03 by 12.9 %; on translated gels

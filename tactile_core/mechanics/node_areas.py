@@ -1,4 +1,4 @@
-"""Area of a sensor's surface that belongs to each of its nodes; a nodal force divided by it is a traction."""
+"""Area of a sensor's surface that belongs to each of its nodes, and normals there; force over area is traction."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import functools
 
 import numpy as np
 
+from .. import sensors
+from .solids.elasticity import quadratic
 from .solids.hex_mesh import outer_faces, solid_mesh
 
 _GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
@@ -23,7 +25,7 @@ def node_areas(sensor: str) -> np.ndarray:
     corners = mesh.nodes[faces].reshape(-1, 3, 3, 3)  # face, b along eta, a along xi, axis
     for xi, by_xi in zip(*_GAUSS, strict=True):
         for eta, by_eta in zip(*_GAUSS, strict=True):
-            (along, slope_along), (across, slope_across) = _quadratic(xi), _quadratic(eta)
+            (along, slope_along), (across, slope_across) = quadratic(xi), quadratic(eta)
             first = np.einsum("fbai,b,a->fi", corners, across, slope_along)
             second = np.einsum("fbai,b,a->fi", corners, slope_across, along)
             area = by_xi * by_eta * np.linalg.norm(np.cross(first, second), axis=1)
@@ -44,6 +46,12 @@ def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     return found
 
 
-def _quadratic(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Values and slopes (3,) of the quadratic shape functions of nodes at -1, 0, 1."""
-    return np.array([t * (t - 1) / 2, 1 - t * t, t * (t + 1) / 2]), np.array([t - 0.5, -2 * t, t + 0.5])
+@functools.cache
+def rest_normals(sensor: str) -> np.ndarray:
+    """Return the unit outward normals (n, 3) of a sensor's resting surface; not to be written to."""
+    from ..sensors.unrolling import node_normals
+
+    surface = sensors.sensor_surface(sensor)
+    outward = node_normals(surface.rest, surface.faces)
+    outward.flags.writeable = False
+    return outward

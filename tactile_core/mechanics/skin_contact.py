@@ -19,8 +19,7 @@ from ..geometry.indenters import Indenter, Sphere
 from ..sensors.unrolling import roll_up, unrolled_nodes
 from .body_contact import BodyContact, leaning, patch_radius
 from .inverse_contact import pressing_traction
-from .node_areas import node_areas
-from .rest_normals import rest_normals
+from .node_areas import node_areas, rest_normals
 from .solve import solve
 
 SENSOR = "biotac"

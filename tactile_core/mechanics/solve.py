@@ -18,9 +18,8 @@ from .fast.contact_state import Contact
 from .fast.press import CorrectedPress
 from .finite_strain.load_path import LoadPath
 from .force_search import MOST_FORCE, UnreachableError, unreachable
-from .node_areas import traction
+from .node_areas import rest_normals, traction
 from .placement import FRICTION, Placement, on_gel, pose_at
-from .rest_normals import rest_normals
 from .sharpness import RESOLVED_RADIUS, sharpest
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 from .thickness import DEPTH_LIMIT, thickness_under
@@ -102,17 +101,20 @@ def solve_path(
 
 
 def _first_touch(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
-    if not (on_gel(place.x, place.z, sensor=sensor) if sensors.is_gel(sensor) else on_gel(place.x, place.z)):
+    gel = (
+        sensor if sensors.is_gel(sensor) else sensors.TARGET
+    )  # the part of the pad that unrolls onto it can be touched
+    if not on_gel(place.x, place.z, sensor=gel):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
-        gel = sensors.title(sensor) if sensors.is_gel(sensor) else "DIGIT"  # what of the pad can be touched
-        raise TactileError("solve, place", found, f"a place on the {gel}'s gel (x, z), see digit.outline_distance")
+        advice = f"tactile_core.sensors.shape_of({gel!r}).outline_distance says how far inside a place is"
+        raise TactileError("solve, place", found, f"a place (x, z) on the {sensors.title(gel)}'s gel", advice)
     return pose_at(sensor, indenter, place)
 
 
 def _check(step: Step, limit: float) -> None:
-    if (step.depth is None) == (step.force is None):
-        raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
     name, value, unit = ("depth", step.depth, "m") if step.force is None else ("force", step.force, "N")
+    if value is None or None not in (step.depth, step.force):
+        raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
     if not (np.isfinite(value) and value >= 0):
         raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
     if step.force is not None and 0 < step.force < _LEAST_FORCE:

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import sensors
 from ..geometry.indenters import Indenter, Pose
-from .rest_normals import rest_normals
+from .node_areas import rest_normals
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little

@@ -19,9 +19,10 @@ from ..mechanics.first_touch import surface_drop
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, pose_at
-from ..mechanics.solve import Solution, Step, solve, solve_path
+from ..mechanics.solution import Solution, Step
+from ..mechanics.solve import solve, solve_path
 from ..mechanics.thickness import DEPTH_LIMIT, depth_at
-from .pair_sampling import draw_place, pair_row
+from .pair_sampling import draw_place, pair_row, paired
 from .scene import Scene
 
 REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
@@ -60,14 +61,14 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()
     while True:
-        place = draw_place(random, scene.pairs)
+        place = draw_place(random, paired(scene))
         if number % 2 == 0 or place.x < REGION_X:
             break
     drawn = random.uniform(_SHALLOWEST, _DEEPEST)
     heading, length = random.uniform(0, 2 * np.pi), random.uniform(0, _SLIDE_MOST)
     slide = length * np.array([np.cos(heading), np.sin(heading)]) if number % 12 in _SLIDING else None
     thick = depth_at(DEPTH_LIMIT, "biotac", indenter, pose_at("biotac", indenter, place))
-    depth = _borne(indenter, place, min(drawn, thick), scene.pairs.friction)
+    depth = _borne(indenter, place, min(drawn, thick), paired(scene).friction)
     return TestPress(number, which, indenter, place, depth, slide)
 
 
@@ -103,23 +104,24 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
 
     The record: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
     """
-    began, rows = time.process_time(), []
+    began = time.process_time()
+    rows: list[dict[str, np.ndarray]] = []
     steps = [(share * press.depth, np.zeros(2)) for share in SHARES]
     if press.slide is not None:
         steps.append((press.depth, press.slide))
-    named = {
-        "press": np.int32(press.number),
-        "indenter": np.int16(press.which),
+    named: dict[str, np.ndarray] = {
+        "press": np.array(press.number, np.int32),
+        "indenter": np.array(press.which, np.int16),
         "place": np.array(dataclasses.astuple(press.place), np.float32),
     }
     lost = ""
     try:
-        for slide, biotac, digit in _pairs(press, steps, scene.pairs.friction):
+        for slide, biotac, digit in _pairs(press, steps, paired(scene).friction):
             rows.append({**named, "slide": slide.astype(np.float32), **pair_row(biotac, digit)})
     except TactileError as error:
         lost = str(error)
-    record = {"wanted": np.int32(len(steps)), "lost": np.str_(lost), "seconds": np.float64(time.process_time() - began)}
-    return rows, record
+    took = np.array(time.process_time() - began)
+    return rows, {"wanted": np.array(len(steps), np.int32), "lost": np.array(lost), "seconds": took}
 
 
 def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:

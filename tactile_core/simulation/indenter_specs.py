@@ -9,7 +9,8 @@ import functools
 import operator
 import os
 import pathlib
-from typing import TYPE_CHECKING, Annotated, Literal
+import types
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -17,7 +18,7 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..geometry.indenters import Indenter, MeshIndenter, Pose, Several
-from ..geometry.indenters.scene_form import SceneForm, Size, forms
+from ..geometry.indenters.scene_form import SceneForm, forms
 
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]
@@ -30,23 +31,24 @@ class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     def build(self) -> Indenter:
         """Build the indenter, in metres."""
-        return forms()[self.__struct_config__.tag].build(msgspec.structs.asdict(self))
+        return forms()[str(self.__struct_config__.tag)].build(msgspec.structs.asdict(self))
 
 
 def _spec_of(form: SceneForm) -> type[SizedSpec]:
     """Define the struct of a form."""
-    fields = [
-        (size.field, Positive if size.count == 1 else tuple[(Positive,) * size.count], *_default(size))
+    fields: list[tuple[str, Any, Any]] = [
+        (
+            size.field,
+            Positive if size.count == 1 else types.GenericAlias(tuple, (Positive,) * size.count),
+            msgspec.NODEFAULT if size.default is None else size.default,
+        )
         for size in form.sizes.values()
     ]
-    return msgspec.defstruct(
+    # msgspec names no base in the type of what it defines
+    return msgspec.defstruct(  # type: ignore[return-value]
         f"{form.shape.__name__}Spec", fields, bases=(SizedSpec,), namespace={"__doc__": f"{form.says}."},
         module=__name__, tag=form.kind, tag_field="kind", forbid_unknown_fields=True, frozen=True,
     )  # fmt: skip
-
-
-def _default(size: Size) -> tuple[float, ...]:
-    return () if size.default is None else (size.default,)
 
 
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):

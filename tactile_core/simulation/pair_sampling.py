@@ -9,12 +9,14 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from .. import sensors
+from ..errors import TactileError
 from ..geometry.indenters import Indenter
 from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, on_gel, pose_at
-from ..mechanics.solve import Sensor, Solution, Step, solve_path
+from ..mechanics.solution import Sensor, Solution, Step
+from ..mechanics.solve import solve_path
 from ..mechanics.thickness import depth_at
 from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from .pairs_file import quantise
@@ -40,17 +42,18 @@ def press_rows(
 
     electrodes : their law, of ``law.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
     """
-    spec = scene.pairs
+    spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which = int(random.integers(len(scene.indenters)))
     indenter = scene.indenters[which].build()
     place = draw_place(random, spec, pair[1])
-    rows, stood = [], np.array(dataclasses.astuple(place), np.float32)
+    rows: list[dict[str, np.ndarray]] = []
+    stood = np.array(dataclasses.astuple(place), np.float32)
     steps = _steps_of_depth(random, spec) if spec.depth_steps else _steps_of_force(random, spec)
     for step, biotac, digit in _on_both(indenter, place, spec, steps, pair):
-        named = {
-            "press": np.int32(press),
-            "indenter": np.int16(which),
+        named: dict[str, np.ndarray] = {
+            "press": np.array(press, np.int32),
+            "indenter": np.array(which, np.int16),
             "slide": np.array(step.slide, np.float32),
             "place": stood,
         }
@@ -67,10 +70,10 @@ def _on_both(
         _press(sensor, indenter, place, spec, own) for sensor, own in zip(pair, for_each, strict=True)
     )
     try:
-        for step, *both in zip(steps, on_source, on_target, strict=False):
-            if not all(found.converged and found.contact_patch.any() for found in both):
+        for step, source, target in zip(steps, on_source, on_target, strict=False):
+            if not all(found.converged and found.contact_patch.any() for found in (source, target)):
                 return
-            yield step, *both
+            yield step, source, target
     except (UnreachableError, PenetrationError):
         return
 
@@ -103,6 +106,13 @@ def _steps_of_force(random: np.random.Generator, spec: PairSpec) -> Iterator[Ste
     for share in np.arange(1, _SLIDE_STEPS + 1) / _SLIDE_STEPS:
         slide = share * length * np.array([np.cos(heading), np.sin(heading)])
         yield Step(force=force, slide=tuple(slide))
+
+
+def paired(scene: Scene) -> PairSpec:
+    """Return how a scene's presses are drawn. Raises TactileError for a scene without pairs."""
+    if scene.pairs is None:
+        raise TactileError("scene, pairs", "none", "a table [pairs]")
+    return scene.pairs
 
 
 def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET) -> Placement:

@@ -9,6 +9,7 @@ import os
 import pathlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from ..sensors import PAIR, SOURCE, TARGET
 from ..sensors.descriptor import OWN
 from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import FALLS
+
+if TYPE_CHECKING:
+    import h5py
 
 FORMAT = "tactile-pairs-2"
 ADVICE = "Make the file again with `tactile pairs`"
@@ -171,7 +175,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
     )
 
 
-def _pair(file: object, path: str | os.PathLike) -> tuple[str, str]:
+def _pair(file: h5py.File, path: str | os.PathLike) -> tuple[str, str]:
     """Source and target of the pairs: the sensors whose nodes the file names, first the one of skin and fluid.
 
     Of a file that names no two sensors they are those that ship.
@@ -197,7 +201,7 @@ def _named(pair: tuple[str, str]) -> dict[str, str]:
 
 
 def _dataset(
-    file: object, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
+    file: h5py.File, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
 ) -> np.ndarray:
     """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
     place = f"{os.fspath(path)}, {name}"
@@ -218,7 +222,7 @@ def _dataset(
     return values.astype(np.float32) if kind == "f" else values
 
 
-def _scale(data: object, place: str) -> float:
+def _scale(data: h5py.Dataset, place: str) -> float:
     """Metres per unit of a displacement dataset."""
     scale = np.asarray(data.attrs.get("scale", np.nan), np.float64)
     if scale.shape != () or not 0.0 < scale < 1.0:

@@ -17,7 +17,8 @@ from ..geometry.indenters import Indenter
 from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
-from ..mechanics.solve import Sensor, Solution, Tier, solve
+from ..mechanics.solution import Sensor, Solution, Tier
+from ..mechanics.solve import solve
 from ..recordings import Truth, write_simulated
 from ..sensors import SOURCE, TARGET, descriptor
 from ..sensors.readout import Wiring, readings
@@ -98,15 +99,16 @@ def simulate_recording(
         frames.append(known[x, z, newtons])
         if progress:
             progress(len(frames), len(time))
-    fluid, counts = "", {}
+    fluid, electrode_counts, pdc, still = "", None, None, None
     if "electrodes" in keep:
-        pressure, still = _pressure(frames), np.full(len(time), _STILL_COUNT, np.int16)
+        pressure = _pressure(frames)
         change = np.stack([frame.change for frame in frames])
-        counts = {"electrodes": readings(change, time, wiring, seed), "pdc": pdc_counts(pressure)}
-        counts |= {"tac": still, "tdc": still}
+        electrode_counts, pdc = readings(change, time, wiring, seed), pdc_counts(pressure)
+        still = np.full(len(time), _STILL_COUNT, np.int16)
         fluid = " " + _describe_fluid(pressure, electrodes)
     write_simulated(
-        out, time=time, **counts, truth=_truth(frames, keep), scene=text, seed=seed,
+        out, time=time, electrodes=electrode_counts, pdc=pdc, tac=still, tdc=still,
+        truth=_truth(frames, keep), scene=text, seed=seed,
         made_by=f"tactile {__version__}, mechanics.recording{_describe_tiers(tiers)}",
         note=f"Simulated, not measured: {scene.description}{fluid}",
     )  # fmt: skip

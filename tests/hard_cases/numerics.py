@@ -17,8 +17,7 @@ from tactile_core.mechanics.fast.press import FastContact
 from tactile_core.mechanics.finite_strain.body import graded_body
 from tactile_core.mechanics.placement import pose_at
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
-from tactile_core.mechanics.solids.neo_hookean import NeoHookean
-from tactile_core.mechanics.solids.split_bulk_modulus import SplitBulkModulus
+from tactile_core.mechanics.solids.neo_hookean import NeoHookean, SplitBulkModulus
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 from tactile_core.pictures.height_map import gel_mapper

@@ -14,7 +14,7 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.files import array_pack
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of_gaps
 from tactile_core.mechanics.fast.compliance import biotac_compliance
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.sensing_points import electrode_feet

@@ -11,7 +11,7 @@ from conftest import SLIDE_HEADER
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.electrodes.gap_law import signal_of_gaps
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.recordings import electrode_gains, prepare, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile

@@ -11,8 +11,7 @@ from ...errors import TactileError
 from ...sensors import divider
 from ..fast.contact_state import Contact
 from ..solution import Solution
-from .biotac_sheet import sensing_films
-from .gap_law import signal_of_gaps
+from .biotac_sheet import sensing_films, signal_of_gaps
 from .reduced_sheet import reduced_sheet
 
 SHEET, GAP = LAWS = ("sheet", "gap")

@@ -58,7 +58,6 @@ def complement(
     gap: np.ndarray,
     active: np.ndarray,
     along: np.ndarray | None = None,
-    carry: np.ndarray | None = None,
     force: float = 0.0,
     *,
     factors: dict[bytes, np.ndarray] | None = None,
@@ -66,7 +65,7 @@ def complement(
     """Find forces p >= 0 with gaps ``matrix p + gap - step along >= 0`` and one of the two zero at every node.
 
     matrix : (k, k) m/N; gap : (k,) m; active : (k,) bool, first guess
-    along : (k,) or None; with it, ``step`` is free and ``carry . p`` is ``force`` N, otherwise ``step`` is 0
+    along : (k,) or None; with it, ``step`` is free and ``along . p`` is ``force`` N, otherwise ``step`` is 0
     factors : Cholesky factors of this symmetric matrix by active set, used and added to
     Raises UnsolvedError.
     """
@@ -74,13 +73,13 @@ def complement(
     pressing, step = np.zeros(len(gap)), 0.0
     for _ in range(_MOST_EXCHANGES):
         index = np.flatnonzero(active)
-        if along is not None and not (len(index) and (carry[index] > 0).any()):
+        if along is not None and not (len(index) and (along[index] > 0).any()):
             raise UnsolvedError("no node can carry the force")
         right = -gap[index] if along is None else np.column_stack([-gap[index], along[index]])
         factor, answer = _closed(matrix, active, index, right, factors)
         if along is not None:
             answer, per_step = answer.T
-            step = float((force - carry[index] @ answer) / (carry[index] @ per_step))
+            step = float((force - along[index] @ answer) / (along[index] @ per_step))
             answer = answer + step * per_step
         pressing[:] = 0
         pressing[index] = answer

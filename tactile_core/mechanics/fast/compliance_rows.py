@@ -19,9 +19,7 @@ _INNER = 2**40  # more than a surface has degrees of freedom
 class Rows(Protocol):
     """Compliance among points near an indenter: ``ComplianceRows`` of nodes, or of nodes and points between them."""
 
-    @property
-    def near(self) -> np.ndarray:
-        """Sorted numbers (n,) of the points."""
+    near: np.ndarray  # sorted numbers (n,) of the points
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
         """Return the compliance (3 k, 3 k) float32 m/N among sorted, near numbers (k,)."""

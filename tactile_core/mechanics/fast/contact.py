@@ -17,8 +17,8 @@ from ..pose_path import between, same_place
 from .active_set import UnsolvedError, Work
 from .candidates import Candidates, first_contact, project
 from .compliance import Compliance
-from .compliance_rows import ComplianceBlock, ComplianceRows, sensing_gaps
-from .contact_state import Contact, among, borne, sideways_share
+from .compliance_rows import ComplianceBlock, ComplianceRows, Rows, sensing_gaps
+from .contact_state import Contact, Loads, among, borne, sideways_share
 from .contact_stiffness import ContactStiffness
 from .friction import Friction
 from .frictionless import Frictionless, Try
@@ -61,7 +61,7 @@ class ContactProblem:
         self._rest = self._resting()
         self._block: ComplianceBlock | None = None
         self._stiffness = ContactStiffness()
-        self._rows = ComplianceRows(compliance, np.empty(0, int))
+        self._rows: Rows = ComplianceRows(compliance, np.empty(0, int))
         self._look_near(pose.moved(reach))
 
     def _resting(self) -> np.ndarray:
@@ -101,7 +101,7 @@ class ContactProblem:
             near = wanted if start is None else np.union1d(self._nodes_within(pose, _REACH + _SPARE), touched)
             self._rows = self._rows_of(near)
 
-    def _rows_of(self, near: np.ndarray) -> ComplianceRows:
+    def _rows_of(self, near: np.ndarray) -> Rows:
         return ComplianceRows(self.compliance, near)
 
     def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
@@ -163,8 +163,7 @@ class ContactProblem:
 
     def _overlaps_at_rest(self, pose: Pose) -> bool:
         """Return true where an undeformed surface would touch the indenter."""
-        gap, _ = self._distance(pose, self.near, np.zeros((len(self.near), 3)))
-        return bool((gap < 0).any())
+        return bool((self._distance(pose, self.near, np.zeros((len(self.near), 3)))[0] < 0).any())
 
     def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) displaced by (k, 3) m."""
@@ -176,7 +175,8 @@ class ContactProblem:
 
     def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
         """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
-        iterations, shift, contact = 0, 0.0, None
+        iterations, shift = 0, 0.0
+        contact = self._nothing(pose)  # where every round found creases
         for _ in range(_MOST_ROUNDS):
             state = self._iterate(pose, axial_force, before, moved, candidates, shift)
             if state is None:
@@ -204,7 +204,7 @@ class ContactProblem:
         begin = Try(candidates.displacement, np.zeros_like(rest), np.zeros(block.c), shift, active)
         core_gap = self.compliance.watch_gap[candidates.inner].astype(float)
         if self.friction == 0:
-            solver = self._frictionless(block, rest, core_gap, pose, candidates)
+            solver: Frictionless | Friction = self._frictionless(block, rest, core_gap, pose, candidates)
         else:
             begin.force, begin.slipping = borne(before, candidates.nodes)
             spots = self._spots(before, moved, pose, candidates.nodes)
@@ -274,7 +274,7 @@ class ContactProblem:
         )  # fmt: skip
         return contact, _Around(moved, gap, core)
 
-    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> Loads:
         """The nodes (k,) that carry what touches, (k, 3) N, and whether they slip (k,)."""
         return touching, force, slipping
 
@@ -283,7 +283,7 @@ class ContactProblem:
         return moved
 
 
-def _single(nodes: np.ndarray, state: Try) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _single(nodes: np.ndarray, state: Try) -> Loads:
     """Nodes (k,) that carry force, each once, their forces (k, 3) N, and whether they slip (k,)."""
     force, slipping = state.force, state.slipping
     if (nodes[1:] == nodes[:-1]).any():

@@ -11,6 +11,8 @@ from ...geometry.indenters import Pose
 from .compliance import Compliance
 from .compliance_rows import sensing_gaps, surface_motion
 
+Loads = tuple[np.ndarray, np.ndarray, np.ndarray]  # nodes (k,) that carry force, (k, 3) N, and whether they slip (k,)
+
 
 @dataclasses.dataclass(frozen=True)
 class Contact:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,8 @@ from ...files.shipped import shipped
 from ...sensors import unrolling
 from .compliance import Compliance
 from .contact_state import Contact
+
+_Answer = TypeVar("_Answer", float, np.ndarray)
 
 REACH = 12.0  # patch radii, how far the learned fields go; they fade over the last of their cells
 LINES = 33  # of their grid, even in asinh(distance / radius): fine at the patch, coarse far from it
@@ -105,10 +107,11 @@ class Correction:
         """See ``Learned``."""
         return self._blend(features, Learned.field)
 
-    def _blend(self, features: np.ndarray, of: Callable) -> np.ndarray | float:
+    def _blend(self, features: np.ndarray, of: Callable[[Learned, np.ndarray], _Answer]) -> _Answer:
         share = float(rubs(features))
-        of_still = of(self.still, features) if share < 1 else 0.0
-        return of_still if share == 0 else (1 - share) * of_still + share * of(self.rubbing, features)
+        if share in (0, 1):
+            return of(self.rubbing if share else self.still, features)
+        return (1 - share) * of(self.still, features) + share * of(self.rubbing, features)
 
 
 class _Supports(NamedTuple):

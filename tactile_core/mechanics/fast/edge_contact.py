@@ -21,7 +21,7 @@ from .candidates import Candidates
 from .compliance import Compliance
 from .compliance_rows import ComplianceBlock, ComplianceRows
 from .contact import ContactProblem
-from .contact_state import Contact
+from .contact_state import Contact, Loads
 from .frictionless import Frictionless, Try
 
 _SLACK = 20e-6  # m, in which the points do not push, as in the full tier (``penalty_points``)
@@ -93,7 +93,8 @@ class EdgeContactProblem(ContactProblem):
         return np.concatenate([nodes, self._m + points])
 
     def _rows_of(self, near: np.ndarray) -> SpringRows:
-        return SpringRows(self.compliance, near, self._points, self._softness)
+        self._springs = SpringRows(self.compliance, near, self._points, self._softness)
+        return self._springs
 
     def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         gap, normal = super()._distance(pose, nodes, moved)
@@ -119,8 +120,8 @@ class EdgeContactProblem(ContactProblem):
                 break
         return contact
 
-    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> tuple[np.ndarray, ...]:
-        nodes, loads = self._rows.on_nodes(touching, force)
+    def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> Loads:
+        nodes, loads = self._springs.on_nodes(touching, force)
         return nodes, loads, np.ones(len(nodes), bool)
 
     def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:

@@ -53,11 +53,11 @@ class Try:
     active: np.ndarray
     settled: bool = False
     iterations: int = 0
-    slipping: np.ndarray | None = None
+    slipping: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0, bool))
     creases: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
 
     def __post_init__(self) -> None:
-        if self.slipping is None:
+        if not len(self.slipping):  # without friction all nodes slip
             self.slipping = np.ones(len(self.displacement), bool)
 
 
@@ -184,7 +184,7 @@ class Frictionless:
         if axial_force is None:
             return complement(matrix, offset, active, factors=model.factors)
         along = np.concatenate([normal @ self.pose.direction, np.zeros(self.block.c)])
-        solved = complement(matrix, offset, active, along, along, axial_force, factors=model.factors)
+        solved = complement(matrix, offset, active, along, axial_force, factors=model.factors)
         if abs(solved.step) <= _LARGEST_STEP:
             return solved
         step = float(np.clip(solved.step, -_LARGEST_STEP, _LARGEST_STEP))

@@ -48,7 +48,8 @@ def change_of(
     answer = np.ascontiguousarray(_solved(system, right))
     slide(known, answer, slipping)
     forces = moving_forces(inverse, rows, known)
-    return Change(forces, *borne(forces, known, motion.moves, slipping, direction), answer[count:])
+    bearing, moved = borne(forces, known, motion.moves, slipping, direction)
+    return Change(forces, bearing, moved, answer[count:])
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
 
@@ -42,6 +43,9 @@ class FastContact:
     axial_force: float
     pressure: float
     depth: float
+
+
+_Found = TypeVar("_Found", FastContact, FastContact | None)
 
 
 class CorrectedPress:
@@ -90,10 +94,10 @@ class CorrectedPress:
         self.last, fall = self._on_the_way
         return self._with_correction(self.last, fall)
 
-    def _guarded_if_needed(self, solve: Callable[[], FastContact | None]) -> FastContact | None:
-        """Solve, again with points between nodes where the frictionless nodes alone do not hold the indenter.
+    def _guarded_if_needed(self, solve: Callable[[], _Found]) -> _Found:
+        """Solve; where frictionless nodes alone do not hold the indenter, solve again with points between them.
 
-        between them, solved from the start, and from then on.
+        That solve begins at the start, and the points stay for all contacts that follow.
         """
         try:
             found = solve()

@@ -16,8 +16,7 @@ from ..solids.finite_strain import FiniteStrainSolid
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.graded_mesh import Footprint, GradedMesh, graded
 from ..solids.hex_mesh import inner_faces, outer_faces
-from ..solids.neo_hookean import NeoHookean
-from ..solids.split_bulk_modulus import SplitBulkModulus
+from ..solids.neo_hookean import NeoHookean, SplitBulkModulus
 from ..solution import Sensor
 from .newton import FiniteStrainContact
 from .solved_contact import ContactState

@@ -18,12 +18,10 @@ from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import BEHIND
 from ..pose_path import between
-from ..solids.damped_factor import DampedFactor, held_back
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
-from ..solids.sparse_cholesky import NotPositiveDefiniteError, PatternFactor
-from .contact_set import ContactSet
-from .obstacle import Obstacle, PlacedIndenter
+from ..solids.sparse_cholesky import DampedFactor, NotPositiveDefiniteError, PatternFactor, held_back
+from .contact_set import ContactSet, Obstacle, PlacedIndenter
 from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
 from .solved_contact import ContactState, guarded
 from .tolerance import EXACT, Tolerance
@@ -215,7 +213,7 @@ class FiniteStrainContact:
 
     def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
         """Push of the indenter on the surface between nodes, where that is guarded."""
-        if not (start.guarded and outer.obstacle):
+        if not (start.guarded and outer.obstacle and self._between):
             return NO_PUSH
         return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
 

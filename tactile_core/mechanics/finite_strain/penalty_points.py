@@ -14,7 +14,7 @@ import numpy as np
 
 from ..solids.block_pattern import BlockPattern
 from ..solids.elasticity import quadratic
-from .obstacle import Obstacle
+from .contact_set import Obstacle
 
 # m: at the edges of nine contacts with balls of 7 and 14 mm quadratic faces hid up to 43 um, and 129 um once.
 LET_THROUGH = 50e-6

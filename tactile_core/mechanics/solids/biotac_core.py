@@ -88,12 +88,12 @@ def above_core(sensor: str) -> tuple[np.ndarray, np.ndarray]:
     points = skin.skin_surface("inner").rest
     step, turn = _POINT_STEP
     tip, base = skin.descriptor.skin.inner_poles
-    x, theta = np.meshgrid(
+    grids = np.meshgrid(
         np.arange(np.floor(1e3 * tip) / 1e3, base + 0.2e-3, step),
         np.arange(-np.pi, np.pi - turn / 2, turn),
         indexing="ij",
     )
-    x, theta = x.ravel(), theta.ravel()
+    x, theta = (each.ravel() for each in grids)
     radius = skin.core_radius(x, theta)
     core = np.column_stack([x, skin.axis_y - radius * np.cos(theta), radius * np.sin(theta)])
     core = core[np.isfinite(radius)]

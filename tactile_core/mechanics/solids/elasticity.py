@@ -60,8 +60,8 @@ def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
             stiffness[:, :, i, :, i] += trace
         divergence += np.einsum("e,p,eai->epai", weight, linear[q], gradient).reshape(n, 4, 81)
         mass += np.einsum("e,p,r->epr", weight, linear[q], linear[q])
-    stiffness = stiffness.reshape(n, 81, 81)
-    return stiffness + bulk * np.einsum("epi,epj->eij", divergence, np.linalg.solve(mass, divergence), optimize=True)
+    swelling = np.einsum("epi,epj->eij", divergence, np.linalg.solve(mass, divergence), optimize=True)
+    return stiffness.reshape(n, 81, 81) + bulk * swelling
 
 
 def assemble(mesh: HexMesh, material: Material):  # noqa: ANN201 (scipy is imported only where it is needed)

@@ -13,10 +13,9 @@ import numpy as np
 
 from ...sensors import Material
 from .block_pattern import BlockPattern
-from .determinants import cofactors, determinants
 from .elasticity import reference_gradients
 from .hex_mesh import HexMesh
-from .neo_hookean import Law, NeoHookean
+from .neo_hookean import Law, NeoHookean, cofactors, determinants
 
 _BATCH = 32  # cells whose stiffness is made at once: what they need stays in the processor's cache
 
@@ -102,9 +101,9 @@ class FiniteStrainSolid:
         pressure_gap = np.linalg.solve(self.mass, gap[..., None])[..., 0]
         by_dof = couple.reshape(n, 4, 81).swapaxes(1, 2)
         stiffness += (by_dof @ to_pressure.swapaxes(2, 3).reshape(n, 4, 81)).reshape(n, 27, 3, 3, 27)
-        residual = residual.reshape(n, 81)
-        condensed = residual + (by_dof @ pressure_gap[..., None])[..., 0]
-        return Linearised(self, residual, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
+        by_cell = residual.reshape(n, 81)
+        condensed = by_cell + (by_dof @ pressure_gap[..., None])[..., 0]
+        return Linearised(self, by_cell, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
 
     def _cells(self, part, f, j, p, residual, couple, stiffness) -> None:  # noqa: ANN001
         """Fill in internal forces (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some cells."""

@@ -100,6 +100,7 @@ def _graded_gel(sensor: str, footprint: Footprint) -> GradedMesh:
     shape = sensors.shape_of(sensor)
     plan = shape.plan_grid()
     window = shape.surface().window
+    assert window is not None  # a gel's grid is even about its middle
     marks = [(0, part.start, part.stop - 1, size - 1) for part, size in zip(window, plan.shape[:2], strict=True)]
     rows, columns = (_lines(marks[k], footprint, k, _WIDEST_GEL) for k in range(2))
     place = _bilinear(plan, rows, columns)

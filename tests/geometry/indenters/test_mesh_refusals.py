@@ -9,7 +9,7 @@ import trimesh
 from tactile_core.errors import TactileError
 from tactile_core.files.cache import cache_folder
 from tactile_core.geometry.indenters import MeshIndenter, mesh_file
-from tactile_core.geometry.indenters.mesh_inside import OverlapError, inside
+from tactile_core.geometry.indenters.mesh_grid import OverlapError, inside
 
 
 def sphere(radius=2.0, at=(0, 0, 0)):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
-from tactile_core.mechanics.electrodes.gap_law import film_floor
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.sensors import biotac
 

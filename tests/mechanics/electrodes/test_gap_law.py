@@ -3,7 +3,7 @@
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.gap_law import film_floor, signal_of_gaps
+from tactile_core.mechanics.electrodes.biotac_sheet import film_floor, signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 
 

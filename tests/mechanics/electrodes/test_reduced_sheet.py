@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
-from tactile_core.mechanics.electrodes.gap_law import film_floor
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
 from tactile_core.mechanics.fast.compliance import biotac_compliance
 from tactile_core.mechanics.fast.sensing_points import sensing_nodes

@@ -39,7 +39,7 @@ def test_depth_found_for_a_force():
     matrix, gap = problem(3)
     gap = np.abs(gap)
     along = np.linspace(0.7, 1.0, len(gap))
-    solved = complement(matrix, gap, gap < np.median(gap), along, along, 0.02)
+    solved = complement(matrix, gap, gap < np.median(gap), along, 0.02)
     assert along @ solved.pressing == pytest.approx(0.02, rel=1e-12)
     check(matrix, gap, solved, along)
 
@@ -48,4 +48,4 @@ def test_no_solution_is_said():
     with pytest.raises(UnsolvedError, match="positive definite"):
         complement(-np.eye(3), -np.ones(3), np.ones(3, bool))
     with pytest.raises(UnsolvedError, match="no node"):
-        complement(np.eye(3), np.ones(3), np.zeros(3, bool), np.ones(3), np.ones(3), 1.0)
+        complement(np.eye(3), np.ones(3), np.zeros(3, bool), np.ones(3), 1.0)

@@ -6,7 +6,7 @@ import pytest
 from tactile_core.geometry.indenters import Pose, Ring, Sphere
 from tactile_core.mechanics.finite_strain import penalty_points
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, graded_body
-from tactile_core.mechanics.finite_strain.obstacle import PlacedIndenter
+from tactile_core.mechanics.finite_strain.contact_set import PlacedIndenter
 from tactile_core.mechanics.finite_strain.penalty_points import PenaltyPoints
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solids.block_pattern import BlockPattern
