@@ -144,25 +144,15 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
     Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
     not kept or lies on another surface, and a frame that it does not hold.
     """
-    path = os.fspath(path)
     if not os.path.isfile(path):
-        raise TactileError(path, "there is no such file", "frames.h5 of `tactile convert`, or a simulated recording")
-    with open_hdf5(path) as store:
-        kind = store.attributes.get("format")
-        if kind == CONVERTED:
-            values, numbers, scale = _array(store, f"displacement_{sensor}", sensor), store.array("frame", (None,)), 1.0
-        elif kind == SIMULATED:
-            name = f"truth/displacement_{sensor}"
-            values, scale = _array(store, name, sensor), store.attributes_of(name).get("scale", 1.0)
-            numbers = np.arange(len(values))
-        else:
-            raise TactileError(path, f"format {kind!r}", f"{CONVERTED!r} or {SIMULATED!r}", "Name a file of `tactile`")
-    check_numbers(path, numbers)
-    row = np.flatnonzero(numbers == frame)
-    if len(row) != 1 or len(numbers) != len(values):
-        held = f"{numbers.min():g} to {numbers.max():g}" if len(numbers) else "none"
-        raise TactileError(f"{path}, frame {frame}", "not in the file", f"a frame it holds ({held})")
-    return values[row[0]].astype(np.float64) * scale
+        expected = "frames.h5 of `tactile convert`, or a simulated recording"
+        raise TactileError(path, "there is no such file", expected)
+    held = _of_hdf5(Path(path), sensor)
+    row = np.flatnonzero(held.numbers == frame)
+    if held.displacement is None or len(row) != 1:
+        span = f"{held.numbers.min():g} to {held.numbers.max():g}"
+        raise TactileError(f"{os.fspath(path)}, frame {frame}", "not in the file", f"a frame it holds ({span})")
+    return held.displacement[row[0]].astype(np.float64) * held.scale
 
 
 def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:

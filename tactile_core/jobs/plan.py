@@ -5,18 +5,16 @@ Times are of one thread of the machine that the tables were measured on (``scrip
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import json
 from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..files.shipped import shipped
 from ..sensors import PAIR, TARGET, title
 
-COSTS = shipped("costs.json")
-TIERS = shipped("mechanics_tiers.json")
+COSTS, TIERS = shipped("costs.json"), shipped("mechanics_tiers.json")
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
 # ``compliance.build`` asks for, and the size of the files.
 BUILD_S, BUILD_MB, MATRICES_MB = {"biotac": 42.0, "digit": 18.0}, 2200.0, {"biotac": 342.0, "digit": 151.0}
@@ -25,24 +23,18 @@ TRACTION_MS, TRACTION_KB = 1.5, 0.7  # a frame of the shipped recording, measure
 TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
 
-@dataclasses.dataclass(frozen=True)
-class Part:
-    """Output that is built, with its cost: seconds; MB of memory and disk that it adds; building : MB taken meanwhile.
-
-    extent : how much of it, in words
-    """
+class Part(NamedTuple):
+    """Output that is built, how much of it in words, and its cost: seconds; MB of memory and disk that it adds."""
 
     what: str
     extent: str
     seconds: float = 0.0
     memory: float = 0.0
     disk: float = 0.0
-    building: float = 0.0
 
 
-@dataclasses.dataclass(frozen=True)
-class Plan:
-    """Parts of a command's work, in the order they are built."""
+class Plan(NamedTuple):
+    """Parts of a command's work, in the order they are built; matrices are built one after another."""
 
     parts: Sequence[Part]
 
@@ -53,15 +45,14 @@ class Plan:
 
     @property
     def memory(self) -> float:
-        """Memory, MB, of all parts together; matrices are built one after another."""
-        return sum(part.memory for part in self.parts) + max(part.building for part in self.parts)
+        """Memory, MB, of all parts together."""
+        built = [part.memory for part in self.parts if part.memory == BUILD_MB]
+        return sum(part.memory for part in self.parts) - sum(built[1:])
 
     def lines(self) -> list[str]:
         """Return a table, and the totals, as lines of text."""
         found = [f"{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
-        for part in self.parts:
-            numbers = f"{part.seconds:9.2f}{part.memory or part.building:7.0f}{part.disk:9.1f}"
-            found.append(f"{part.what:22}{numbers}  {part.extent}")
+        found += [f"{what:22}{s:9.2f}{mb:7.0f}{disk:9.1f}  {extent}" for what, extent, s, mb, disk in self.parts]
         disk = sum(part.disk for part in self.parts)
         return [*found, f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {disk:.3g} MB on disk"]
 
@@ -86,13 +77,11 @@ def of_scene(path: Path, keep: Collection[str], um: float | None = None) -> Plan
     contacts = len({(*at, newtons) for at, newtons in zip(place.tolist(), force.tolist(), strict=True) if newtons > 0})
     used = scene_recording.sensors_of(keep)
     choices = tier_choice.choose_for_scene(path, used, um)
-    start = _part("simulate_nothing")
-    parts = [
-        Part("start", f"{frames} frames, {pressed} in contact; indenter {spec.indenter}", start["start"], start["mb"])
-    ]
+    start, extent = _part("simulate_nothing"), f"{frames} frames, {pressed} in contact; indenter {spec.indenter}"
+    parts = [Part("start", extent, start["start"], start["mb"])]
     for sensor in used:
         kept = pressed if f"displacement_{sensor}" in keep else 0
-        parts += [*_matrices(sensor), _contacts(sensor, choices[sensor], contacts, spec.friction > 0, kept)]
+        parts += [_matrices(sensor), _contacts(sensor, choices[sensor], contacts, spec.friction > 0, kept)]
     if "electrodes" in keep:
         disk = _part("simulate_electrodes")["kb"] * frames / 1e3
         parts.append(Part("electrodes", "from the film over each; noise and drift", disk=disk))
@@ -103,32 +92,26 @@ def of_pairs(count: int) -> Plan:
     """Plan `tactile pairs` of so many contacts: each is solved on both sensors in the fast tier."""
     parts = []
     for sensor in PAIR:
-        part = _part(f"simulate_{sensor}")
-        parts += _matrices(sensor)
-        parts.append(
-            Part(
-                f"{title(sensor)} contacts", f"{count}", part["ms"] * count / 1e3, part["mb"], part["kb"] * count / 1e3
-            )
-        )
+        cost, what = _part(f"simulate_{sensor}"), f"{title(sensor)} contacts"
+        contacts = Part(what, str(count), cost["ms"] * count / 1e3, cost["mb"], cost["kb"] * count / 1e3)
+        parts += [_matrices(sensor), contacts]
     return Plan(parts)
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
     """Plan a conversion of so many frames; keep : words of ``results.KEEPABLE``; preset : of the pictures."""
-    start = _part("convert_displacement" if "displacement" in keep else "convert_latent")
-    seconds, disk = start["start"] + start["ms"] * frames / 1e3, start["kb"] * frames / 1e3
-    parts = [Part("networks", f"{frames} frames; contact sheet", seconds, start["mb"], disk)]
-    if "height" in keep:
-        parts.append(_beyond("height maps", frames, "convert_height"))
-    if "image" in keep:
-        drawn = _beyond("pictures", frames, "convert_image")
-        extra = (_preset_ms(preset) - _preset_ms("fast")) * frames / 1e3
-        parts.append(dataclasses.replace(drawn, extent=f"preset {preset}", seconds=drawn.seconds + extra))
+    cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
+    seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
+    parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
+    extra = _preset_ms(preset) - _preset_ms("fast")
+    for word, what, ms in (("height", "height maps", 0.0), ("image", f"pictures, {preset}", extra)):
+        if word in keep:  # beyond the work that is done in any case
+            beyond = {key: max(_part(f"convert_{word}")[key] - other[key], 0) for key in ("ms", "mb", "kb")}
+            seconds, disk = (beyond["ms"] + ms) * frames / 1e3, beyond["kb"] * frames / 1e3
+            parts.append(Part(what, f"{frames} frames", seconds, beyond["mb"], disk))
     if "traction" in keep:
-        parts += _matrices(TARGET)
-        parts.append(
-            Part("force field", f"{frames} frames", TRACTION_MS * frames / 1e3, disk=TRACTION_KB * frames / 1e3)
-        )
+        seconds, disk = TRACTION_MS * frames / 1e3, TRACTION_KB * frames / 1e3
+        parts += [_matrices(TARGET), Part("force field", f"{frames} frames", seconds, disk=disk)]
     return Plan(parts)
 
 
@@ -136,23 +119,16 @@ def _part(name: str) -> dict[str, float]:
     return costs()["parts"][name]
 
 
-def _beyond(what: str, frames: int, name: str) -> Part:
-    """Return the cost of one output a frame beyond the work that is done in any case."""
-    own, other = _part(name), _part("convert_latent")
-    seconds, disk = (max(own[key] - other[key], 0) * frames / 1e3 for key in ("ms", "kb"))
-    return Part(what, f"{frames} frames", seconds, max(own["mb"] - other["mb"], 0), disk)
-
-
-def _matrices(sensor: str) -> list[Part]:
+def _matrices(sensor: str) -> Part:
     """Return the surface compliance as a part of the plan, with the cost of building it where it is not cached."""
     from ..mechanics.fast.compliance import stored
 
     found, what = stored(sensor), f"{title(sensor)} matrices"
     nodes = f"{found.surface} surface nodes, {found.touchable} of them touchable; solid of {found.volume} nodes"
     if found.bytes:
-        return [Part(what, f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")]
-    once = {"seconds": BUILD_S[sensor], "disk": MATRICES_MB[sensor], "building": BUILD_MB}
-    return [Part(what, f"to be built once in {found.folder}; {nodes}", **once)]
+        return Part(what, f"{found.bytes / 1e6:.0f} MB, cached; {nodes}")
+    extent = f"to be built once in {found.folder}; {nodes}"
+    return Part(what, extent, BUILD_S[sensor], BUILD_MB, MATRICES_MB[sensor])
 
 
 def _contacts(sensor: str, choice: Any, contacts: int, rough: bool, kept: int) -> Part:

@@ -104,7 +104,7 @@ def test_pictures_cost_what_their_preset_was_measured_to():
 
 def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
     assert built(plan.of_frames(150, ("latent",))) == ["networks"]
-    assert built(plan.of_frames(150, ("latent", "height", "image"))) == ["networks", "height maps", "pictures"]
+    assert built(plan.of_frames(150, ("latent", "height", "image"))) == ["networks", "height maps", "pictures, fast"]
     assert {"force field", "DIGIT matrices"} <= set(built(plan.of_frames(10, ("traction",))))
     line = [
         "convert",
