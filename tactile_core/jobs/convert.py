@@ -20,7 +20,7 @@ from . import results, sampling_error
 from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
-from .results import SOLVED, TRANSLATED, Gel, frames_text, select
+from .results import SOLVED, TRANSLATED, GelKind, frames_text, select
 
 if TYPE_CHECKING:
     from ..recordings import PrepareOptions, Recording
@@ -56,7 +56,7 @@ def load_tools(
     preset: str = "fast",
     variant: str | None = None,
     answer: Answer | None = None,
-    gel: Gel = TRANSLATED,
+    gel: GelKind = TRANSLATED,
     target: str = TARGET,
     source: str | None = SOURCE,
 ) -> Tools:
@@ -75,7 +75,7 @@ def load_tools(
 
 
 def load_networks(
-    weights: str | os.PathLike | None, answer: Answer | None, gel: Gel, target: str, source: str | None
+    weights: str | os.PathLike | None, answer: Answer | None, gel: GelKind, target: str, source: str | None
 ) -> tuple[Translator, bool]:
     """Load the networks, and tell whether the target is solved under the contacts that they find; see `load_tools`."""
     must_lead_to = None if gel == SOLVED or weights is None else target

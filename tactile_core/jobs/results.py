@@ -28,9 +28,9 @@ FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png
 OURS = {FRAMES, IMAGES, SHEET, NOTE, TIMINGS, "exr", "rest.exr"}  # the last two of `tactile render --exr`
 IMAGE_NAME = "{:05d}.png"
 
-Gel = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on the DIGIT (``solved_gel``)
-TRANSLATED: Gel = "translated"
-SOLVED: Gel = "solved"
+GelKind = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on it (``solved_gel``)
+TRANSLATED: GelKind = "translated"
+SOLVED: GelKind = "solved"
 KEEPABLE = ("latent", "displacement", "height", "image", "traction", "marker_motion")
 DEFAULT_KEEP = ("latent", "displacement", "image")
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..translation.answer import Answer
     from .engine.job import Job
     from .engine.recipes import Translate
-    from .results import Gel
+    from .results import GelKind
 
 GROWS = False
 # kB a frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
@@ -107,7 +107,7 @@ def _tools(
     preset: str,
     variant: str,
     answer: Answer,
-    gel: Gel,
+    gel: GelKind,
     source: str,
     target: str,
 ) -> Tools:

@@ -13,7 +13,7 @@ from ...recordings.electrode_gains import SensorFile
 from ...recordings.tables.column_map import ColumnMap
 from ...sensors import SOURCE, TARGET
 from ...translation.answer import Answer
-from ..results import TRANSLATED, Gel
+from ..results import TRANSLATED, GelKind
 
 SHARD_FRAMES = 1000  # frames a task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
@@ -58,7 +58,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     preset: str = "fast"
     variant: str = ""
     answer: Answer = Answer()
-    gel: Gel = TRANSLATED
+    gel: GelKind = TRANSLATED
     source: str = SOURCE
     target: str = TARGET
     version: str = __version__
