@@ -2,7 +2,7 @@
 
 A loop is written once, as plain Python over arrays. numba is imported at its first call; what it compiles is kept on
 disk, beside the source or in the user's cache, and read from there by the next process. Without numba the same lines
-run uncompiled and give the same numbers: contacts then take some fifty times as long.
+run uncompiled and give the same numbers: contacts then take five to twenty-five times as long.
 """
 
 from __future__ import annotations

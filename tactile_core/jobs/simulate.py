@@ -16,7 +16,8 @@ import msgspec
 
 from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
-from ..mechanics.fast.compliance import biotac_compliance, digit_compliance
+from ..mechanics.fast.compliance import compliance_of
+from ..sensors import PAIR
 from ..simulation.scene import Scene
 from ..simulation.scene_grid import combinations, name_of, with_values
 from ..simulation.scene_recording import DEFAULT, check_places, recording_of
@@ -47,7 +48,8 @@ def simulate_grid(
     progress : (tasks done, known so far); place : where the work is done, from the job's folder; None for this process
     The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done.
     """
-    digit_compliance(), biotac_compliance()  # built once here, not by every worker at the same time
+    for sensor in PAIR:
+        compliance_of(sensor)  # built once here, not by every worker at the same time
     with result_parts.begun(Path(out), job) as folder:
         where = (place or InProcess)(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .. import sensors
 from ..geometry.indenters import Indenter
 from ..geometry.indenters.pose import tangents
 from .placement import Placement
@@ -27,7 +28,7 @@ class BodyContact:
     place: Placement
     force: float
 
-    def on_gel(self, sensor: str = "digit") -> Solution:
+    def on_gel(self, sensor: str = sensors.TARGET) -> Solution:
         """Solve the contact on a gel, in the fast tier.
 
         Raises TactileError for a place off the gel, and for a force that the gel does not bear.

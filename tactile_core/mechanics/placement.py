@@ -37,11 +37,6 @@ def skin_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     return first_touch(sensors.sensor_surface(sensor), indenter, pose)
 
 
-def biotac_pose(indenter: Indenter, place: Placement) -> Pose:
-    """First touch on the BioTac; see ``skin_pose``."""
-    return skin_pose("biotac", indenter, place)
-
-
 def gel_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     """First touch on a gel at (x, z), leaning as much off the dome's normal as off the BioTac's."""
     point, outward = sensors.shape_of(sensor).dome_point(place.x, place.z)
@@ -49,16 +44,11 @@ def gel_pose(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     return first_touch(sensors.sensor_surface(sensor), indenter, pose)
 
 
-def digit_pose(indenter: Indenter, place: Placement) -> Pose:
-    """First touch on the DIGIT's gel; see ``gel_pose``."""
-    return gel_pose("digit", indenter, place)
-
-
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     """First touch on a sensor."""
     return (gel_pose if sensors.is_gel(sensor) else skin_pose)(sensor, indenter, place)
 
 
-def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = "digit") -> bool:
+def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = sensors.TARGET) -> bool:
     """Return true if a place of the common plane lies on a sensor's gel, at least ``margin`` m inside its outline."""
     return bool(sensors.shape_of(sensor).outline_distance(np.array(x), np.array(z)) > margin)

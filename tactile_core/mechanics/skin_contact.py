@@ -22,7 +22,7 @@ from .inverse_contact import pressing_traction
 from .node_areas import node_areas, rest_normals
 from .solve import solve
 
-SENSOR = "biotac"
+SENSOR = sensors.SOURCE
 # Share of the deepest node's inward displacement, above which a node may be pressed: the skin is dented far beside the
 # few nodes in contact. And share of the largest pressure, from which on it is (median IoU with true patches 0.7; 0.4 is
 # alike). Chosen on a quarter of the test contacts.

@@ -24,7 +24,7 @@ from .sharpness import RESOLVED_RADIUS, sharpest
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 from .thickness import DEPTH_LIMIT, thickness_under
 
-_LEAST_FORCE = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
+_LIGHTEST = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
@@ -117,8 +117,8 @@ def _check(step: Step, limit: float) -> None:
         raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
     if not (np.isfinite(value) and value >= 0):
         raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
-    if step.force is not None and 0 < step.force < _LEAST_FORCE:
-        raise TactileError("solve, force", f"{step.force:g} N", f"0, or at least {_LEAST_FORCE:g} N", "Press more")
+    if step.force is not None and 0 < step.force < _LIGHTEST:
+        raise TactileError("solve, force", f"{step.force:g} N", f"0, or at least {_LIGHTEST:g} N", "Press more")
     if step.force is not None and step.force > MOST_FORCE:
         raise unreachable("solve", step.force, limit)
     if step.depth is not None and step.depth > limit:

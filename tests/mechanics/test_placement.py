@@ -7,7 +7,7 @@ from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
 from tactile_core.mechanics.first_touch import first_touch
-from tactile_core.mechanics.placement import Placement, digit_pose
+from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.thickness import thickness
 from tactile_core.sensors import digit, unrolling
 
@@ -27,7 +27,7 @@ def dome(pose: Pose, reach: float) -> np.ndarray:
 @pytest.mark.parametrize("indenter", INDENTERS, ids=lambda i: type(i).__name__)
 def test_first_touch_is_on_the_true_dome(indenter, place):
     """The lattice's interpolation stands for the dome: found from above, the touch is exact to a micrometre."""
-    pose = digit_pose(indenter, place)
+    pose = pose_at("digit", indenter, place)
     rest = sensors.digit_surface().rest
     near = rest[np.argmin(pose.distance(indenter, rest)[0])]
     gap = pose.distance(indenter, dome(near, 0.4e-3))[0].min()
@@ -47,7 +47,7 @@ def test_first_touch_does_not_depend_on_where_the_motion_starts(lattice):
 @pytest.mark.parametrize("place", PLACES)
 def test_a_ball_that_fits_between_nodes_touches_the_surface_between_them(radius, place):
     """Looked for among nodes alone, its first touch once lay 147 mm behind the gel."""
-    pose = digit_pose(Sphere(radius), place)
+    pose = pose_at("digit", Sphere(radius), place)
     at = dome(pose.apex, 0.4e-3)
     assert abs(pose.distance(Sphere(radius), at)[0].min()) < 0.5e-6  # m, as above
 
@@ -61,7 +61,7 @@ def test_an_indenter_that_meets_nothing_is_refused():
 def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
     """The sixteen nodes nearest to this leaning cube lie beside it; it once ran past them for ever."""
     cube, place = Box((14e-3,) * 3, 0.5e-3), Placement(-4.5836989537761e-3, 7.306593692882052e-3, 0.421, 4.7387)
-    pose = digit_pose(cube, place)
+    pose = pose_at("digit", cube, place)
     rest = sensors.digit_surface().rest
     near = rest[np.argmin(pose.distance(cube, rest)[0])]
     assert abs(pose.distance(cube, dome(near, 0.4e-3))[0].min()) < 0.5e-6  # m, as above

@@ -15,7 +15,7 @@ from tactile_core.errors import TactileError
 from tactile_core.files import array_pack
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.electrodes.biotac_sheet import signal_of_gaps
-from tactile_core.mechanics.fast.compliance import biotac_compliance
+from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.mechanics.force_search import FORCE_TOLERANCE
@@ -113,7 +113,7 @@ def test_the_film_is_that_of_the_linear_model_for_a_small_force():
 
     4 to 8 % of the changes were left under four indenters; the meshes of the skin differ, too.
     """
-    pose, compliance = pose_at("biotac", BALL, PLACE), biotac_compliance()
+    pose, compliance = pose_at("biotac", BALL, PLACE), compliance_of("biotac")
     full = solve("biotac", BALL, pose, depth=0.1e-3, tier="full", friction=0.0)
     linear = ContactProblem(compliance, BALL, pose, 0.1e-3).at_depth(0.1e-3)
     rest = electrode_feet().gap

@@ -17,7 +17,7 @@ from tactile_core.mechanics.fast import correction
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.contact_state import Contact
-from tactile_core.mechanics.fast.correction import Correction, Frame, features, frame
+from tactile_core.mechanics.fast.correction import Correction, PatchFrame, features, frame
 from tactile_core.mechanics.fast.edge_contact import EdgeContactProblem
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, Sensor, graded_body
 from tactile_core.mechanics.placement import pose_at
@@ -48,7 +48,7 @@ class Sample:
     press: int
     friction: float
     features: np.ndarray
-    frame: Frame
+    frame: PatchFrame
     depth: float
     ratio: float
     fast: np.ndarray
@@ -115,7 +115,7 @@ def _holds(problem: ContactProblem, contact: Contact) -> bool:
     return True
 
 
-def residual_on_grid(sensor: str, at: Frame, residual: np.ndarray) -> np.ndarray:
+def residual_on_grid(sensor: str, at: PatchFrame, residual: np.ndarray) -> np.ndarray:
     """A field (n, 3) at a sensor's nodes, in the frames of its nodes, on the moving grid (g, 3); 0 beyond the nodes."""
     import scipy.interpolate
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from tactile_core.geometry.indenters import Indenter, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.finite_strain.solved_contact import ContactState
-from tactile_core.mechanics.finite_strain.tolerance import Tolerance
+from tactile_core.mechanics.finite_strain.solved_contact import ContactState, Tolerance
 from tactile_core.mechanics.solids.neo_hookean import NeoHookean
 from tactile_core.sensors import Material
 

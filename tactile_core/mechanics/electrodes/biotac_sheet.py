@@ -70,7 +70,7 @@ class BiotacSheet:
 
 
 @functools.cache
-def biotac_sheet(sensor: str = "biotac", *, core_of_mesh: bool = False) -> BiotacSheet:
+def biotac_sheet(sensor: str = sensors.SOURCE, *, core_of_mesh: bool = False) -> BiotacSheet:
     """The sheet of the resting finger; a solve takes 10 ms.
 
     core_of_mesh : whether the film ends on the public mesh's core. By default it ends on a core that carries the
@@ -142,7 +142,7 @@ def _connected(faces: np.ndarray) -> np.ndarray:
 FILM_CONSTANT = 0.1
 
 
-def signal_of_gaps(gaps: np.ndarray, sensor: str = "biotac") -> np.ndarray:
+def signal_of_gaps(gaps: np.ndarray, sensor: str = sensors.SOURCE) -> np.ndarray:
     """Noise-free change (..., e) of the raw counts against rest for film thicknesses (..., e) m.
 
     b (1 / max(gap, floor) - 1 / gap at rest), the sign as in ``sensors.COUNT_SIGN``.

@@ -17,7 +17,7 @@ from .reduced_sheet import reduced_sheet
 SHEET, GAP = LAWS = ("sheet", "gap")
 
 
-def signal_of(contact: Contact | Solution, law: str = SHEET, sensor: str = "biotac") -> np.ndarray:
+def signal_of(contact: Contact | Solution, law: str = SHEET, sensor: str = sensors.SOURCE) -> np.ndarray:
     """Noise-free change (e,) of the raw counts against rest, of a unit that rests at ``rest_counts``.
 
     law : ``"sheet"``, the film as a conducting sheet, 3 ms; ``"gap"``, one over the film's thickness, at no cost

@@ -10,6 +10,7 @@ import functools
 
 import numpy as np
 
+from ... import sensors
 from ..solids.sparse_cholesky import factor
 from .biotac_sheet import FED, BiotacSheet, biotac_sheet
 from .thin_sheet import resistances
@@ -43,7 +44,7 @@ class ReducedSheet:
 
 
 @functools.cache
-def reduced_sheet(sensor: str = "biotac") -> ReducedSheet:
+def reduced_sheet(sensor: str = sensors.SOURCE) -> ReducedSheet:
     """The reduced sheet of the resting finger: 1 s once, then 3 ms a contact."""
     sheet = biotac_sheet(sensor)
     rest = sheet.sheet.matrix(sheet.film)[1:, 1:].tocsc()

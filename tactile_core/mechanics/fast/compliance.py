@@ -22,7 +22,7 @@ from ...files import array_cache, lock
 from ...files.cache import cache_folder
 from ...files.threads import one_thread
 from ...geometry.lattice import Lattice
-from ...sensors import Material, digit
+from ...sensors import TARGET, Material
 from ...sensors import unrolling as surface
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.hex_mesh import HexMesh, inner_faces, solid_mesh
@@ -83,16 +83,6 @@ class Compliance:
 ARRAYS = ("move", "watch", "watch_gap", "pressure", "inner_move", "inner_watch", "inner_pressure")
 
 
-def biotac_compliance() -> Compliance:
-    """The BioTac's skin over incompressible fluid; see ``compliance_of``."""
-    return compliance_of("biotac")
-
-
-def digit_compliance() -> Compliance:
-    """The DIGIT's gel; see ``compliance_of``."""
-    return compliance_of("digit")
-
-
 @functools.cache
 def compliance_of(sensor: str) -> Compliance:
     """Return the compliance of a sensor that is there; built in about a minute, then read from the cache."""
@@ -140,8 +130,9 @@ def stored(sensor: str) -> Stored:
 def _touchable_skin(sensor: str) -> np.ndarray:
     rolled = surface.unrolled_nodes(sensor)
     x, z = rolled.T
-    near = (x > digit.X_TIP - _BESIDE_GEL) & (x < digit.X_BASE + _BESIDE_GEL)
-    return np.flatnonzero(near & (np.abs(z) < digit.HALF_WIDTH + _BESIDE_GEL))
+    gel = sensors.shape_of(TARGET)
+    near = (x > gel.tip_x - _BESIDE_GEL) & (x < gel.base_x + _BESIDE_GEL)
+    return np.flatnonzero(near & (np.abs(z) < gel.half_width + _BESIDE_GEL))
 
 
 def _folder(solid: Solid) -> pathlib.Path:

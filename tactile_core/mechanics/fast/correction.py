@@ -36,7 +36,7 @@ FILE = "mechanics_correction.npz"
 
 
 @dataclasses.dataclass(frozen=True)
-class Frame:
+class PatchFrame:
     """A frame that moves with a contact: centre (2,) m in unrolled coordinates, radius m of its patch."""
 
     centre: np.ndarray
@@ -166,17 +166,17 @@ def node_frames(sensor: str) -> np.ndarray:
     return np.stack([along, outward, np.cross(along, outward)], -1)
 
 
-def frame(compliance: Compliance, contact: Contact) -> Frame:
-    """Frame of a contact's fields: about the centre of its forces, scaled with its patch's radius."""
+def frame(compliance: Compliance, contact: Contact) -> PatchFrame:
+    """PatchFrame of a contact's fields: about the centre of its forces, scaled with its patch's radius."""
     places = plane(compliance.name)[compliance.touchable[contact.nodes]]
     load = np.linalg.norm(contact.nodal_force, axis=1)
     share = load / load.sum()
     centre = share @ places
     # Hertz's pressure has 2/5 of the radius squared as its mean square distance; a count of nodes would jump.
-    return Frame(centre, float(np.sqrt(2.5 * (share @ ((places - centre) ** 2).sum(axis=1)))) + _SMALLEST_RADIUS)
+    return PatchFrame(centre, float(np.sqrt(2.5 * (share @ ((places - centre) ** 2).sum(axis=1)))) + _SMALLEST_RADIUS)
 
 
-def features(compliance: Compliance, contact: Contact, at: Frame) -> np.ndarray:
+def features(compliance: Compliance, contact: Contact, at: PatchFrame) -> np.ndarray:
     """Features (f,) of a fast contact, without units: lengths over the thickness, stresses over E.
 
     All are continuous in the nodal forces, so that a force can be searched for.
@@ -226,7 +226,7 @@ def learned() -> dict[str, Correction]:
                 Learned(**{name: arrays[f"{sensor}_{kind}_{name}"].astype(np.float64) for name in names})
                 for kind in ("still", "rubbing")
             ))
-            for sensor in ("biotac", "digit")
+            for sensor in sensors.PAIR
         }  # fmt: skip
 
 
@@ -258,7 +258,7 @@ def correct(compliance: Compliance, contact: Contact, parts: Correction | None =
     )
 
 
-def add_field(sensor: str, displacement: np.ndarray, at: Frame, field: np.ndarray, scale: float) -> np.ndarray:
+def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.ndarray, scale: float) -> np.ndarray:
     """Return a displacement (n, 3) m plus ``scale`` m times a field on the grid (g, 3), in the sensor's axes."""
     return _add_field(
         displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, REACH, LINES,

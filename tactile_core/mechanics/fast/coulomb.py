@@ -18,7 +18,7 @@ import numpy as np
 from ...files.compiled import Loop
 
 # Loops are compiled with these numbers: they stand in the file whose change compiles the loops again.
-LEAST_FORCE = 1e-9  # N: below what single precision of the compliance resolves
+FORCE_NOISE = 1e-9  # N: below what single precision of the compliance resolves
 GAP_NOISE = 1e-9  # m: likewise
 SLIP_TOLERANCE = 0.05e-6  # m, motion of a sticking node that counts as none: a quarter of the gaps' tolerance
 LARGEST_TURN = 1.0  # rad, of a slipping node's friction in one step
@@ -164,7 +164,7 @@ def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001,
             across[a, i] = normal[node, j] * lean[node, h] - normal[node, h] * lean[node, j]
             pressing[a] += points.force[node, i] * normal[node, i]
             against[a] -= motion.slip[node, i] * lean[node, i]
-        limit[a] = friction * max(pressing[a], LEAST_FORCE)
+        limit[a] = friction * max(pressing[a], FORCE_NOISE)
         against[a] = max(against[a], 0.0) / limit[a]
     for p in range(len(curved)):
         node = at[curved[p]]
@@ -230,11 +230,11 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
         for i in range(3):
             tilted += (turned[a, i] - normal[a, i]) ** 2 * length
         sideways = np.sqrt(sideways)
-        touches = pressing >= -LEAST_FORCE if active[a] else gap[a] < -GAP_NOISE
+        touches = pressing >= -FORCE_NOISE if active[a] else gap[a] < -GAP_NOISE
         new_active[a] = touches
         changed |= (active[a] and not touches) or (not active[a] and gap[a] < -law.gap_tolerance)
         if touches and active[a]:
-            spare = LEAST_FORCE if stuck_again[a] < WAVERS else law.spare
+            spare = FORCE_NOISE if stuck_again[a] < WAVERS else law.spare
             if slips[a]:
                 new_slips[a] = slip_lean <= SLIP_TOLERANCE
             else:
@@ -254,7 +254,7 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
                 free -= (share / max(sideways, 1e-30)) ** 2
             slid = max(slid, free)
     for p in range(c):
-        touches = core[p] >= -LEAST_FORCE if active[k + p] else core_gap[p] < -GAP_NOISE
+        touches = core[p] >= -FORCE_NOISE if active[k + p] else core_gap[p] < -GAP_NOISE
         new_active[k + p] = touches
         changed |= (active[k + p] and not touches) or (not active[k + p] and core_gap[p] < -law.gap_tolerance)
     size, slid = np.sqrt(whole[0] ** 2 + whole[1] ** 2 + whole[2] ** 2), np.sqrt(max(slid, 0.0))
@@ -285,5 +285,5 @@ def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
         if far > 0:
             after.slips[a] = True
             for i in range(3):
-                force[a, i] = LEAST_FORCE * (turned[a, i] - friction * (off[a, i] - onto * normal[a, i]) / far)
+                force[a, i] = FORCE_NOISE * (turned[a, i] - friction * (off[a, i] - onto * normal[a, i]) / far)
     return wrong

@@ -134,7 +134,7 @@ class Friction:
     def _spare(self, force: np.ndarray) -> float:
         """Friction, N, that a wavering node may bear beyond its limit, of forces (k, 3) N."""
         axial = abs(float(force.sum(axis=0) @ self.pose.direction))
-        return max(WAVERING * self.friction * axial, coulomb.LEAST_FORCE)
+        return max(WAVERING * self.friction * axial, coulomb.FORCE_NOISE)
 
 
 def _in_place(found: coulomb.Sorted, *, may_be_empty: bool) -> bool:

@@ -50,7 +50,7 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
     return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap, side_gap])
 
 
-def sensing_nodes(sensor: str = "biotac") -> np.ndarray:
+def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
     """Nodes (f,) of the inner skin that are sensing points after the electrodes' feet: all that can move."""
     mesh = skin_mesh(sensor)
     return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
@@ -67,7 +67,7 @@ class ElectrodeFeet:
 
 
 @functools.cache
-def electrode_feet(sensor: str = "biotac") -> ElectrodeFeet:
+def electrode_feet(sensor: str = sensors.SOURCE) -> ElectrodeFeet:
     """Nearest point of the resting inner skin to each electrode; gaps are 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
     positions = sensors.electrodes(sensor)
     face, weights, place = unrolling.closest_on_triangles(sensors.skin_of(sensor).skin_surface("inner"), positions)

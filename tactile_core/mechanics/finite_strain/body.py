@@ -19,8 +19,7 @@ from ..solids.hex_mesh import inner_faces, outer_faces
 from ..solids.neo_hookean import NeoHookean, SplitBulkModulus
 from ..solution import Sensor
 from .newton import FiniteStrainContact
-from .solved_contact import ContactState
-from .tolerance import EXACT, Tolerance
+from .solved_contact import EXACT, ContactState, Tolerance
 
 # m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
 ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3

@@ -21,8 +21,8 @@ from ..pose_path import same_line
 from ..sharpness import sharpest
 from ..solution import OnDemand, Sensor, Solution, Step, centre_of_pressure
 from .body import FRICTION_STEP, ONE_STEP, Body, graded_body
-from .newton import FiniteStrainContact, NoEquilibriumError
-from .solved_contact import ContactState
+from .newton import FiniteStrainContact
+from .solved_contact import ContactState, NoEquilibriumError
 
 # Of the full tier's spacing, where its own mesh finds no contact: 8 of 14 rings at random depths settled then, and five
 # of five deeper than their wire's radius that had not, or had gone through.

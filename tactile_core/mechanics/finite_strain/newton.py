@@ -14,17 +14,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import BEHIND
 from ..pose_path import between
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.sparse_cholesky import DampedFactor, NotPositiveDefiniteError, PatternFactor, held_back
+from . import solved_contact
 from .contact_set import ContactSet, Obstacle, PlacedIndenter
 from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
-from .solved_contact import ContactState, guarded
-from .tolerance import EXACT, Tolerance
+from .solved_contact import EXACT, ContactState, NoEquilibriumError, NotConvergedError, Tolerance, guarded
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
 MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end (assumed)
@@ -34,17 +33,7 @@ SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halv
 # Of a node's own stiffness, of springs between nodes: stiff ones find their contact only from that of softer ones.
 _SPRING, _STIFF = 10.0, 40.0
 _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
-
-
-class NoEquilibriumError(TactileError):
-    """A path has ended: no contact was found beyond it."""
-
-
-class _NotConvergedError(Exception):
-    """A load step is too large."""
-
-
-_FAILURES = _NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError  # of a load step
+_FAILURES = NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError  # of a load step
 
 
 class FiniteStrainContact:
@@ -110,7 +99,7 @@ class FiniteStrainContact:
 
         try:
             touch = self._follow(along, begin, step / reach)
-        except _PathEndsError as end:
+        except solved_contact.PathEndsError as end:
             reached = begin.depth + end.part * reach
             found = f"no equilibrium beyond {reached * 1e3:.3f} mm"
             raise NoEquilibriumError("finite-strain solver", found, "a smaller depth") from None
@@ -125,7 +114,7 @@ class FiniteStrainContact:
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
         try:
             touch = self._follow(lambda part: between(start.pose, pose, part), start, step / max(way, turned, 1e-12))
-        except _PathEndsError as end:
+        except solved_contact.PathEndsError as end:
             found = f"no equilibrium beyond {end.part:.0%} of the way"
             raise NoEquilibriumError("finite-strain solver", found, "a shorter way, or less force") from None
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
@@ -165,7 +154,7 @@ class FiniteStrainContact:
                     continue
                 size, failures = min(size, goal - done) / 2, failures + 1
                 if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
-                    raise _PathEndsError(done) from None
+                    raise solved_contact.PathEndsError(done) from None
             else:
                 steps += 1
         return dataclasses.replace(self._stiffened(touch), steps=steps)
@@ -179,7 +168,7 @@ class FiniteStrainContact:
             _GRIP * self._factor.stiffness, self.first_share,
         )  # fmt: skip
         if (outer.normals @ pose.direction).min(initial=1.0) < BEHIND:
-            raise _NotConvergedError  # it would come to lie before the nodes that it should push
+            raise NotConvergedError  # it would come to lie before the nodes that it should push
         inner = start.inner.carried(self.core, self.inner, at)
         self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
         for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
@@ -199,9 +188,9 @@ class FiniteStrainContact:
                 return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
             sizes.append(float(np.abs(step).max()))
             if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
-                raise _NotConvergedError  # to and fro between two faces of the indenter
+                raise NotConvergedError  # to and fro between two faces of the indenter
             self._factor.relax()
-        raise _NotConvergedError
+        raise NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
         """Share of a step that leaves every Gauss point a good part of its volume; else FloatingPointError."""
@@ -278,14 +267,14 @@ class FiniteStrainContact:
         for touching in (outer, inner):
             touching.press(reaction[touching.nodes])
         loose = ~held
-        forces = (float((values[loose] * step[loose]).sum()) for values in (residual, reaction - residual))
-        slide = outer.slide_share(step[outer.nodes], *forces)
+        force, stiffness = (float((values[loose] * step[loose]).sum()) for values in (residual, reaction - residual))
+        slide = outer.slide_share(step[outer.nodes], force, stiffness)
         pulled = residual.copy()
         pulled[outer.nodes] -= outer.rubbing_in_frames()
-        imbalance = np.abs(pulled[loose]).max(initial=0.0) / max(largest, 1e-12)
+        imbalance = float(np.abs(pulled[loose]).max(initial=0.0) / max(largest, 1e-12))
+        excess_share = abs(excess) / max(self.volume, 1e-12)
         step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
-        imbalance = float(max(imbalance, abs(excess) / max(self.volume, 1e-12)))
-        return step, rise, imbalance, lines.pressure_step(step), slide
+        return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
     def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
         """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
@@ -305,18 +294,7 @@ class FiniteStrainContact:
 
 _FADING = 0.78, 0.3, 0.1, 0.03  # friction that fades, after the fast tier's own (assumed: a third each time)
 _GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
-_SHARES = 1.0, 0.5, 0.25, 0.125  # of a step
-_SAME = 1e-6  # relative, of two steps that swing to and fro (assumed)
+_SHARES, _SAME = (1.0, 0.5, 0.25, 0.125), 1e-6  # of a step; relative, of two steps that swing to and fro (assumed)
 _MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step
-
-
-class _PathEndsError(Exception):
-    """Even a small load step fails; part : of the way that was reached."""
-
-    def __init__(self, part: float) -> None:
-        super().__init__(part)
-        self.part = part
-
-
 _TURN_ARM = 5e-3  # m, lever arm at which a turn counts as travel: about a fingertip's radius

@@ -1,4 +1,4 @@
-"""A solved contact of a finite-strain solid."""
+"""A solved contact of a finite-strain solid: its state, when an iteration has found it, and errors where none has."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 
+from ...errors import TactileError
 from ...geometry.indenters import Pose
 from ..solids.finite_strain import State
 from .contact_set import ContactSet
@@ -56,3 +57,35 @@ class ContactState:
 def guarded(touch: ContactState) -> ContactState:
     """Return the same contact with a surface that keeps the indenter out between its nodes, to continue from."""
     return dataclasses.replace(touch, guarded=True)
+
+
+@dataclasses.dataclass(frozen=True)
+class Tolerance:
+    """Criteria that end an iteration.
+
+    gap : m, of every touching node; balance : of the largest nodal force and of the fluid's volume, before the last
+        step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
+    """
+
+    gap: float
+    balance: float
+    step: float = 0.0
+
+
+EXACT = Tolerance(1e-9, 1e-8, 1e-13)
+
+
+class NoEquilibriumError(TactileError):
+    """A path has ended: no contact was found beyond it."""
+
+
+class NotConvergedError(Exception):
+    """A load step is too large."""
+
+
+class PathEndsError(Exception):
+    """Even a small load step fails; part : of the way that was reached."""
+
+    def __init__(self, part: float) -> None:
+        super().__init__(part)
+        self.part = part

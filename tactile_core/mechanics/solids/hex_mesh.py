@@ -101,7 +101,7 @@ def outer_faces(mesh: HexMesh) -> np.ndarray:
 
 
 @functools.cache
-def gel_mesh(sensor: str = "digit") -> HexMesh:
+def gel_mesh(sensor: str = sensors.TARGET) -> HexMesh:
     """A sensor's gel on the lattice of its surface; the DIGIT's has about 20,000 nodes."""
     shape = sensors.shape_of(sensor)
     surface = shape.surface()
@@ -109,7 +109,7 @@ def gel_mesh(sensor: str = "digit") -> HexMesh:
 
 
 @functools.cache
-def skin_mesh(sensor: str = "biotac") -> HexMesh:
+def skin_mesh(sensor: str = sensors.SOURCE) -> HexMesh:
     """A sensor's skin on its lattice, clamped where its inner side meets the core; the BioTac's has 18,200 nodes."""
     skin = sensors.skin_of(sensor)
     return skin_solid(skin.skin_grid("outer"), skin.skin_grid("inner"), glued_skin(sensor))
@@ -121,7 +121,7 @@ def solid_mesh(sensor: str) -> HexMesh:
 
 
 @functools.cache
-def glued_skin(sensor: str = "biotac") -> np.ndarray:
+def glued_skin(sensor: str = sensors.SOURCE) -> np.ndarray:
     """Mark the inner points of the skin's grid (stations, columns) that lie on or in the core."""
     inner = sensors.skin_of(sensor).skin_grid("inner")
     return _on_core(sensor, inner.reshape(-1, 3)).reshape(inner.shape[:2])

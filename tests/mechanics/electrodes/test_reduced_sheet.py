@@ -4,7 +4,7 @@ import numpy as np
 
 from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor
 from tactile_core.mechanics.electrodes.reduced_sheet import reduced_sheet
-from tactile_core.mechanics.fast.compliance import biotac_compliance
+from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.sensing_points import sensing_nodes
 
 
@@ -34,7 +34,7 @@ def test_it_is_near_in_dented_films():
 
 
 def test_sensing_nodes_are_all_that_move_and_fill_the_sheet():
-    skin, sheet, nodes = biotac_compliance(), biotac_sheet(), sensing_nodes()
+    skin, sheet, nodes = compliance_of("biotac"), biotac_sheet(), sensing_nodes()
     assert len(skin.watch_gap) == skin.feet + len(nodes) and len(np.unique(nodes)) == len(nodes)
     np.testing.assert_array_equal(nodes[sheet.sensing], sheet.wet)
     np.testing.assert_array_equal(sheet.films_of(np.zeros(len(nodes))), np.maximum(sheet.film, film_floor("biotac")))

@@ -9,9 +9,9 @@ from benchmarks.mechanics.random_contacts import random_contacts
 from slab import slab_compliance
 
 from tactile_core.geometry.indenters import Cylinder, Sphere, pose_on
-from tactile_core.mechanics.fast.compliance import biotac_compliance, digit_compliance
+from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
-from tactile_core.mechanics.placement import Placement, biotac_pose, digit_pose
+from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.thickness import thickness_under
 from tactile_core.sensors import Material, unrolling
 
@@ -55,7 +55,10 @@ def test_linear_model_is_softer_than_finite_strain_when_deep(layer):
 
 
 def sensors_and_poses(indenter, place):
-    return [(biotac_compliance(), biotac_pose(indenter, place)), (digit_compliance(), digit_pose(indenter, place))]
+    return [
+        (compliance_of("biotac"), pose_at("biotac", indenter, place)),
+        (compliance_of("digit"), pose_at("digit", indenter, place)),
+    ]
 
 
 PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.15, 4.0)]
@@ -107,8 +110,8 @@ def test_mirrored_place_gives_mirrored_displacement():
 def test_fluid_keeps_its_volume():
     """Pressing lowers the film under the ball and lifts it at the sides: the fluid does not vanish."""
     ball = Sphere(3.5e-3)
-    skin = biotac_compliance()
-    contact = ContactProblem(skin, ball, biotac_pose(ball, PLACES[0]), 8e-4).at_depth(8e-4)
+    skin = compliance_of("biotac")
+    contact = ContactProblem(skin, ball, pose_at("biotac", ball, PLACES[0]), 8e-4).at_depth(8e-4)
     change = contact.sensing_gaps - skin.watch_gap
     assert change[17] < -0.2e-3  # E18, under the ball
     assert change[19:].max() > 0.02e-3
@@ -132,8 +135,8 @@ def test_backing_out_leaves_no_pull(depth):
 
 def test_the_inner_skin_rests_on_the_core():
     """At the side of the pad the skin is a millimetre from its core: pressed deeper it is held there."""
-    ball, skin = Sphere(3.5e-3), biotac_compliance()
-    pose = biotac_pose(ball, Placement(-8e-3, 8e-3))
+    ball, skin = Sphere(3.5e-3), compliance_of("biotac")
+    pose = pose_at("biotac", ball, Placement(-8e-3, 8e-3))
     problem = ContactProblem(skin, ball, pose, 1.2e-3)
     light, deep = problem.at_depth(0.2e-3), problem.at_depth(1.2e-3)
     assert len(light.core_nodes) == 0 and len(deep.core_nodes) > 0 and deep.converged
@@ -150,7 +153,7 @@ def test_the_inner_skin_rests_on_the_core():
 @pytest.mark.parametrize("sensor", ["biotac", "digit"])
 def test_random_contacts_settle(sensor, friction):
     """All nine indenters; the whole count is made by a script. One of them may fail, and must say so."""
-    compliance, pose_of = {"biotac": (biotac_compliance, biotac_pose), "digit": (digit_compliance, digit_pose)}[sensor]
+    compliance, pose_of = {"biotac": (compliance_of, pose_at), "digit": (compliance_of, pose_at)}[sensor]
     compliance = compliance()
     settled = []
     for drawn in random_contacts(18, seed=3):
@@ -168,9 +171,9 @@ def test_random_contacts_settle(sensor, friction):
 def test_nodes_that_waver_settle(number, friction):
     """A node seen too far from the foot of its bump to have two faces; one at an edge that slips back as it slips."""
     *_, drawn = random_contacts(number + 1)
-    pose = digit_pose(drawn.indenter, drawn.place)
+    pose = pose_at("digit", drawn.indenter, drawn.place)
     depth = drawn.depth * thickness_under("digit", drawn.indenter, pose)
-    problem, contact = ContactProblem(digit_compliance(), drawn.indenter, pose, depth, friction), None
+    problem, contact = ContactProblem(compliance_of("digit"), drawn.indenter, pose, depth, friction), None
     for share in np.arange(1, 11) / 10:
         contact = problem.at_depth(share * depth, contact)
         assert contact.converged

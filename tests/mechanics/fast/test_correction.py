@@ -9,10 +9,10 @@ from benchmarks.make import learn_correction
 from tactile_core.files.shipped import shipped
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.fast import correction
-from tactile_core.mechanics.fast.compliance import digit_compliance
-from tactile_core.mechanics.fast.correction import LINES, MIRRORED, Frame, correct, features, frame
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.correction import LINES, MIRRORED, PatchFrame, correct, features, frame
 from tactile_core.mechanics.fast.press import FORCE_TOLERANCE, CorrectedPress
-from tactile_core.mechanics.placement import Placement, digit_pose
+from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.sensors import sensor_surface
 
 BALL = Sphere(3.5e-3)
@@ -20,7 +20,9 @@ REST = np.zeros_like(sensor_surface("digit").rest)
 
 
 def press(z=1.5e-3, tilt=0.2, heading=0.7):
-    return CorrectedPress(digit_compliance(), BALL, digit_pose(BALL, Placement(-8e-3, z, tilt, heading)), 2e-3)
+    return CorrectedPress(
+        compliance_of("digit"), BALL, pose_at("digit", BALL, Placement(-8e-3, z, tilt, heading)), 2e-3
+    )
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +39,7 @@ def test_the_shipped_file_is_small_finite_and_whole():
 
 
 def test_a_field_is_spread_where_it_belongs_and_fades():
-    at = Frame(np.array([-8e-3, 1e-3]), 1e-3)
+    at = PatchFrame(np.array([-8e-3, 1e-3]), 1e-3)
     field = np.zeros((LINES, LINES, 3))
     field[LINES // 2, LINES // 2, 1] = -1.0  # outward at the centre
     moved = correction.add_field("digit", REST, at, field.reshape(-1, 3), 1.0)
@@ -47,7 +49,7 @@ def test_a_field_is_spread_where_it_belongs_and_fades():
 
 
 def test_a_field_on_the_nodes_survives_the_way_to_the_grid_and_back():
-    at = Frame(np.array([-8e-3, 0.5e-3]), 1.5e-3)
+    at = PatchFrame(np.array([-8e-3, 0.5e-3]), 1.5e-3)
     plane = correction.plane("digit")
     bump = np.exp(-((plane - at.centre) ** 2).sum(axis=1) / (2 * (2e-3) ** 2))
     field = np.stack([0.3 * bump, bump, -0.2 * bump], -1)
@@ -58,7 +60,7 @@ def test_a_field_on_the_nodes_survives_the_way_to_the_grid_and_back():
 
 def test_features_of_a_mirrored_contact_are_mirrored():
     pair = [press(z, 0.2, heading).at_depth(0.5e-3).linear for z, heading in ((1.5e-3, 0.7), (-1.5e-3, -0.7))]
-    first, second = (features(digit_compliance(), c, frame(digit_compliance(), c)) for c in pair)
+    first, second = (features(compliance_of("digit"), c, frame(compliance_of("digit"), c)) for c in pair)
     np.testing.assert_allclose(second, first * MIRRORED, atol=2e-3)  # the first touch is found to a micrometre
 
 
@@ -71,11 +73,11 @@ def test_force_asked_for_is_the_corrected_one(contact):
 
 def test_learning_recovers_a_known_factor_and_field(contact):
     """Presses whose truth is a smooth function of the contact: the regression finds most of it on presses apart."""
-    compliance, samples = digit_compliance(), []
+    compliance, samples = compliance_of("digit"), []
     random = np.random.default_rng(0)
     for number in range(40):
         place = Placement(random.uniform(-12e-3, -4e-3), random.uniform(-3e-3, 3e-3))
-        run = CorrectedPress(compliance, BALL, digit_pose(BALL, place), 2e-3)
+        run = CorrectedPress(compliance, BALL, pose_at("digit", BALL, place), 2e-3)
         found = run.at_depth(random.uniform(0.2e-3, 0.9e-3)).linear
         at = frame(compliance, found)
         x = features(compliance, found, at)

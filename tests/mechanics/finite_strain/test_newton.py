@@ -7,7 +7,8 @@ from slab import slab_mesh
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Pose, Sphere, pose_on
 from tactile_core.mechanics.finite_strain import newton
-from tactile_core.mechanics.finite_strain.newton import MOST_FAILURES, FiniteStrainContact, NoEquilibriumError
+from tactile_core.mechanics.finite_strain.newton import MOST_FAILURES, FiniteStrainContact
+from tactile_core.mechanics.finite_strain.solved_contact import NoEquilibriumError
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solve import solve
