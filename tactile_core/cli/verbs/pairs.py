@@ -62,16 +62,14 @@ def run(options: argparse.Namespace) -> int:
     check_seed(options.seed)
     from ...jobs import pairs, plan, results
     from ...jobs.engine import result_parts
-    from ...sensors import PAIR
     from ...simulation.pairs_file import KEEPABLE
 
     pair = options.source, options.target
     keep = () if options.keep is None else results.parse_words(options.keep, tuple(KEEPABLE))
     if options.plan:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
-        if pair == PAIR:  # of others no cost was measured
-            for line in plan.of_pairs(options.count).lines():
-                say(line)
+        for line in plan.of_pairs(options.count, pair).lines():
+            say(line)
         engine.tell_planned_parts(result_parts.write(options.out, job))
         return 0
     place = engine.place_or_none(options)
