@@ -51,6 +51,7 @@ LIBRARIES = (
     Library("scipy", "scipy", "fem", "contact mechanics (tactile simulate, pairs, mesh --press)"),
     Library("trimesh", "trimesh", "fem", "indenters from mesh files"),
     Library("cholespy", "cholespy", "fem", "solid mechanics"),
+    Library("numba", "numba", "fem", "compiled contacts, and pictures"),
     Library("pypardiso", "pypardiso", "mkl", "faster solid mechanics"),
     Library("rosbags", "rosbags", "ros", "ROS bags and MCAP"),
     Library("distributed", "distributed", "batch", "batches on many machines (tactile batch --cluster)"),
