@@ -123,8 +123,12 @@ def inputs(tmp_path_factory) -> Path:
     for name, frames in (("touch.csv", 80), ("day1/a.csv", 80), ("day2/b.csv", 80), ("touches/1.csv", None)):
         (folder / name).parent.mkdir(exist_ok=True)
         write_touch(folder / name, frames)
-    own = (folder / "touch.csv").read_text(encoding="utf-8").replace("ele", "Taxel ").replace("timestamp", "t")
-    (folder / "own.csv").write_text(own, encoding="utf-8")
+    with (
+        h5py.File(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5") as file,
+        h5py.File(folder / "own.h5", "w") as own,
+    ):
+        own["trial_1/finger_0/electrode_data"] = np.rint(file["electrodes"][:80])
+        own["trial_1/stamps"] = 10**7 * np.arange(80)  # ns
     (folder / "slips").mkdir()
     for name in ("n1", "n2", "s1"):  # of a BioTac SP
         counts = np.random.default_rng(0).integers(2600, 3700, (30, 24))

@@ -129,7 +129,7 @@ def biotac_sp(lines: list[str]) -> list[str]:
 # What a user can give `convert`: how the file is damaged, the exit status, and words of the message or warning.
 DAMAGES = {
     "truncated": (truncated, 0, "line 151"),
-    "missing column": (without_ele7, 2, "ele7"),
+    "missing electrode": (without_ele7, 0, "no readings of E7"),
     "text cell": (text_cell, 0, "line 11, ele3"),
     "empty": (lambda lines: [], 2, "empty"),
     "header only": (lambda lines: lines[:1], 2, "without data rows"),
