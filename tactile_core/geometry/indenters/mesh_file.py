@@ -25,6 +25,9 @@ EXTENT_MM = (0.2, 100.0)  # an indenter for a fingertip; outside of it the unit 
 _UNITS = {"metres": 1.0, "inches": 0.0254, "centimetres": 1e-2, "millimetres": 1e-3, "micrometres": 1e-6}
 _COPLANAR = 1e-9  # of the longest edge cubed: volumes below are those of coplanar points and of touching ones
 _PAIRS = 200_000  # candidate pairs looked at together: about 150 MB
+_ROUNDING = 1e-5  # of the largest coordinate: twice what six digits of text round off
+_LARGEST_GAP = 1e-4  # of the body, whose coordinates may be far from zero (assumed)
+_WELDED = 8  # nearest vertices that one is united with; chains of them reach further
 _LOWEST_MM = 1e-4  # vertices this near to the lowest one belong to one flat
 
 
@@ -71,11 +74,27 @@ def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLik
     check_size(where, np.ptp(vertices, axis=0).max(), scale)
     mesh = trimesh.Trimesh(vertices * (scale * 1e3), faces, process=False)
     mesh.merge_vertices()
+    if not mesh.is_watertight:
+        mesh = trimesh.Trimesh(*_welded(mesh.vertices, mesh.faces), process=False)
     corners = np.sort(mesh.faces, axis=1)
     mesh.update_faces((corners[:, 0] < corners[:, 1]) & (corners[:, 1] < corners[:, 2]))
     mesh.remove_unreferenced_vertices()
     _check_solid(where, mesh)
     return mesh
+
+
+def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unite vertices (n, 3) that differ by rounding alone; returns those that are left, and faces (m, 3) of them."""
+    import scipy.sparse
+    import scipy.spatial
+
+    within = min(_ROUNDING * np.abs(vertices).max(), _LARGEST_GAP * np.ptp(vertices, axis=0).max())
+    tree = scipy.spatial.cKDTree(vertices)
+    near = tree.query(vertices, min(_WELDED, tree.n), distance_upper_bound=within)[1].reshape(tree.n, -1)
+    one, other = np.nonzero(near < tree.n)
+    graph = scipy.sparse.coo_array((np.ones(len(one)), (one, near[one, other])), (tree.n, tree.n))
+    label = scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
+    return vertices[np.unique(label, return_index=True)[1]], label[faces]
 
 
 def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]:
@@ -132,9 +151,9 @@ def check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
     smallest, largest = EXTENT_MM
     if smallest <= extent * scale * 1e3 <= largest:
         return
-    fitting = [f"{name} (scale {unit:g} m)" for name, unit in _UNITS.items() if 1 <= extent * unit * 1e3 <= 50]
+    fitting = [f"{name} (unit_mm = {unit * 1e3:g})" for name, unit in _UNITS.items() if 1 <= extent * unit * 1e3 <= 50]
     advice = f"The file seems to be in {' or '.join(fitting)}" if fitting else "Scale it to the size of an indenter"
-    found = f"{extent * scale * 1e3:.4g} mm across with {scale:g} m a unit"
+    found = f"{extent * scale * 1e3:.4g} mm across with unit_mm = {scale * 1e3:g}"
     raise TactileError(where, found, f"{smallest:g} to {largest:g} mm", advice)
 
 

@@ -10,10 +10,13 @@ import numpy as np
 
 from ...errors import TactileError
 from .spline_grid import SplineGrid
+from .tip_grid import BAND, TipGrid
 
 MARGIN = 1e-3  # m, how far the grid reaches beyond the body
 MAX_NODES = 8_000_000  # 32 MB kept, about 300 MB while it is built
 _STEP_UP = 1.1  # step in the search of a spacing
+REACH = 5e-3  # m above the lowest point: deeper than any dent of a gel or skin (assumed)
+_STEM = 4  # times the spacing, at least, beyond what may touch
 _SPARE = 6  # nodes more on every side while the spline is fitted: what it assumes at its ends fades by 0.27 a node
 _FINEST = 0.1e-3  # m: finer than the nodes of either sensor
 _CHECKED = 500  # points near the surface at which the error is measured
@@ -26,26 +29,41 @@ _COARSER = 4
 _BESIDE = ((1.234e-4, 0.876e-4), (-0.543e-4, 1.567e-4), (0.987e-4, -1.654e-4))
 
 
-def finest(extent: np.ndarray) -> float:
-    """Return the spacing, m, of the finest grid that a body of extent (3,) m fits in, 0.1 mm at least."""
-    spacing = _FINEST
-    while np.prod(np.ceil((extent + 2 * MARGIN) / spacing) + 3 + 2 * _SPARE) > MAX_NODES:
+def finest(extent: np.ndarray, spacing: float = _FINEST) -> float:
+    """Return the spacing, m, of the finest grid that a body of extent (3,) m fits in, at least the one given."""
+    while np.prod(_shape(extent, spacing)) > MAX_NODES:
         spacing *= _STEP_UP
     return float(np.round(spacing, 8))
 
 
-def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid:
+def _shape(extent: np.ndarray, spacing: float) -> tuple[int, ...]:
+    """Nodes along x, y and z of the grid of a body of extent (3,) m while its spline is fitted."""
+    return tuple(int(n) + 3 + 2 * _SPARE for n in np.ceil((extent + 2 * MARGIN) / spacing))
+
+
+def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid | TipGrid:
     """Build the grid of a solid mesh's signed distance (a trimesh, mm).
 
-    where : names the mesh in messages; spacing : m
-    Raises TactileError for a grid of more than MAX_NODES nodes, and for a mesh that overlaps itself.
+    where : names the mesh in messages; spacing : m. Where the whole body takes more than MAX_NODES nodes, it is that of
+        its lowest REACH, which may touch; the rest has a coarser one.
+    Raises TactileError where that takes too many, too, and for a mesh that overlaps itself.
     """
+    extent = np.ptp(mesh.bounds, axis=0) * 1e-3
+    if np.prod(_shape(extent, spacing)) <= MAX_NODES:
+        return _grid(mesh, where, spacing, extent)
+    tip = np.minimum(extent, [np.inf, np.inf, REACH + BAND])
+    _check_memory(where, _shape(tip, spacing), spacing)
+    coarse = _grid(mesh, where, finest(extent, _STEM * spacing), extent)
+    return TipGrid(_grid(mesh, where, spacing, tip), coarse, mesh.bounds[0, 2] * 1e-3 + REACH)
+
+
+def _grid(mesh: Any, where: str | os.PathLike, spacing: float, extent: np.ndarray) -> SplineGrid:
+    """Build the grid of what lies in the extent (3,) m above the mesh's lower bounds."""
     import scipy.ndimage
 
-    lower, extent = mesh.bounds[0] * 1e-3 - MARGIN, np.ptp(mesh.bounds, axis=0) * 1e-3 + 2 * MARGIN
-    shape = tuple(int(n) + 3 + 2 * _SPARE for n in np.ceil(extent / spacing))
-    _check_memory(where, shape, spacing)
-    origin = lower - spacing * (1 + _SPARE)  # the outermost node that is kept lies outside of the known box
+    shape = _shape(extent, spacing)
+    # The outermost node that is kept lies outside of the known box.
+    origin = mesh.bounds[0] * 1e-3 - MARGIN - spacing * (1 + _SPARE)
     distance = _signed(mesh, where, origin * 1e3, spacing * 1e3, shape) * 1e-3
     coefficients = scipy.ndimage.spline_filter(distance, order=3, output=np.float64, mode="mirror")
     kept = np.ascontiguousarray(coefficients[(slice(_SPARE, -_SPARE),) * 3], np.float32)
@@ -56,9 +74,9 @@ def _check_memory(where: str | os.PathLike, shape: tuple[int, ...], spacing: flo
     excess = np.prod(shape) / MAX_NODES
     if excess > 1:
         least = np.ceil(spacing * excess ** (1 / 3) * 1e5 + 1) / 1e2  # mm, and a little more
-        found = f"a grid of {np.prod(shape) / 1e6:.0f} million nodes"
+        found = f"a grid of {np.prod(shape) / 1e6:.0f} million nodes with spacing_mm = {spacing * 1e3:g}"
         expected = f"at most {MAX_NODES // 10**6} million (32 MB)"
-        raise TactileError(where, found, expected, f"Take a spacing of {least:g} mm or a smaller part of the body")
+        raise TactileError(where, found, expected, f"Give it spacing_mm = {least:g}, or a narrower part")
 
 
 def _signed(
@@ -73,16 +91,19 @@ def _signed(
     return signed(mesh.triangles, origin, spacing, within)
 
 
-def error_of(mesh: Any, distance: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def error_of(
+    mesh: Any, distance: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], top: float = np.inf
+) -> np.ndarray:
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
 
-    Measured at random places over its area, up to 0.3 mm inside and outside. The signs are checked by counting how
-    often a ray from there meets the mesh.
+    Measured at random places over its area, of triangles that reach below the height ``top``, m, up to 0.3 mm inside
+    and outside. The signs are checked by counting how often a ray from there meets the mesh.
     """
     import trimesh
 
     random = np.random.default_rng(0)
-    face = random.choice(len(mesh.faces), _CHECKED, p=mesh.area_faces / mesh.area_faces.sum())
+    area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
+    face = random.choice(len(mesh.faces), _CHECKED, p=area / area.sum())
     weights = random.dirichlet([1, 1, 1], _CHECKED)
     points = np.einsum("nk,nkd->nd", weights, mesh.triangles[face])
     points += mesh.face_normals[face] * random.uniform(-_CHECKED_WITHIN_MM, _CHECKED_WITHIN_MM, (_CHECKED, 1))

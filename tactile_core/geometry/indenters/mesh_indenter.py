@@ -22,11 +22,12 @@ from ...files.short_text import Summary
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
 from .spline_grid import SplineGrid
+from .tip_grid import TipGrid
 
 log = logging.getLogger(__name__)
-_FORMAT = 1  # raise when the meaning of the cached arrays changes
+_FORMAT = 2  # raise when the meaning of the cached arrays changes
 _ROOM = "40 MB"
-_ARRAYS = ("coefficients", "origin", "hull", "error")
+_ARRAYS = ("coefficients", "origin", "hull", "error", "stem", "stem_place")  # the last two are empty for one grid
 _SPACING = (0.01e-3, 1e-3)  # m
 _FLATTEST = 0.5  # flatter than at any edge: deep inside, where opposite faces are equally near
 _LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
@@ -49,11 +50,11 @@ class MeshIndenter(Summary, Indenter):
     about one grid spacing. Normals and curvatures are exactly those of the spline's level
     surfaces.
 
-    grid : the spline, m; hull : (k, 3) m, vertices of the mesh's convex hull
+    grid : the spline, m, fine where the body may touch; hull : (k, 3) m, vertices of the mesh's convex hull
     error : rms and largest difference, m, of ``distance`` from the mesh's, measured within 0.3 mm of it
     """
 
-    grid: SplineGrid
+    grid: SplineGrid | TipGrid
     hull: np.ndarray
     error: tuple[float, float]
 
@@ -65,7 +66,8 @@ class MeshIndenter(Summary, Indenter):
         """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once (up to a minute) and cached on disk.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
-        spacing : m, of the grid; the body's lowest point, or the middle of its lowest flat, becomes the own origin.
+        spacing : m, of the grid; of a body of more than 8 million nodes, that of its lowest 5 mm, and coarser above
+            The body's lowest point, or the middle of its lowest flat, becomes the own origin.
             Raises TactileError for anything that is no closed, outward, uncrossed surface of an indenter's size;
             ModuleNotFoundError without the extra [fem].
         """
@@ -111,14 +113,16 @@ class MeshIndenter(Summary, Indenter):
             log.info("building the distance grid of %s in %s (up to a minute, once)", where, folder)
             mesh = make()
             built = cls(mesh_grid.build(mesh, where, spacing), _hull(mesh), (0.0, 0.0))
-            error = mesh_grid.error_of(mesh, built.distance)
+            error = mesh_grid.error_of(mesh, built.distance, getattr(built.grid, "top", np.inf))
             log.info("%s: distance within %.1f um rms, %.1f um at most", where, *(error * 1e6))
-            arrays = (built.grid.coefficients, built.grid.origin, built.hull, error)
             array_cache.claim(folder, _ROOM)
-            array_cache.store(folder, dict(zip(_ARRAYS, arrays, strict=True)), _ROOM)
+            array_cache.store(folder, _arrays_of(built, error), _ROOM)
             arrays = _load(folder)
-        coefficients, origin, hull, error = arrays
-        return cls(SplineGrid(origin, spacing, coefficients), hull, tuple(error.tolist()))
+        coefficients, origin, hull, error, stem, stem_place = arrays
+        grid: SplineGrid | TipGrid = SplineGrid(origin, spacing, coefficients)
+        if len(stem):
+            grid = TipGrid(grid, SplineGrid(stem_place[:3], float(stem_place[3]), stem), float(stem_place[4]))
+        return cls(grid, hull, tuple(error.tolist()))
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``: the spline's value, and the unit normal of its level surface.
@@ -141,6 +145,15 @@ class MeshIndenter(Summary, Indenter):
         return self.hull[reach > reach.max() - _LEVEL].mean(axis=0)
 
 
+def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what the cache keeps, by its names. stem_place : the coarse grid's origin and spacing, the tip's top"""
+    fine, stem, place = built.grid, np.zeros((0, 0, 0), np.float32), np.zeros(0)
+    if isinstance(fine, TipGrid):
+        coarse = fine.coarse
+        fine, stem, place = fine.fine, coarse.coefficients, np.array([*coarse.origin, coarse.spacing, fine.top])
+    return dict(zip(_ARRAYS, (fine.coefficients, fine.origin, built.hull, error, stem, place), strict=True))
+
+
 def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Length (n,) of slopes (n, 3), at least _FLATTEST, and unit normals (n, 3) along them."""
     length = np.linalg.norm(slope, axis=1)
@@ -152,11 +165,11 @@ def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> None:
     if not (np.isfinite(scale) and scale > 0):
-        raise TactileError(path, f"scale {scale!r}", "metres per unit of the file, above zero")
+        raise TactileError(path, f"unit_mm = {scale * 1e3:g}", "millimetres per unit of the file, above zero")
     if up not in mesh_file.UPS:
-        raise TactileError(path, f"up {up!r}", f"one of {', '.join(mesh_file.UPS)}")
+        raise TactileError(path, f"up = {up!r}", f"one of {', '.join(mesh_file.UPS)}")
     if not _SPACING[0] <= spacing <= _SPACING[1]:
-        raise TactileError(path, f"a grid spacing of {spacing * 1e3:g} mm", "0.01 to 1 mm")
+        raise TactileError(path, f"spacing_mm = {spacing * 1e3:g}", "0.01 to 1 mm")
 
 
 def _hull(mesh: Any) -> np.ndarray:

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from tactile_core.files.cache import cache_folder
-from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh_indenter, pose_on
+from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh_grid, mesh_indenter, pose_on
 
 BALL = Sphere(2.5e-3)
 SPACING = 0.2e-3
@@ -153,3 +153,64 @@ def test_public_meshes_build(outside_data):
     points = np.random.default_rng(5).uniform(-1.5e-3, 1.5e-3, (200, 3)) * [1, 1, 0.3]
     exact, _ = Sphere(3.5e-3).distance(points)
     assert np.abs(indenter.distance(points)[0] - exact).max() < 40e-6  # its facets of 0.8 mm lie 24 um under the ball
+
+
+def stem_file(folder, width=16.0, height=20.0, cells=40):
+    """A square stem, mm, as of FOTS's set, whose lower face has waves of 0.5 mm."""
+    x = np.linspace(-width / 2, width / 2, cells + 1)
+    low = np.array([(a, b, 0.25 * np.sin(2 * a) * np.cos(2 * b)) for a in x for b in x])
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    right, up = cells + 1, 1
+    faces = np.concatenate([
+        np.stack([corner, corner + up, corner + right], axis=1),
+        np.stack([corner + right, corner + up, corner + right + up], axis=1),
+    ])  # fmt: skip
+    rim = trimesh.Trimesh(low, faces, process=False)
+    edges = rim.edges[trimesh.grouping.group_rows(rim.edges_sorted, require_count=1)]
+    top = low * [1, 1, 0] + [0, 0, height]
+    n = len(low)
+    sides = [(np.c_[edges[:, 1], edges[:, 0], edges[:, 0] + n]), (np.c_[edges[:, 1], edges[:, 0] + n, edges[:, 1] + n])]
+    body = trimesh.Trimesh(np.concatenate([low, top]), np.concatenate([faces, faces[:, ::-1] + n, *sides]))
+    assert body.is_volume
+    body.export(folder / "stem.stl")
+    return folder / "stem.stl"
+
+
+def test_a_large_stem_has_a_fine_tip_and_a_coarse_rest(tmp_path, monkeypatch):
+    monkeypatch.setattr(mesh_grid, "MAX_NODES", 300_000)  # a stem of 16 x 16 x 20 mm exceeds the true one at 0.1 mm
+    path = stem_file(tmp_path)
+    made = MeshIndenter.from_file(path, spacing=0.3e-3)
+    assert made.grid.fine.spacing == 0.3e-3 and made.grid.coarse.spacing >= 1.2e-3
+    assert made.error[0] < 60e-6  # m: edges are rounded over a spacing of 0.3 mm, near the tip alone
+    middle = np.array([*(made.hull.min(axis=0) + made.hull.max(axis=0))[:2] / 2, 0])  # the lowest flat is beside it
+    points = middle + np.random.default_rng(0).uniform([-7e-3, -7e-3, 3e-3], [7e-3, 7e-3, 9e-3], (200, 3))
+    value = made.distance(points)[0]
+    to_side = np.abs(points - middle)[:, :2].max(axis=1) - 8e-3
+    assert (value < 0).all()
+    near = to_side > -1.5e-3  # deeper, grids four times coarser are interpolated
+    np.testing.assert_allclose(value[near], to_side[near], atol=60e-6)
+    step, axis = 1e-6, np.eye(3)
+    ahead = [made.grid.value_and_gradient(points + step * each)[0] for each in axis]
+    back = [made.grid.value_and_gradient(points - step * each)[0] for each in axis]
+    slope = made.grid.value_and_gradient(points)[1]
+    np.testing.assert_allclose((np.array(ahead) - back).T / (2 * step), slope, atol=1e-3)
+    ahead = [made.grid.value_and_gradient(points + step * each)[1] for each in axis]
+    back = [made.grid.value_and_gradient(points - step * each)[1] for each in axis]
+    bend = made.grid.gradient_and_hessian(points)[1]
+    np.testing.assert_allclose(np.moveaxis(np.array(ahead) - back, 0, 1) / (2 * step), bend, atol=1, rtol=1e-2)
+    again = MeshIndenter.from_file(path, spacing=0.3e-3)  # from the cache
+    np.testing.assert_array_equal(again.distance(points)[0], value)
+
+
+@pytest.mark.parametrize("gap", [2e-6, 2e-5])
+def test_gaps_of_rounding_are_welded(gap, tmp_path):
+    """Each triangle has corners of its own, mm apart by what numbers of four bytes or six digits leave."""
+    ball = trimesh.creation.icosphere(3, 2.5)
+    corners = ball.triangles.reshape(-1, 3) + np.random.default_rng(0).uniform(
+        -gap / 2, gap / 2, (3 * len(ball.faces), 3)
+    )
+    loose = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+    loose.export(tmp_path / "ball.off", digits=12)
+    made = MeshIndenter.from_file(tmp_path / "ball.off", spacing=0.3e-3)
+    value = made.distance(np.array([[0.0, 0, 0], [2e-3, 0, 2.5e-3]]))[0]
+    np.testing.assert_allclose(value, [0, -0.5e-3], atol=60e-6)

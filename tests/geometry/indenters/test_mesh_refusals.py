@@ -79,7 +79,7 @@ def nan_vertex():
         (lambda: both(sphere(), sphere(at=(1, 0, 0))), "overlap"),  # mirrored, so that edges meet edges alone
         (lambda: both(sphere(), sphere(1.0)), "overlap"),  # a ball in a ball, both solid
         (shifted_in_plane, "two triangles|overlap"),
-        (lambda: sphere(2e-3), r"0.004 mm across.*in metres \(scale 1 m\)"),
+        (lambda: sphere(2e-3), r"0.004 mm across.*unit_mm = 1; .*in metres \(unit_mm = 1000\)"),
         (lambda: sphere(2e3), r"4000 mm across.*in micrometres"),
         (lambda: sphere(0.05), "Scale it|inches|centimetres"),
         (nan_vertex, "nan or infinite"),
@@ -124,12 +124,12 @@ def test_missing_file(tmp_path):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"scale": 0.0}, "scale"),
-        ({"scale": float("nan")}, "scale"),
-        ({"up": "w"}, "one of x, y, z"),
+        ({"scale": 0.0}, "unit_mm = 0"),
+        ({"scale": float("nan")}, "unit_mm = nan"),
+        ({"up": "w"}, "up = 'w'; expected one of x, y, z"),
         ({"spacing": 1e-6}, "0.01 to 1 mm"),
         ({"spacing": float("nan")}, "0.01 to 1 mm"),
-        ({"spacing": 0.02e-3}, r"million nodes.*Take a spacing of 0.05 mm"),
+        ({"spacing": 0.02e-3}, r"million nodes with spacing_mm = 0.02.*Give it spacing_mm = 0.0\d"),
     ],
 )
 def test_bad_settings_are_refused(ball_file, settings, said):
