@@ -153,11 +153,9 @@ def test_the_inner_skin_rests_on_the_core():
 @pytest.mark.parametrize("sensor", ["biotac", "digit"])
 def test_random_contacts_settle(sensor, friction):
     """All nine indenters; the whole count is made by a script. One of them may fail, and must say so."""
-    compliance, pose_of = {"biotac": (compliance_of, pose_at), "digit": (compliance_of, pose_at)}[sensor]
-    compliance = compliance()
-    settled = []
+    compliance, settled = compliance_of(sensor), []
     for drawn in random_contacts(18, seed=3):
-        pose = pose_of(drawn.indenter, drawn.place)
+        pose = pose_at(sensor, drawn.indenter, drawn.place)
         depth = drawn.depth * thickness_under(sensor, drawn.indenter, pose)
         contact = ContactProblem(compliance, drawn.indenter, pose, depth, friction).at_depth(depth)
         settled.append(contact.converged)
