@@ -198,6 +198,9 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     warnings += polarity.warnings
     change = change.then(partial(np.multiply, polarity.sign))
     pdc = _pressure_change(recording, kind, quiet, unit_rest)
+    if recording.pdc is not None and not np.isfinite(recording.pdc).all():
+        unread = int(np.sum(~np.isfinite(recording.pdc)))
+        warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
     typical = change.then(lambda each: _typical(each, kind, at_start, recording.sensor))
     flags, doubt = contact_law.flagged(typical, kind, quiet.mask, flags, pdc, recording.sensor)
     report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired

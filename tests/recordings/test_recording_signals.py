@@ -224,3 +224,11 @@ def test_a_long_recording_is_prepared_in_few_times_its_own_memory(press):
     finally:
         tracemalloc.stop()
     assert peak < 6 * electrodes.nbytes  # 4.9 measured; 9 with the sums
+
+
+def test_a_pressure_that_is_no_number_is_said(make):
+    recording = make_recording(make())
+    recording.pdc[:7] = np.nan
+    signals = recordings.prepare(recording)
+    assert f"PDC has no number in 7 of {len(recording)} frames" in "\n".join(signals.warnings)
+    assert np.isnan(signals.pdc[:7]).all() and np.isfinite(signals.pdc[7:]).all()
