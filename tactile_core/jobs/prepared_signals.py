@@ -70,15 +70,16 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
     """
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
-    if checksummed.verified_checksum(file) is not None:
-        return len(Prepared(file)), False
+    frames = checksummed.stated_rows(file)
+    if frames is not None and checksummed.verified_checksum(file) is not None:
+        return frames, False
     digest, size = content_hash(Path(one.path))
     if (digest, size) != (one.sha256, one.bytes):
         found = "another content than when the job was made"
         raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
     with atomic.new_file(file, shared=True) as partial:
         count = _write(partial, job, one.path, digest)
-        checksummed.write_checksum(partial)
+        checksummed.write_checksum(partial, rows=count)
     return count, True
 
 

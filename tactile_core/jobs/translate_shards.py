@@ -90,12 +90,18 @@ def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict
 def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts | None:
     """Return the shards, frames and warnings of a prepared recording."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
-    try:
-        about = Prepared(file).about()
-    except TactileError:  # none yet, or a damaged one, which the next run makes again
+    frames = checksummed.stated_rows(file)
+    if frames is None:  # none yet, or a damaged one, which the next run makes again
         return None
-    frames, kb = about["frames"], sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
-    return InputFacts(count(frames, job), frames, tuple(about["warnings"]), int(1e3 * kb * frames))
+    kb = sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
+    return InputFacts(count(frames, job), frames, lambda: _warnings(file), int(1e3 * kb * frames))
+
+
+def _warnings(file: Path) -> tuple[str, ...]:
+    try:
+        return tuple(Prepared(file).about()["warnings"])
+    except TactileError:  # damaged since; `--verify` says so
+        return ()
 
 
 @functools.lru_cache(maxsize=2)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+from collections.abc import Callable
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -29,14 +30,15 @@ MODULES: dict[Any, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class InputFacts:
-    """Facts known of an input. shards : their number; frames : of a recording; warnings : to report
+    """Facts known of an input. shards : their number; frames : of a recording
 
+    warnings : reads those to report, which takes longer than the rest
     bytes : about, of all its shards; 0 where that is not known before they are there
     """
 
     shards: int
     frames: int = 0
-    warnings: tuple[str, ...] = ()
+    warnings: Callable[[], tuple[str, ...]] = tuple
     bytes: int = 0
 
 

@@ -141,4 +141,4 @@ def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
         digest = checksummed.stated_checksum(path)
         if digest is not None:
             listed["shards"].append({"file": path.name, "sha256": digest})
-    return listed | {"warnings": list(seen.warnings)}
+    return listed | {"warnings": list(seen.warnings())}

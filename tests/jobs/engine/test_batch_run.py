@@ -75,6 +75,12 @@ def test_what_is_told_of_a_recording_is_checked(finished, about):
         data["about"] = np.frombuffer(about, np.uint8)
     with pytest.raises(TactileError, match="a prepared recording"):
         prepared_signals.Prepared(file).read(np.arange(1))
+    assert checksummed.verified_checksum(file) is None  # so that the next run makes it again
+    with open(file, "r+b") as spoiled:
+        spoiled.seek(len(checksummed.MAGIC) + 65)  # another number of frames
+        spoiled.write(b"7")
+    assert checksummed.verified_checksum(file) is None
+    file.unlink()
     assert manifest.status(folder, job).prepared == len(job.inputs) - 1
 
 
