@@ -145,8 +145,9 @@ def _still(readings: np.ndarray) -> np.ndarray:
     for j in range(readings.shape[1]):
         change = np.diff(readings[:, j]) != 0
         bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
-        for first, last in zip(bounds, bounds[1:], strict=False):
-            if last - first >= DEAD_FRAMES and (last - first == len(readings) or _moves(readings[first:last])):
+        for run in np.flatnonzero(np.diff(bounds) >= DEAD_FRAMES):
+            first, last = bounds[run], bounds[run + 1]
+            if last - first == len(readings) or _moves(readings[first:last]):
                 still[first:last, j] = True
         moving = ~still[1:, j]
         if moving.any() and change[moving].mean() < NOISY:
