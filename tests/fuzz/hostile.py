@@ -257,7 +257,7 @@ def good_prepared() -> bytes:
 
 def read_prepared(path: Path) -> None:
     found = prepared_signals.Prepared(path)
-    len(found), found.rows(0, 4)
+    len(found), found.read(np.arange(4))
 
 
 def loaders(folder: Path) -> dict[str, tuple[bytes, Loader]]:

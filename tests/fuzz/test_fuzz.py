@@ -20,7 +20,7 @@ found.loader.exec_module(hostile)
 NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
     *("scene", "calibration", "photograph", "sensor", "gel", "dome", "list", "queue", "heights", "exr"),
-    *("tet", "obj", "stl", "ply", "off"),
+    *("obj", "stl", "ply", "off"),
     *("safetensors", "weights_card", "job", "pairs", "prepared", "seal"),
 ]
 FEW = settings(

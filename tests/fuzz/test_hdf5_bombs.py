@@ -198,7 +198,7 @@ def test_prepared_recordings_are_looked_at_first(make, words, tmp_path):
 
 
 def rows_of(path):
-    prepared_signals.Prepared(path).rows(0, 4)
+    prepared_signals.Prepared(path).read(np.arange(4))
 
 
 def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
