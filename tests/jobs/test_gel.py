@@ -311,7 +311,7 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
     for mesh, words in ((cut, "not closed"), (huge, "5000000 triangles"), ("ball", "trimesh"), (None, "trimesh")):
         with pytest.raises(TactileError, match=words):
             Gel("digit", mesh)
-    with pytest.raises(TactileError, match="scale"):
+    with pytest.raises(TactileError, match="seems to be in millimetres"):
         Gel("digit", trimesh.creation.icosphere(2, 3.0))  # in millimetres
     with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
         Gel("gelsight", BALL)
