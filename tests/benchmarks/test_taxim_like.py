@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.table.taxim_like import TableBench, fit_table, try_table
+from benchmarks.table.taxim_like import fit_table, try_table
 
 from tactile_core.accuracy import HEADER, line, row
 from tactile_core.pictures.calibrate import ball_pictures
-from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.calibrate.evaluate import evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.photographs import Photographs, chosen, read_photographs
 from tactile_core.sensors.calibration_file import load_calibration
@@ -46,10 +45,3 @@ def test_shipped_calibration_beats_a_table_fitted_on_the_same_presses(
             )
     assert baseline["roi_psnr"] < theirs["roi_psnr"] < ours["roi_psnr"]
     assert ours["roi_l1"] < theirs["roi_l1"] < baseline["roi_l1"]
-
-
-def test_time_of_a_picture(photographs: Photographs, benchmark: Callable) -> None:
-    unit = load_calibration()
-    table = fit_table(unit, chosen(photographs, list(unit.fit.photographs)[:2]), BALL)
-    picture = benchmark(TableBench(FastPictures(unit), table).change, (0.0, 0.0, 1e-3, BALL))
-    assert np.isfinite(picture).all()

@@ -78,7 +78,7 @@ def test_flags_are_kept_frame_by_frame(scene, part):
 
 def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
     surface = part("tactile_core.sensors").digit_surface()
-    patch = part("tactile_core.translation.contact_patch").contact_patch(_translation(part).displacement_digit, surface)
+    patch = part("tactile_core.translation.gel_place").contact_patch(_translation(part).displacement_digit, surface)
     assert patch[40].any() and not patch[40].all()
     for frame in (40, 80, 100, 139):
         bpy.context.scene.frame_set(frame)

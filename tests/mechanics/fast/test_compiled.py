@@ -14,8 +14,8 @@ SHAPES = {
     "side": LyingCylinder(1e-3, 0.5e-3, 3e-3),
     "ring": Ring(1.5e-3, 0.5e-3),
 }
-# arcsinh, cosine and sine of numpy and of the C library differ in their last bits. Before version 2 numpy takes a single
-# float32 times a Python float in float64, numba in float32, as a matrix is stored: 6e-8 an operation.
+# arcsinh, cosine and sine of numpy and of the C library differ in their last bits. Before version 2 numpy multiplies a
+# single float32 by a Python float in float64, numba in float32, as a matrix is stored: 6e-8 an operation.
 ROUNDING = 1e-10 if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 1e-6
 PATH = [Step(depth=0.1e-3), Step(depth=0.1e-3, slide=(0.1e-3, 0.0)), Step(force=0.05)]
 
