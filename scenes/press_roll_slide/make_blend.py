@@ -2,7 +2,7 @@
 
     blender -b --python scenes/press_roll_slide/make_blend.py -- example.blend
 
-In a Blender that has the extension; 6 MB, which play without it.
+In a Blender that has the extension; the file plays without it.
 """
 
 import sys
@@ -16,7 +16,7 @@ RECORDING = Path(__file__).resolve().parent / "press_roll_slide.h5"
 def write(path: Path) -> None:
     """Build the scene from an empty file and save it. Raises RuntimeError in the words of the operator that fails."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    bpy.ops.tactile.import_recording(filepath=str(RECORDING), motion="COMPACT")
+    bpy.ops.tactile.import_recording(filepath=str(RECORDING))
     bpy.ops.tactile.translate()
     bpy.ops.tactile.set_style(style="DISPLACEMENT")
     bpy.ops.tactile.force_arrow()

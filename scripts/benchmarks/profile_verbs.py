@@ -83,20 +83,20 @@ class Case(NamedTuple):
 
 SOLVING = "numpy h5py msgspec scipy"
 # Libdeflate packs PNG without Pillow.
-WATCHING = "numpy msgspec PIL" if importlib.util.find_spec("deflate") is None else "numpy msgspec"
+WATCHING = "numpy PIL" if importlib.util.find_spec("deflate") is None else "numpy"
 BALL = "--press sphere --diameter 7 --depth-mm 0.3"
 CASES = (
     Case("help", "--help"),
-    Case("info", "info {}/touch.csv", "numpy msgspec"),
+    Case("info", "info {}/touch.csv", "numpy"),
     Case("convert", "convert {}/touch.csv --out {}/converted --frames :10", "numpy h5py msgspec PIL matplotlib"),
     Case("watch", "watch {}/touch.csv --out {}/now.png --idle 0.1", WATCHING),
     Case("batch", "batch {}/touch.csv --out {}/job", "numpy h5py msgspec"),
     Case("export", "export {}/job --to npz --out {}/exported", "numpy h5py msgspec"),
     Case("adapt", f"adapt {RECORDING} --out {{}}/sensor.toml", "numpy h5py msgspec"),
-    Case("render_fast", "render {}/converted/touch/frames.h5 --out {}/fast --preset fast", "numpy h5py msgspec PIL"),
+    Case("render_fast", "render {}/converted/touch/frames.h5 --out {}/fast --preset fast", "numpy h5py PIL"),
     Case(
         "render_standard", "render {}/converted/touch/frames.h5 --out {}/standard --frames :2",
-        "numpy h5py msgspec PIL mitsuba drjit",
+        "numpy h5py PIL mitsuba drjit",
     ),
     Case("simulate --plan", "simulate {}/scene.toml --out {}/planned.h5 --plan", "numpy msgspec scipy"),
     Case("simulate", "simulate {}/scene.toml --out {}/simulated.h5", f"{SOLVING} cholespy"),

@@ -6,6 +6,7 @@ Whatever opens a user's or a stranger's file goes through here; a library that o
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import stat
@@ -56,6 +57,11 @@ def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
     Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
     """
     return read(path, most, "a text file").decode("utf-8-sig")
+
+
+def toml_quoted(text: str) -> str:
+    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
+    return json.dumps(text.encode(errors="replace").decode())
 
 
 def read_toml_text(path: str | os.PathLike) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import msgspec
+
+from .outside import toml_quoted
 
 
 def as_toml(content: msgspec.Struct, notes: Mapping[str, str], head: Sequence[str] = ()) -> str:
@@ -23,11 +24,6 @@ def as_toml(content: msgspec.Struct, notes: Mapping[str, str], head: Sequence[st
         if _is_table(table):
             lines += _table(name, table, notes)
     return "\n".join(lines) + "\n"
-
-
-def toml_quoted(text: str) -> str:
-    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
-    return json.dumps(text.encode(errors="replace").decode())
 
 
 def _is_table(value: Any) -> bool:

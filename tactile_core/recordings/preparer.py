@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..sensors.fluid_sensor import FALLS
-from . import electrode_gains
 from .answers import prepare, unanswered
 from .doubt import POLARITY, REST, Doubt, Reason, reason_of, without
-from .electrode_gains import ElectrodeGains
 from .flags import Flag
 from .polarity import AUTO
 from .recording import Recording
 from .signals import EVERY, PrepareOptions, Rest, Signals
+
+if TYPE_CHECKING:
+    from .electrode_gains import ElectrodeGains
 
 DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 
@@ -61,7 +63,11 @@ class Preparer:
             signals = self._carried(part, signals, rest, rows, given=options.tare is not None)
         signals = self._decided_once(signals, first=first)
         self._keep_rest(part, signals, rows)
-        return signals if self._unit is None else electrode_gains.apply(signals, self._unit).at(frames)
+        if self._unit is None:
+            return signals
+        from . import electrode_gains  # reads by msgspec, which Blender has by the extension's wheels alone
+
+        return electrode_gains.apply(signals, self._unit).at(frames)
 
     def _look_for_polarity(self) -> bool:
         """Take the polarity of the first part that shows it; returns whether one does."""

@@ -6,14 +6,13 @@ import os
 import sys
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from ..recordings import PrepareOptions, Recording, Signals, electrode_gains
-from ..recordings.electrode_gains import ElectrodeGains
+from ..recordings import PrepareOptions, Recording, Signals
 from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
 from . import error_bounds, networks, reference_signals
@@ -25,6 +24,9 @@ from .layers import DISTANCES
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
 from .weights import ADVICE
+
+if TYPE_CHECKING:
+    from ..recordings.electrode_gains import ElectrodeGains
 
 CHUNK = 64  # frames decoded at a time: about 5 MB of displacements, and the networks' own block
 Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and signals of rising frames (n,)
@@ -141,6 +143,8 @@ def translate(
     chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)
     translator, unit = _shared_translator(*chosen_by, answer or Answer()), None
     if sensor is not None:
+        from ..recordings import electrode_gains  # reads by msgspec, which Blender has by the extension's wheels alone
+
         file, section = electrode_gains.read(sensor), recording.section
         unit = file.gains_for(recording.path, section, sensor, recording.sensor)
     rows = PreparedRows(recording, chosen, translator.answer, prepare, unit)
