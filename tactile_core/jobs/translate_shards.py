@@ -94,14 +94,9 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
     if frames is None:  # none yet, or a damaged one, which the next run makes again
         return None
     kb = sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
-    return InputFacts(count(frames, job), frames, lambda: _warnings(file), int(1e3 * kb * frames))
-
-
-def _warnings(file: Path) -> tuple[str, ...]:
-    try:
-        return tuple(Prepared(file).about()["warnings"])
-    except TactileError:  # damaged since; `--verify` says so
-        return ()
+    return InputFacts(
+        count(frames, job), frames, lambda: tuple(Prepared(file).about()["warnings"]), int(1e3 * kb * frames)
+    )
 
 
 @functools.lru_cache(maxsize=2)

@@ -32,7 +32,7 @@ MODULES: dict[Any, str] = {
 class InputFacts:
     """Facts known of an input. shards : their number; frames : of a recording
 
-    warnings : reads those to report, which takes longer than the rest
+    warnings : reads those to report, which takes longer than the rest; TactileError where the input is damaged
     bytes : about, of all its shards; 0 where that is not known before they are there
     """
 

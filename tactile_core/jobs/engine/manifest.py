@@ -135,10 +135,14 @@ def write(folder: Path, job: Job) -> None:
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
     seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.InputFacts(0)
+    try:
+        warnings = list(seen.warnings())
+    except TactileError:  # its prepared file is damaged: the next run makes it again
+        seen, warnings = kinds.InputFacts(0), []
     listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)
         digest = checksummed.stated_checksum(path)
         if digest is not None:
             listed["shards"].append({"file": path.name, "sha256": digest})
-    return listed | {"warnings": list(seen.warnings())}
+    return listed | {"warnings": warnings}
