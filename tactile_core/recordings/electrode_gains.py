@@ -13,8 +13,7 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.outside import read_toml_text
-from ..files.toml_text import as_toml
+from ..files.outside import read_toml_text, toml_quoted
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
@@ -168,4 +167,21 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     )
     if typical_rest(sensor.sensor) is None:
         head = (f"Rest of a {name}, E1 to {last}, in counts. Used by: tactile info RECORDING --sensor THIS_FILE",)
-    atomic.write_bytes(path, as_toml(sensor, {}, head).encode())
+    lines = [*(f"# {line}" for line in head), *_lines({"format": sensor.format, "sensor": sensor.sensor})]
+    for section, unit in sensor.sections().items():
+        table = f"topics.{toml_quoted(section)}" if "/" in section else section
+        lines += ["", f"[{table}]", *_lines(msgspec.structs.asdict(unit))]
+    atomic.write_bytes(path, ("\n".join(lines) + "\n").encode())
+
+
+def _lines(fields: dict[str, Any]) -> list[str]:
+    return [f"{name} = {_value(value)}" for name, value in fields.items() if value is not None]
+
+
+def _value(value: str | float | list[float]) -> str:
+    """Format a text, a number with six digits, or a list of numbers as TOML."""
+    if isinstance(value, str):
+        return toml_quoted(value)
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return f"{value + 0.0:.6g}"  # no negative zero
