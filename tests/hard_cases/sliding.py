@@ -89,4 +89,4 @@ def lifted() -> Found:
 def beside() -> Found:
     """1 mm outside the outline."""
     place = Placement(-8e-3, digit.HALF_WIDTH + 1e-3)
-    return refusal(lambda: next(solve_path("digit", BALL, place, [Step(depth=0.1e-3)])), "a place on the DIGIT's gel")
+    return refusal(lambda: next(solve_path("digit", BALL, place, [Step(depth=0.1e-3)])), "on the DIGIT's gel")
