@@ -48,6 +48,11 @@ def read_table(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def short(value: float | None) -> str:
+    """Format with two digits, hundreds whole."""
+    return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+
+
 def finished(rows: list[Row], json: Path | None) -> int:
     """Write the rows to a file, if one is given, and name those that miss their target; returns the exit status."""
     if json:

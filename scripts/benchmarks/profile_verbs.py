@@ -1,6 +1,6 @@
 """Measure the cost of each verb of ``tactile``, in its own process: time, memory, and the heavy libraries it loads.
 
-    python scripts/benchmarks/profile_verbs.py --json FILE   and 700 frames converted, with the ten hottest functions
+    python scripts/benchmarks/profile_verbs.py --json FILE   and 700 frames converted, stage by stage
     python scripts/benchmarks/profile_verbs.py --quick --json FILE  each verb on as little as it takes, about a minute
 
 CPU time is user and system together, on one thread; a machine's load changes it less than wall time. The cases and
@@ -9,9 +9,7 @@ what each may load are in ``CASES``; tests/scripts/test_profile_verbs.py runs th
 
 from __future__ import annotations
 
-import dataclasses
 import importlib.util
-import io
 import json
 import os
 import re
@@ -29,16 +27,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is 
 from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core import recordings
 from tactile_core.accuracy import Row, row
-from tactile_core.files import png_writer
-from tactile_core.jobs import live
-from tactile_core.jobs.convert import load_tools
 from tactile_core.recordings import Truth, write_simulated
-from tactile_core.sensors import SAMPLE_RATE
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-LONG, HOT = 700, 10  # frames of the long recording, functions that are named
+LONG = 700  # frames of the long recording
 HEAVY = (
     "numpy", "scipy", "h5py", "PIL", "matplotlib", "tqdm", "msgspec", "torch", "mitsuba", "drjit", "OpenEXR", "trimesh",
     "rtree", "cholespy", "pypardiso", "skfem", "rosbags", "distributed", "pyarrow", "safetensors",
@@ -57,15 +51,6 @@ else:
     peak = used.ru_maxrss / (1024 * 1024 if sys.platform == "darwin" else 1024)
 record = {"status": status, "cpu": used.ru_utime + used.ru_stime, "peak": peak, "modules": sorted(sys.modules)}
 open(sys.argv[1], "w").write(json.dumps(record))
-"""
-HOTTEST = """
-import cProfile, json, pstats, sys
-from tactile_core.cli import main as cli
-profile = cProfile.Profile()
-profile.runcall(cli.main, sys.argv[2:])
-stats = pstats.Stats(profile).stats
-found = [[name, at, line, time] for (at, line, name), (_, _, time, _, _) in stats.items()]
-open(sys.argv[1], "w").write(json.dumps(sorted(found, key=lambda one: -one[3])))
 """
 
 
@@ -130,7 +115,7 @@ def main(arguments: list[str] | None = None) -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_inputs(folder)
-        parts = verbs(folder), packings(), live_picture(), [] if options.quick else long_conversion(folder)
+        parts = verbs(folder), [] if options.quick else long_conversion(folder)
         return finished(printed(one for part in parts for one in part), options.json)
 
 
@@ -197,43 +182,6 @@ def verbs(folder: Path) -> list[Row]:
         yield row(f"{case.name}_memory", cost.peak, "MB", of="peak resident")
 
 
-def packings() -> list[Row]:
-    """Measure the cost of a picture of the demo as PNG, by zlib's level, and with the toolkit's settings."""
-    from PIL import Image
-
-    from tactile_core.pictures import shading
-    from tactile_core.pictures.height_map import height_map
-
-    truth = recordings.read(RECORDING).truth.displacement_digit[60:340:20]
-    shader = shading.Shader()
-    pictures = [shader(heights) for heights in height_map(truth)]
-    ways = {f"level_{level}": {"compress_level": level} for level in (1, 3, 4, 6)}
-    ways |= {"huffman": png_writer.PACKING, "toolkit": None}
-    for name, packing in ways.items():
-        began, size = time.process_time(), 0
-        for picture in pictures:
-            out = io.BytesIO()
-            if packing is None:
-                png_writer.write_png(out, picture)
-            else:
-                Image.fromarray(picture).save(out, "PNG", **packing)
-            size += len(out.getvalue())
-        each = 1e3 * (time.process_time() - began) / len(pictures)
-        yield row(f"png_{name}", each, "ms", of=f"{size / len(pictures) / 1e3:.1f} kB a picture")
-
-
-def live_picture() -> list[Row]:
-    """Measure the thread time of `tactile watch` from a frame's rows to its picture."""
-    recording, view, work = recordings.read(RECORDING), live.View(load_tools(), SAMPLE_RATE), []
-    for start, stop in [(0, 60), *((i, i + 1) for i in range(60, 160))]:
-        rows = dataclasses.replace(
-            recording, electrodes=recording.electrodes[start:stop], pdc=recording.pdc[start:stop]
-        )
-        shown = view.show(rows, time.perf_counter())
-        work += [] if shown is None else [shown.work]
-    yield row("watch_picture", 1e3 * float(np.median(work)), "ms", 20.0, of=f"{len(work)} pictures, median, one core")
-
-
 def write_long(path: Path) -> None:
     """The shipped recording, again and again, LONG frames in all."""
     one = recordings.read(RECORDING)
@@ -246,7 +194,7 @@ def write_long(path: Path) -> None:
 
 
 def long_conversion(folder: Path) -> list[Row]:
-    """Profile `convert` of a long recording with its default outputs: where its time goes, its hottest functions."""
+    """Measure `convert` of a long recording with its default outputs, and where its time goes."""
     write_long(folder / "long.h5")
     cost = run(Case("long", "convert {}/long.h5 --out {}/whole"), folder)
     of = f"{LONG} frames, {cost.wall:.1f} s on the wall, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
@@ -255,13 +203,6 @@ def long_conversion(folder: Path) -> list[Row]:
     timings = json.loads((folder / "whole" / "long" / "timings.json").read_text(encoding="utf-8"))
     for stage, each in timings["ms_a_frame"].items():
         yield row(f"convert_700_{stage}", each, "ms", of="a frame, on the wall")
-    file = folder / "hot.json"
-    words = ["convert", str(folder / "long.h5"), "--out", str(folder / "again")]
-    environment = {**os.environ, **ONE_CORE, "PYTHONPATH": str(ROOT)}
-    subprocess.run([sys.executable, "-c", HOTTEST, file, *words], env=environment, check=True, capture_output=True)
-    for place, (name, at, number, seconds) in enumerate(json.loads(file.read_text())[:HOT], 1):
-        where = f" {Path(at).name}:{number}" if number else ""
-        yield row(f"hot_{place}", seconds, "s", of=f"{name.strip('<>{}')}{where}")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 
 # Huffman coding of the filtered rows, without zlib's search for repeats: a smooth picture with a camera's grain holds
-# none. Measured, a frame of the simulated recording with the shipped background (profile_verbs.py, ``png_*``):
+# none. Measured, a frame of the simulated recording with the shipped background:
 # 40 kB in 4.8 ms; zlib's level 1: 54 kB in 5.2, level 3: 47 kB in 8.7, level 4: 42 kB in 7.7, level 6: 38 kB in 20.7.
 PACKING = {"compress_level": 1, "compress_type": zlib.Z_HUFFMAN_ONLY}
 # Where the extra [fast] is installed libdeflate packs: 39 kB in 2.3 ms where the other takes 5.4; level 2: 40 in 2.0.

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_core.errors import TactileError
-
 SCRIPTS = Path(__file__).parents[2] / "scripts"
 
 
@@ -49,29 +47,6 @@ def test_a_promise_counts_what_stayed_below(script):
     many = Promise("x", "um", np.full(400, 2.0), np.tile([1.0, 1, 1, 3], 100), ["a"] * 400, "four hundred")
     assert many.row()["ok"] is False and many.row()["value"] == 0.75
     assert [line.split(" | ")[-1] for line in promise.lines()] == ["75.0% |", "100.0% |", "50.0% |"]
-
-
-def test_the_page_of_accuracy_gets_the_table(script, tmp_path):
-    from benchmarks.table.method import Method
-    from benchmarks.table.summary import HEADER, write_summary
-
-    file = tmp_path / "accuracy.md"
-    file.write_text(f"before\n\n{HEADER}\n| old | a | 1 | 2 | 3 | 4 |\n\nafter\n")
-    drawn = [Method("pictures", name, ms, 100.0, 2.0, "levels", 9.0, "set")
-             for name, ms in (("fast", 1.26), ("standard_llvm_ad_rgb", 30.4), ("quality_scalar_rgb", 123.0),
-                              ("reference_llvm_ad_rgb", 9876.0))]  # fmt: skip
-    write_summary(file, [Method("chain", "fast", 2.0, 50.0, 1.0, "levels", 3.0, "set"), *drawn])
-    assert file.read_text() == (
-        f"before\n\n{HEADER}\n"
-        "| picture of a known gel | fast | 1.3 | 100 | 2 levels | 9 levels |\n"
-        "| picture of a known gel | standard | 30 | 100 | 2 levels | 9 levels |\n"
-        "| picture of a known gel | quality | 120 | 100 | 2 levels | 9 levels |\n"
-        "| picture of a known gel | reference | 9,900 | 100 | 2 levels | 9 levels |\n"
-        "| signals → picture | fast | 2 | 50 | 1 levels | 3 levels |\n\nafter\n"
-    )
-    (tmp_path / "other.md").write_text("no table\n")
-    with pytest.raises(TactileError, match=r"other\.md"):
-        write_summary(tmp_path / "other.md", drawn)
 
 
 def test_the_page_that_ships_says_what_its_rows_say(script):

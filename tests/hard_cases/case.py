@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable, Iterable
 
-from tactile_core.accuracy import Row, row
+import pytest
+from gel_pictures import NO_MITSUBA
+
+from tactile_core.accuracy import Row, line, row
 from tactile_core.errors import TactileError
 
 MECHANICS_FAST, MECHANICS_FULL = "mechanics, fast tier", "mechanics, full tier"
@@ -41,31 +43,8 @@ class Found:
     broken: tuple[str, ...] = ()
 
 
-@dataclasses.dataclass(frozen=True)
-class Case:
-    """One hard case of one stage.
-
-    hard : the difficulty, one of HARD; expected : the behaviour, and where the target comes from
-    slow : not in a quick run
-    """
-
-    name: str
-    hard: str
-    stage: str
-    expected: str
-    find: Callable[[], Found]
-    slow: bool = False
-
-    def row(self) -> Row:
-        """What was found, as a row of a report, with its words."""
-        found = self.find()
-        made = row(self.name, found.value, found.unit, found.target, of=self.stage, at_least=found.at_least)
-        made["ok"] = bool(made["ok"]) and not found.broken
-        words = "; ".join([found.words, *found.broken] if found.words else found.broken)
-        return made | {"case": self.hard, "expected": self.expected, "words": words}
-
-
-CASES: list[Case] = []
+COLLECTED: list[str] = []  # names of all cases, slow ones too
+ROWS: dict[str, Row] = {}  # what those that ran have found
 
 
 def case(
@@ -75,23 +54,37 @@ def case(
     expected: str,
     *each: tuple,
     slow: Iterable[str] = (),
-) -> Callable[[Callable[..., Found]], Callable[..., Found]]:
-    """Add a function that finds something to the table.
+) -> Callable[[Callable[..., Found]], Callable[..., None]]:
+    """Make a test of a function that finds something; it fails where that misses its target or breaks a law.
 
     each : its arguments, a case each, which the name is formatted with; hard, stage : or by the first argument that
-    they have; slow : names, or arguments, of slow cases
+    they have; slow : names, or arguments, of slow cases; expected : the behaviour, and where the target comes from
     """
 
     def by(which: str | dict[str, str], args: tuple) -> str:
         return which if isinstance(which, str) else next(which[arg] for arg in args if arg in which)
 
-    def add(find: Callable[..., Found]) -> Callable[..., Found]:
-        for args in each or [()]:
-            made = name.format(*args), by(hard, args), by(stage, args), expected, functools.partial(find, *args)
-            CASES.append(Case(*made, slow=bool({made[0], *args} & {*slow})))
-        return find
+    def test_of(find: Callable[..., Found]) -> Callable[..., None]:
+        cases = {name.format(*args): args for args in each or [()]}
+        assert not cases.keys() & {*COLLECTED} and {by(hard, args) for args in cases.values()} <= {*HARD}
+        COLLECTED.extend(cases)
+        marks = {case: [pytest.mark.slow_case] if {case, *args} & {*slow} else [] for case, args in cases.items()}
 
-    return add
+        @pytest.mark.parametrize("case", [pytest.param(case, id=case, marks=marks[case]) for case in cases])
+        def test(case: str) -> None:
+            args = cases[case]
+            if by(stage, args) == MITSUBA:
+                pytest.importorskip("mitsuba", reason=NO_MITSUBA)
+            found = find(*args)
+            made = row(case, found.value, found.unit, found.target, of=by(stage, args), at_least=found.at_least)
+            words = "; ".join([found.words, *found.broken] if found.words else found.broken)
+            ok = bool(made["ok"]) and not found.broken
+            ROWS[case] = made | {"ok": ok, "case": by(hard, args), "expected": expected, "words": words}
+            assert ok, f"{line(made)} {words}; expected: {expected}"
+
+        return test
+
+    return test_of
 
 
 def refusal(ask: Callable[[], object], said: str) -> Found:

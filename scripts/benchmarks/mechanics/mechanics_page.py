@@ -11,8 +11,7 @@ import numpy as np
 from tactile_core.accuracy import Row, failed
 from tactile_core.files import atomic
 
-from ..measured_rows import write_table
-from ..table.summary import short
+from ..measured_rows import short, write_table
 from .bonded_layer import GOLDEN_FORCE
 
 _PURPOSE = """# Contact mechanics against known answers

@@ -16,8 +16,6 @@ from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
-from tactile_core.errors import TactileError
-from tactile_core.files import atomic
 from tactile_core.pictures.presets import measured as measured_presets
 from tactile_core.recordings import prepare, read
 from tactile_core.sensors.calibration_file import load_calibration
@@ -35,7 +33,6 @@ from .method import ROOT, TEST_SET, TRAINING
 COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (assumed)
 FEWEST = 200  # contacts: of fewer, such a share is 1.5 % off and more by chance, and has no target
 TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |\n|---|---|---|---|---|---|"
-PLACE = re.compile(re.escape(TABLE) + r"\n(?:\|.*\n)+")  # of the table of bounds in docs/benchmark.md
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
 SCENES = "press", "press_roll_slide", "edge", "ring", "roll", "slide", "user_mesh"
@@ -104,22 +101,6 @@ class Promise:
             here = np.ones(len(names), bool) if name == "all" else names == name
             bound, found = (f"{np.median(values[here]):.3g} {self.unit}" for values in (self.bound, self.found))
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
-
-
-def renew(docs: Path) -> list[Row]:
-    """Compare bounds of mechanics and translation with errors measured again, in seconds; return the rows of the table.
-
-    Raises TactileError where docs/benchmark.md has no such table.
-    """
-    page = docs / "benchmark.md"
-    text = page.read_text(encoding="utf-8")
-    if len(PLACE.findall(text)) != 1:
-        raise TactileError(page, "not one table of bounds", "one with these columns: " + TABLE.split("\n")[0])
-    promises = [*of_mechanics(quick=False), *of_translation(quick=False)]
-    table = "\n".join([TABLE, *(line for promise in promises for line in promise.lines()), ""])
-    atomic.write_bytes(page, PLACE.sub(lambda _: table, text).encode())
-    atomic.write_bytes(docs / "promised.png", plot(promises))
-    return [promise.row() for promise in promises]
 
 
 def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], str, bytes]:

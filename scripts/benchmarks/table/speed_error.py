@@ -1,10 +1,9 @@
 """Speed against error of every stage, in one run on one machine: a table, a plot, rows.
 
-    python scripts/benchmark.py                      everything; docs/benchmark.*, the table of docs/accuracy.md
+    python scripts/benchmark.py                      everything; writes docs/benchmark.*, docs/promised.png
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
     python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
-    python scripts/benchmark.py --promised           bounds against errors alone, in seconds: docs/promised.png
 
 Stages: contact mechanics by tier and sensor; translation; pictures by preset; the whole chain from signals to pictures.
 Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
@@ -46,7 +45,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
     parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")
     parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
-    parser.add_argument("--promised", action="store_true", help="the bounds alone, in docs/promised.png and its table")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     unknown = [each for each in options.only if each.split(" ")[0] not in STAGES]
@@ -54,13 +52,9 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error(f"--only: no stage {', '.join(unknown)}; there are {', '.join(STAGES)}")
     missing: dict[str, str] = {}
     try:
-        methods = [] if options.promised else list(all_measured(options, missing))
+        methods = list(all_measured(options, missing))
         rows, text, picture = [each for method in methods for each in method.rows()], "", b""
-        if options.promised:
-            from benchmarks.table.promised import renew
-
-            rows = renew(ROOT / "docs")
-        elif not options.only:
+        if not options.only:
             from benchmarks.table.promised import promised
 
             found, text, picture = promised(rows, options.quick)
@@ -73,13 +67,11 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"left out: {name}, {why}", file=sys.stderr)
     if options.json:
         atomic.write_json(options.json, rows)
-    if not (options.quick or options.only or options.promised):
+    if not (options.quick or options.only):
         from benchmarks.table.benchmark_page import write_report
-        from benchmarks.table.summary import write_summary
 
         write_report(ROOT / "docs", methods, rows, missing, text)
         atomic.write_bytes(ROOT / "docs" / "promised.png", picture)
-        write_summary(ROOT / "docs" / "accuracy.md", methods)
     for each in failed(rows):
         print(f"MISSED: {each['name']} = {each['value']}, right is 0.9 to 0.98", file=sys.stderr)
     return int(bool(failed(rows)))

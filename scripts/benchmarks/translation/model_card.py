@@ -16,8 +16,7 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translator import Translator
 
-from ..measured_rows import write_table
-from ..table.summary import short
+from ..measured_rows import short, write_table
 from .noise import as_read
 from .test_set import SEED
 

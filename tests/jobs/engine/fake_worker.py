@@ -1,7 +1,8 @@
 """A worker, or the command ``tactile batch``, with the tools of ``fake_tools``: no weights, one dent.
 
 ``python fake_worker.py FOLDER`` serves tasks; FAKE_KILL names a shard that kills its worker (FAKE_KILL_ONCE: a file
-that is made first, so that it happens once). ``python fake_worker.py batch ...`` is the command, with such workers.
+that is made first, so that it happens once); FAKE_CUT: a process ends at this fsync or rename of its own, as by a power
+cut. ``python fake_worker.py batch ...`` is the command, with such workers.
 """
 
 from __future__ import annotations
@@ -39,7 +40,23 @@ def killing(make):
     return made
 
 
+def cutting(write):
+    """`write`, until the process has written as often as FAKE_CUT says."""
+
+    def written(*words):
+        global left
+        left -= 1
+        if left == 0:
+            os._exit(77)
+        return write(*words)
+
+    return written
+
+
+left = int(os.environ.get("FAKE_CUT", 0))
+
 if __name__ == "__main__":
+    os.fsync, os.replace = cutting(os.fsync), cutting(os.replace)
     convert.load_tools = lambda *words: fake_tools.tools()
     convert.load_translator = lambda *words: fake_tools.Networks()
     translate_shards.make = killing(translate_shards.make)

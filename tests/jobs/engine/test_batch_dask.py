@@ -1,4 +1,4 @@
-"""Dask as one more place: the same bytes, over TLS too. Workers are threads; scripts/fault_test.py kills real ones."""
+"""Dask as one more place: the same bytes, over TLS too. Workers are threads."""
 
 from __future__ import annotations
 

@@ -160,6 +160,19 @@ def test_a_killed_client_leaves_nothing_half_and_the_same_command_goes_on(
     assert not list(folder.rglob(".*.tactile-partial"))
 
 
+@pytest.mark.parametrize("cut", [1, 2, 4])
+def test_a_power_cut_at_a_write_loses_nothing(cut, finished, content, recordings, command_process, monkeypatch):
+    calm, _ = finished
+    folder = calm.parent / "cut"
+    words = [*recordings, "--out", folder, "--keep", "latent", "--shard-frames", "50"]
+    monkeypatch.setenv("FAKE_CUT", str(cut))
+    assert command_process(*words).returncode
+    monkeypatch.delenv("FAKE_CUT")
+    done = command_process(*words)
+    assert done.returncode == 0, done.stderr
+    assert content(folder) == content(calm) and not list(folder.rglob(".*.tactile-partial"))
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no limit on the size of a process's files")
 @pytest.mark.parametrize(
     ("limit", "needed"),  # below a prepared file (0.3 MB), and between it and a shard of 50 frames (3.9 MB)

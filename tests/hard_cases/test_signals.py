@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hard_cases.case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 from tactile_core import accuracy, recordings
 from tactile_core.jobs.convert import Options, convert, load_tools
 from tactile_core.pictures.height_map import gel_mapper
@@ -22,8 +23,6 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.translation import networks
 from tactile_core.translation.translate import load_translator
 from tactile_core.translation.translator import UNTRAINED_CONFIDENCE, Translation
-
-from .case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "scenes/press_roll_slide/press_roll_slide.h5"
@@ -91,7 +90,7 @@ def _finite(found: Translation) -> tuple[str, ...]:
 
 @case("as_it_is", "12-bit quantisation", TRANSLATION,
       "whole counts: 90 % of the frames at least lie within the stated 95 % bound")  # fmt: skip
-def as_it_is() -> Found:
+def test_as_it_is() -> Found:
     """The shipped recording, which holds whole counts of 12 bits."""
     found, frames = translated(prepared()[1])
     words = f"rms error {_error(found, frames) * 1e6:.1f} um of the gel's nodes"
@@ -100,7 +99,7 @@ def as_it_is() -> Found:
 
 @case("coarser_counts", "12-bit quantisation", TRANSLATION,
       "rounding to whole counts adds less than 2 um to the gel's rms error, noise being 0.7 to 1.5 counts")  # fmt: skip
-def rounding() -> Found:
+def test_rounding() -> Found:
     """Counts with a fraction restored by the noise that rounding hides, against the whole ones."""
     random = np.random.default_rng(1)
     dithered = shipped().electrodes + random.uniform(-0.5, 0.5, shipped().electrodes.shape)
@@ -111,7 +110,7 @@ def rounding() -> Found:
 
 @case("saturated_electrodes", "saturated electrodes", TRANSLATION,
       "frames at an end of the range carry SATURATED, electrodes are named, confidence <= 0.2")  # fmt: skip
-def saturated() -> Found:
+def test_saturated() -> Found:
     """A gain that drives four electrodes to 4095."""
     counts = shipped().electrodes.copy()
     counts[:, :4] = np.clip(counts[:, :4] + 4090 - np.percentile(counts[:, :4], 60, axis=0), 0, 4095)
@@ -133,7 +132,7 @@ def _with_dead(channels: list[int], begin: int) -> tuple[Signals, Translation, n
 
 @case("dead_electrodes", "dead electrodes", TRANSLATION,
       "electrodes that never change: every frame carries DEAD_CHANNEL, confidence is 0.2 at most")  # fmt: skip
-def dead() -> Found:
+def test_dead() -> Found:
     """Two electrodes that stand still."""
     signals, found, frames = _with_dead([7, 17], 0)
     broken = (*_flagged(found, signals, Flag.DEAD_CHANNEL, 1.0), *_finite(found))
@@ -144,7 +143,7 @@ def dead() -> Found:
 
 @case("electrodes_that_die", "dead electrodes", TRANSLATION,
       "electrodes that stop after a third of the recording: the frames from there on carry DEAD_CHANNEL")  # fmt: skip
-def dying() -> Found:
+def test_dying() -> Found:
     """Two electrodes that stand still from a frame on."""
     begin = len(shipped()) // 3
     _, found, frames = _with_dead([7, 17], begin)
@@ -156,7 +155,7 @@ def dying() -> Found:
 
 @case("drift_over_an_hour", "drift over an hour", TRANSLATION,
       "88 counts an hour (Ruppel) taken off between quiet parts: 2 counts at most are left of 88")  # fmt: skip
-def drift() -> Found:
+def test_drift() -> Found:
     """An hour at 10 Hz: a press of 8 s every minute on the shipped recording's counts, every electrode drifting."""
     random = np.random.default_rng(2)
     time = np.arange(36000) / 10.0
@@ -176,7 +175,7 @@ def drift() -> Found:
 
 @case("signals_out_of_range", "out-of-range latents", TRANSLATION,
       "forty times as large: frames in contact carry OUT_OF_RANGE and little confidence; all is finite")  # fmt: skip
-def out_of_range() -> Found:
+def test_out_of_range() -> Found:
     """Changes forty times those of the shipped recording, up to what 12 bits hold: training knows fifteen times."""
     _, signals = prepared()
     touched = np.flatnonzero(np.linalg.norm(shipped().truth.force, axis=1) > 0.3)[::EVERY]
@@ -200,7 +199,7 @@ def _wild() -> np.ndarray:
 
 @case("wild_latents_height_map", "out-of-range latents", HEIGHT_MAP,
       "latents twelve deviations out: whatever they decode to, heights are finite")  # fmt: skip
-def wild_heights() -> Found:
+def test_wild_heights() -> Found:
     """Decoded latents that no training ever made."""
     moved = _wild()
     heights = gel_mapper()(moved)
@@ -210,7 +209,7 @@ def wild_heights() -> Found:
 
 @case("wild_latents_fast_picture", "out-of-range latents", FAST_PICTURE,
       "a picture, or a refusal in words where the gel would reach the lights")  # fmt: skip
-def wild_pictures() -> Found:
+def test_wild_pictures() -> Found:
     """Pictures of the same."""
     heights = gel_mapper()(_wild())
     shader, words, drawn = Shader(), set(), 0
@@ -226,7 +225,7 @@ def wild_pictures() -> Found:
 
 @case("one_frame", "one-frame recordings", TRANSLATION,
       "converts whole: rest is guessed, the frame carries NO_QUIET_PART, confidence <= 0.2")  # fmt: skip
-def one_frame() -> Found:
+def test_one_frame() -> Found:
     """A CSV file with a header and one line, through `tactile convert`."""
     import h5py
 

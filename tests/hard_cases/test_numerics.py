@@ -10,6 +10,9 @@ from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN
 from benchmarks.mechanics.pressed_disc import disc_mesh, pressed
 from slab import slab_compliance
 
+from hard_cases.case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TIERS, TRANSLATION, Found, case, refusal
+from hard_cases.contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
+from hard_cases.test_signals import prepared
 from tactile_core import sensors
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.fast.contact import ContactProblem
@@ -25,17 +28,13 @@ from tactile_core.sensors import Material, digit
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
 from tactile_core.translation import networks
 
-from .case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TIERS, TRANSLATION, Found, case, refusal
-from .contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
-from .signals import prepared
-
 BALL = Sphere(3.5e-3)
 YOUNGS = 0.4e6  # Pa, about the gel's
 
 
 @case("nu_{:g}_fast", "near-incompressible gel", MECHANICS_FAST, "within 3 % of the exact force on a bonded layer",
       (0.49,), (0.499,), slow=[0.49])  # fmt: skip
-def _layer_fast(poisson: float) -> Found:
+def test_layer_fast(poisson: float) -> Found:
     """A ball on a bonded layer: the fast tier's own condensation and contact, against the exact small-strain answer."""
     radius, thickness, depth = 7e-3, 2e-3, 0.06e-3
     outside = np.linspace(1.4e-3, 6e-3, 6)
@@ -51,7 +50,7 @@ def _layer_fast(poisson: float) -> Found:
 
 @case("nu_{:g}_full", "near-incompressible gel", MECHANICS_FULL,
       "in 10 Newton iterations at most, as prototypes took 3 to 7", (0.49,), (0.499,))  # fmt: skip
-def _gel_full(poisson: float) -> Found:
+def test_gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.6e-3)
@@ -74,7 +73,11 @@ def _disc(poisson: float, spacing: float) -> float:
 
 @case("nu_{:g}_full_force", "near-incompressible gel", MECHANICS_FULL,
       "within 1 % on nodes twice as far apart: no locking", (0.49,), (0.499,))  # fmt: skip
-def _mesh_full(poisson: float, spacing: float = 0.2e-3, most: float = 1.0) -> Found:
+def test_locking(poisson: float) -> Found:
+    return _against_fine(poisson, 0.2e-3, 1.0)
+
+
+def _against_fine(poisson: float, spacing: float, most: float) -> Found:
     coarse, fine = _disc(poisson, spacing), _fine_disc(poisson)
     words = f"{coarse:.4g} N, on nodes 0.1 mm apart {fine:.4g} N"
     return Found(100 * (coarse / fine - 1), "percent", most, words=words)
@@ -82,8 +85,8 @@ def _mesh_full(poisson: float, spacing: float = 0.2e-3, most: float = 1.0) -> Fo
 
 @case("nodes_{:g}mm_apart", "coarse and fine meshes", MECHANICS_FULL,
       "within 2 % of a mesh of 0.1 mm: the contact, 2.9 mm wide, ends between nodes", (0.4,), (0.8,))  # fmt: skip
-def _coarse(millimetres: float) -> Found:
-    return _mesh_full(0.49, 1e-3 * millimetres, 2.0)
+def test_coarse(millimetres: float) -> Found:
+    return _against_fine(0.49, 1e-3 * millimetres, 2.0)
 
 
 @functools.cache
@@ -92,20 +95,20 @@ def _fine_disc(poisson: float) -> float:
 
 
 @case("beyond_60_percent", "indentation beyond 60 % of the thickness", MECHANICS_FAST, "refused, in words")
-def beyond() -> Found:
+def test_beyond() -> Found:
     """61 % of the thickness."""
     deep = 0.61 * thickness_under("digit", BALL, pose_at("digit", BALL, MIDDLE))
     return refusal(lambda: solve("digit", BALL, MIDDLE, depth=deep), "60% of the thickness")
 
 
 @case("beyond_60_percent_by_force", "indentation beyond 60 % of the thickness", MECHANICS_FAST, "refused, in words")
-def beyond_by_force() -> Found:
+def test_beyond_by_force() -> Found:
     """A force that no depth within the limit bears."""
     return refusal(lambda: solve("digit", BALL, MIDDLE, force=500.0), "found within")
 
 
 @case("at_60_percent_fast", "indentation beyond 60 % of the thickness", MECHANICS_FAST, "converges right at the limit")
-def at_limit_fast() -> Found:
+def test_at_limit_fast() -> Found:
     """60 % of the thickness, with the sensor's own friction."""
     deep = DEPTH_LIMIT * thickness_under("digit", BALL, pose_at("digit", BALL, MIDDLE))
     found = press("digit", BALL, MIDDLE, 0.78).at_depth(deep)
@@ -114,7 +117,7 @@ def at_limit_fast() -> Found:
 
 
 @case("at_60_percent_full", "indentation beyond 60 % of the thickness", MECHANICS_FULL, "converges right at the limit")
-def at_limit_full() -> Found:
+def test_at_limit_full() -> Found:
     """60 % of the thickness under a ball of 14 mm, in one step."""
     ball = Sphere(7e-3)
     pose = pose_at("digit", ball, MIDDLE)
@@ -127,7 +130,7 @@ def at_limit_full() -> Found:
 
 @case("ten_steps_at_once_full", "load step ten times too large", MECHANICS_FULL,
       "the same answer to 1 um without friction: equilibrium knows no path")  # fmt: skip
-def steps_full() -> Found:
+def test_steps_full() -> Found:
     """0.8 mm at once and in ten steps."""
     depth = 0.8e-3
     one, many = (
@@ -149,7 +152,7 @@ def _ten_steps(friction: float) -> tuple[FastContact, FastContact, tuple[str, ..
 
 
 @case("ten_steps_at_once_fast", "load step ten times too large", MECHANICS_FAST, "the same answer to 1 um")
-def steps_fast() -> Found:
+def test_steps_fast() -> Found:
     """Without friction."""
     one, many, broken = _ten_steps(0.0)
     off = np.abs(one.corrected.displacement - many.corrected.displacement).max()
@@ -158,14 +161,14 @@ def steps_fast() -> Found:
 
 @case("ten_steps_at_once_friction_fast", "load step ten times too large", MECHANICS_FAST,
       "with friction the path matters: within 2 % of force, a fortieth of what the tier states")  # fmt: skip
-def steps_friction_fast() -> Found:
+def test_steps_friction_fast() -> Found:
     """With friction."""
     one, many, broken = _ten_steps(0.78)
     return Found(100 * (np.linalg.norm(one.force) / np.linalg.norm(many.force) - 1), "percent", 2.0, broken=broken)
 
 
 @case("inverted_start_full", "inverted start", MECHANICS_FULL, "refused, in words: no step leads out of a turned cell")
-def inverted() -> Found:
+def test_inverted() -> Found:
     """A state in which the gel's surface has been pulled through its back."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.3e-3)
@@ -188,7 +191,7 @@ SMALL = {
 @case("{}_{}", {name: hard for name, (hard, *_) in SMALL.items()}, TIERS,
       "converges; nothing moves more than the depth asked for, 2 um by 1 uN, not at all by none; its error is honest",
       *((name, tier) for tier in TIERS for name in SMALL), slow=["force_1uN_full"])  # fmt: skip
-def _near(name: str, tier: str) -> Found:
+def test_near(name: str, tier: str) -> Found:
     """A request too small for any lattice: nothing moves farther than was asked, and the error says so."""
     _, ask, most = SMALL[name]
     found = solve("digit", BALL, MIDDLE, tier=tier, friction=0.0, **ask)
@@ -204,7 +207,7 @@ def _near(name: str, tier: str) -> Found:
 
 
 @case("force_1nN", "tiny force (1e-6 N)", MECHANICS_FAST, "a thousandth of that is refused, in words")
-def smaller_force() -> Found:
+def test_smaller_force() -> Found:
     """1e-9 N."""
     return refusal(lambda: solve("digit", BALL, MIDDLE, force=1e-9), "at least 1e-06 N")
 
@@ -213,14 +216,14 @@ def smaller_force() -> Found:
       "0.3 mm deep it sinks in between nodes 0.35 and 0.5 mm apart: said in words",
       *((width, sensor, "fast") for sensor in ("digit", "biotac") for width in (0.1, 0.4)),
       (0.1, "digit", "full"))  # fmt: skip
-def _narrow(millimetres: float, sensor: str, tier: str) -> Found:
+def test_narrow(millimetres: float, sensor: str, tier: str) -> Found:
     ball = Sphere(millimetres * 1e-3 / 2)
     return refusal(lambda: solve(sensor, ball, MIDDLE, depth=0.3e-3, tier=tier, friction=0.0), "sunk")
 
 
 @case("ball_1mm_digit_fast", "indenter much smaller than an element", MECHANICS_FAST,
       "a ball of three spacings is within the stated error of the full tier")  # fmt: skip
-def narrow_enough() -> Found:
+def test_narrow_enough() -> Found:
     """A ball of 1 mm, 0.1 mm deep."""
     ball = Sphere(0.5e-3)
     found = press("digit", ball, MIDDLE, 0.0).at_depth(0.1e-3)
@@ -231,7 +234,7 @@ def narrow_enough() -> Found:
 
 @case("compliance_in_single_precision", "single precision against double", MECHANICS_FAST,
       "float32 matrices move no node of a solved contact by more than 0.1 um")  # fmt: skip
-def single_compliance() -> Found:
+def test_single_compliance() -> Found:
     """The same nodal forces through the stored matrix, summed in single and in double precision."""
     contact = press("digit", BALL, MIDDLE, 0.0).at_depth(0.8e-3).linear
     compliance = contact.compliance
@@ -264,7 +267,7 @@ class _Double(networks.Networks):
 
 @case("networks_in_single_precision", "single precision against double", TRANSLATION,
       "from counts to the gel float32 moves no node by 0.5 um, a fortieth of the chain's own error")  # fmt: skip
-def single_networks() -> Found:
+def test_single_networks() -> Found:
     """Frames of the shipped recording through both."""
     nets = networks.load()
     change = prepared()[1].change[100::60]
@@ -275,7 +278,7 @@ def single_networks() -> Found:
 
 @case("height_map_in_single_precision", "single precision against double", HEIGHT_MAP,
       "float32 look-ups differ from double splines by less than 0.01 um")  # fmt: skip
-def single_height() -> Found:
+def test_single_height() -> Found:
     """A dent without sideways movement, whose heights are splines that scipy makes in double precision."""
     from scipy.interpolate import RectBivariateSpline
 

@@ -15,6 +15,9 @@ from gel_pictures import levels, with_leds
 from plain_unit import plain_unit
 from scipy.ndimage import distance_transform_edt
 
+from hard_cases.case import FAST_PICTURE, HEIGHT_MAP, MITSUBA, PRESETS, Found, case, refusal
+from hard_cases.contacts import press
+from hard_cases.test_shapes import CONTACTS, HARD_OF, SHOWN
 from tactile_core import sensors
 from tactile_core.geometry.cubic_spline import EvenSpline
 from tactile_core.pictures.height_map import HeightMapper, gel_mapper, rest_height_map
@@ -22,10 +25,6 @@ from tactile_core.pictures.perspective import bilinear
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.pictures.shading import Shader
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y, Led
-
-from .case import FAST_PICTURE, HEIGHT_MAP, MITSUBA, PRESETS, Found, case, refusal
-from .contacts import press
-from .shapes import CONTACTS, HARD_OF, SHOWN
 
 UNIT = plain_unit()
 HALF = plain_unit().at_size(120, 160)  # a quarter of the pixels: the time of Mitsuba's scalar variant
@@ -44,7 +43,7 @@ def moved(name: str) -> np.ndarray:
 @case("{}_heights", HARD_OF, HEIGHT_MAP,
       "99 of 100 nodes are where the map says, to 5 um (a pixel is 53 um wide)", *((name,) for name in SHOWN)
       )  # fmt: skip
-def _heights(name: str) -> Found:
+def test_heights(name: str) -> Found:
     """At each displaced node, looked up among the pixels, against the node's own height."""
     mapper, displacement = gel_mapper(), moved(name)
     at = sensors.digit_surface().rest + displacement
@@ -62,7 +61,7 @@ def _heights(name: str) -> Found:
 @case("{}_pictures", HARD_OF, MITSUBA,
       "fast and Mitsuba's picture differ by 1.5 levels rms at most (docs/optics.md: 1.2 and 1.4 off the reference)",
       *((name,) for name in SHOWN), slow=["rim", "deep", "two_patches"])  # fmt: skip
-def _pictures(name: str) -> Found:
+def test_pictures(name: str) -> Found:
     """The change that the contact makes, fast against Mitsuba."""
     heights = HeightMapper(sensors.digit_surface(), HALF.camera)(moved(name))
     return _compared(HALF, heights, rest_height_map(HALF.camera), 1.5)
@@ -80,7 +79,7 @@ def _compared(unit, heights: np.ndarray, rest: np.ndarray, most: float) -> Found
 
 @case("{}_far_off", HARD_OF, FAST_PICTURE, "3 mm away nothing changes by more than half a level",
       ("edge",), ("two_patches",), ("sharp_corner",))  # fmt: skip
-def _far_off(name: str) -> Found:
+def test_far_off(name: str) -> Found:
     """How much the picture changes away from the contact."""
     heights = gel_mapper()(moved(name))
     unit = plain_unit(camera=gel_mapper().camera)
@@ -93,7 +92,7 @@ def _far_off(name: str) -> Found:
 
 
 @case("nothing_touches_heights", "zero contact", HEIGHT_MAP, "exactly the resting gel")
-def still_heights() -> Found:
+def test_still_heights() -> Found:
     """No displacement."""
     still = gel_mapper()(np.zeros((len(sensors.digit_surface().rest), 3)))
     return Found(float(np.abs(still - rest_height_map()).max()) * 1e6, "um", 0.0)
@@ -101,7 +100,7 @@ def still_heights() -> Found:
 
 @case("nothing_touches_{}", "zero contact", PRESETS,
       "bit-equal to the background", *BOTH)  # fmt: skip
-def _still(preset: str) -> Found:
+def test_still(preset: str) -> Found:
     background = np.random.default_rng(0).integers(0, 256, (*HALF.camera.shape, 3), dtype=np.uint8)
     drawn = Renderer(HALF, preset, background=background)(rest_height_map(HALF.camera))
     return Found(float(np.abs(drawn.astype(int) - background).max()), "levels", 0.0)
@@ -109,7 +108,7 @@ def _still(preset: str) -> Found:
 
 @case("depth_0.1um_{}_picture", "tiny depth (0.1 um)", PRESETS,
       "less than half a level anywhere", *BOTH)  # fmt: skip
-def _faint(preset: str) -> Found:
+def test_faint(preset: str) -> Found:
     """A press of 0.1 um: it must not show, and its noise neither."""
     rest = rest_height_map(HALF.camera)
     right, down = np.meshgrid(HALF.camera.right, HALF.camera.down)
@@ -120,14 +119,14 @@ def _faint(preset: str) -> Found:
 
 
 @case("2_px_per_mm", "extreme px/mm", HEIGHT_MAP, "a picture wider than the gel's window is refused, in words")
-def wide() -> Found:
+def test_wide() -> Found:
     """120 mm of gel across."""
     camera = dataclasses.replace(UNIT.camera, px_per_mm_x=2.0, px_per_mm_y=2.0)
     return refusal(lambda: HeightMapper(sensors.digit_surface(), camera), "Raise px_per_mm_y to 18.4")
 
 
 @case("500_px_per_mm", "extreme px/mm", HEIGHT_MAP, "heights are the gel's cubic surface to 0.05 um, at 2 um a pixel")
-def narrow() -> Found:
+def test_narrow() -> Found:
     """A picture of 0.24 mm in the middle of a dent, against the splines themselves."""
     camera = dataclasses.replace(UNIT.camera, px_per_mm_x=500.0, px_per_mm_y=500.0, width=120, height=160)
     mapper, gel = HeightMapper(sensors.digit_surface(), camera), sensors.digit_surface()
@@ -144,7 +143,7 @@ def narrow() -> Found:
 
 
 @case("{:g}_px_per_mm_pictures", "extreme px/mm", MITSUBA, "fast and Mitsuba's agree to 1.5 levels", (18.8,), (400.0,))
-def _scaled(px_per_mm: float) -> Found:
+def test_scaled(px_per_mm: float) -> Found:
     """The same bump, seen by a camera so near that it fills the picture, with lights as near."""
     factor = 18.8 / px_per_mm
     camera = dataclasses.replace(HALF.camera, px_per_mm_x=px_per_mm / 2, px_per_mm_y=px_per_mm / 2)
@@ -156,7 +155,7 @@ def _scaled(px_per_mm: float) -> Found:
 
 @case("grazing_plane_{}", "grazing light", PRESETS,
       "Lambert's law on a plane to 0.2 % (a pixel's middle is 3 um off in Mitsuba)", *BOTH)  # fmt: skip
-def _lambert(preset: str) -> Found:
+def test_lambert(preset: str) -> Found:
     """A small light 0.1 mm over the plane, 13 mm away: it comes in at half a degree."""
     led = Led("green", (-13e-3, -3e-3, 0.1e-3), 1e-5, 1.0)
     unit = dataclasses.replace(HALF, leds=(HALF.leds[0], led, HALF.leds[2])).with_gain(HALF.gain)
@@ -169,7 +168,7 @@ def _lambert(preset: str) -> Found:
 
 
 @case("grazing_bump", "grazing light", MITSUBA, "fast and Mitsuba's agree to 1.5 levels where lights are 1 mm high")
-def grazing_bump() -> Found:
+def test_grazing_bump() -> Found:
     """A bump of 0.3 mm on a plane, lights at 4 degrees: its shadows are 4 mm long."""
     leds = tuple(dataclasses.replace(led, position=(*led.position[:2], 1e-3), radius=0.2e-3) for led in HALF.leds)
     unit = dataclasses.replace(HALF, leds=leds).with_gain(HALF.gain)
@@ -180,7 +179,7 @@ def grazing_bump() -> Found:
 
 @case("gel_over_the_lights_{}", "grazing light", PRESETS,
       "a gel higher than its lights is refused, in words", *BOTH)  # fmt: skip
-def _below(preset: str) -> Found:
+def test_below(preset: str) -> Found:
     """Lights 1 mm high beside a dome of 1.6 mm."""
     low = with_leds(HALF, radius=0.1e-3)
     low = dataclasses.replace(
@@ -193,7 +192,7 @@ def _below(preset: str) -> Found:
 
 @case("cliff_{}", "depth discontinuities", PRESETS,
       "the shadow of a step is as long as it should be, to 1.5 pixels", *BOTH)  # fmt: skip
-def _cliff(preset: str) -> Found:
+def test_cliff(preset: str) -> Found:
     """A step of 0.6 mm within one pixel, a far light at 30 degrees: the shadow is 0.6 mm / tan 30 degrees long."""
     height, angle = 0.6e-3, np.radians(30)
     camera = dataclasses.replace(HALF.camera, apparent_height=10.0)  # without perspective
@@ -213,7 +212,7 @@ def _cliff(preset: str) -> Found:
 
 @case("cliffs_heights", "depth discontinuities", HEIGHT_MAP,
       "one node pushed in by 0.5 mm: finite, overshot by a fifth at most, as cubic splines do")  # fmt: skip
-def spike() -> Found:
+def test_spike() -> Found:
     """A needle of one node."""
     gel = sensors.digit_surface()
     displacement = np.zeros_like(gel.rest)
@@ -226,7 +225,7 @@ def spike() -> Found:
 
 @case("inverted_gel_heights", "inverted start", HEIGHT_MAP,
       "a gel folded over itself gives finite heights, and says so")  # fmt: skip
-def folded() -> Found:
+def test_folded() -> Found:
     """Sideways displacements of five times a press, toward its middle."""
     gel, heard = sensors.digit_surface(), []
     watch = logging.Handler()
@@ -246,7 +245,7 @@ def folded() -> Found:
 
 @case("levels_in_single_precision", "single precision against double", FAST_PICTURE,
       "heights a float32 rounding apart differ by less than 0.05 levels")  # fmt: skip
-def single_levels() -> Found:
+def test_single_levels() -> Found:
     """A press, and the same press with its last bit changed."""
     rest = rest_height_map(HALF.camera)
     right, down = np.meshgrid(HALF.camera.right, HALF.camera.down)

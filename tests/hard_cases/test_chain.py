@@ -6,6 +6,9 @@ import dataclasses
 
 import numpy as np
 
+from hard_cases.case import TRANSLATION, Found, case
+from hard_cases.test_shapes import CONTACTS, HARD_OF, SHOWN
+from hard_cases.test_signals import prepared, translator
 from tactile_core import accuracy
 from tactile_core.mechanics.electrodes.law import signal_of
 from tactile_core.mechanics.force_search import UnreachableError
@@ -13,19 +16,23 @@ from tactile_core.mechanics.solve import solve
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNTS
 
-from .case import TRANSLATION, Found, case
-from .shapes import CONTACTS, HARD_OF, SHOWN
-from .signals import prepared, translator
-
 WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
 
 
 @case("faint_touch_translated", "tiny depth (0.1 um)", TRANSLATION,
-      "a twentieth of a light press: the bound holds, or the frame is flagged", ("deep", 0.01))  # fmt: skip
+      "a twentieth of a light press: the bound holds, or the frame is flagged")  # fmt: skip
+def test_faint_touch() -> Found:
+    return translated("deep", 0.01)
+
+
 @case("{}_translated", HARD_OF, TRANSLATION,
       "the largest node error lies below the bound that holds for 95 of 100 frames, or the frame is flagged",
       *((name,) for name in SHOWN))  # fmt: skip
-def _translated(name: str, share: float = 1.0) -> Found:
+def test_translated(name: str) -> Found:
+    return translated(name, 1.0)
+
+
+def translated(name: str, share: float) -> Found:
     """A contact of the BioTac at a share of its depth and the DIGIT's at the same force, against the translation."""
     _, indenter, place, depth, friction = CONTACTS[name]
     biotac = solve("biotac", indenter, place, depth=share * depth, friction=friction)
@@ -59,7 +66,7 @@ def _translated(name: str, share: float = 1.0) -> Found:
 
 
 @case("nothing_touches_translated", "zero contact", TRANSLATION, "no force, no place, and the gel at rest to 20 um")
-def still() -> Found:
+def test_still() -> Found:
     """Counts that do not change at all."""
     signals = dataclasses.replace(
         prepared()[1], change=np.zeros((1, 19)), electrodes=np.full((1, 19), 3300.0), quiet=np.ones(1, bool),

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from hard_cases.case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
+from hard_cases.contacts import MIDDLE, broken_fast, broken_full, press
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve_path
 from tactile_core.sensors import digit
-
-from .case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
-from .contacts import MIDDLE, broken_fast, broken_full, press
 
 BALL = Sphere(3.5e-3)
 FRICTION = 0.5
@@ -18,7 +17,7 @@ ENDS_AT_MU = "the force along the slide ends at 0.5 of the normal one, to the do
 
 
 @case("slide_{}_fast", "sliding and rolling", MECHANICS_FAST, ENDS_AT_MU, ("digit",), ("biotac",), slow=["biotac"])
-def _slide_fast(sensor: str) -> Found:
+def test_slide_fast(sensor: str) -> Found:
     """0.3 mm deep, then 1.2 mm along the finger: friction grows to the coefficient, and stays."""
     one = press(sensor, BALL, MIDDLE, FRICTION)
     found = one.at_depth(0.3e-3)
@@ -30,7 +29,7 @@ def _slide_fast(sensor: str) -> Found:
 
 
 @case("slide_{}_full", "sliding and rolling", MECHANICS_FULL, ENDS_AT_MU, ("digit",), slow=["digit"])
-def _slide_full(sensor: str) -> Found:
+def test_slide_full(sensor: str) -> Found:
     """The same in the full tier, 0.6 mm far."""
     steps = [Step(depth=0.3e-3), *(Step(depth=0.3e-3, slide=(way, 0.0)) for way in (0.2e-3, 0.4e-3, 0.6e-3))]
     found = list(solve_path(sensor, BALL, MIDDLE, steps, "full", FRICTION))[-1]
@@ -42,7 +41,7 @@ def _slide_full(sensor: str) -> Found:
 
 @case("roll_digit_fast", "sliding and rolling", MECHANICS_FAST,
       "without friction a rolled contact is a fresh press at its place, to twice the gaps' tolerance")  # fmt: skip
-def rolled() -> Found:
+def test_rolled() -> Found:
     """The indenter goes 2 mm across the gel at one depth from its own first touch, in steps, and is then compared."""
     way = np.linspace(0, 2e-3, 9)
     one = press("digit", BALL, MIDDLE, 0.0)
@@ -57,7 +56,7 @@ def rolled() -> Found:
 @case("off_the_rim_{:g}_fast", "contact at the pad's rim and leaving it", MECHANICS_FAST,
       "forces stay balanced and in Coulomb's cone; beyond the gel there is none, and nothing stays deformed",
       (0.0,), (0.5,))  # fmt: skip
-def _off_the_rim(friction: float) -> Found:
+def test_off_the_rim(friction: float) -> Found:
     """From 2 mm inside the gel's side outward, past its outline, until nothing touches."""
     place = Placement(-8e-3, digit.HALF_WIDTH - 2e-3)
     one = press("digit", BALL, place, friction)
@@ -76,7 +75,7 @@ def _off_the_rim(friction: float) -> Found:
 
 @case("lifted_full", "contact at the pad's rim and leaving it", MECHANICS_FULL,
       "a path that ends above the gel ends without force, the gel at rest to 0.01 um")  # fmt: skip
-def lifted() -> Found:
+def test_lifted() -> Found:
     """0.3 mm deep at the rim, then back to first touch."""
     place = Placement(-8e-3, digit.HALF_WIDTH - 0.6e-3)
     found = list(solve_path("digit", BALL, place, [Step(depth=0.3e-3), Step(depth=0.0)], "full", 0.0))[-1]
@@ -86,7 +85,7 @@ def lifted() -> Found:
 
 @case("off_the_gel", "contact at the pad's rim and leaving it", MECHANICS_FAST,
       "a press beside the gel is refused, in words")  # fmt: skip
-def beside() -> Found:
+def test_beside() -> Found:
     """1 mm outside the outline."""
     place = Placement(-8e-3, digit.HALF_WIDTH + 1e-3)
     return refusal(lambda: next(solve_path("digit", BALL, place, [Step(depth=0.1e-3)])), "on the DIGIT's gel")

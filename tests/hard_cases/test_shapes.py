@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from hard_cases.case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
+from hard_cases.contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
 from tactile_core.geometry.indenters import Box, BumpyCube, Edge, Indenter, Pose, Ring, Several, Sphere
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import solve
-
-from .case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal
-from .contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
 
 PAIR = Several(tuple((Sphere(2e-3), Pose(np.array([x, 0.0, 0.0]), np.eye(3))) for x in (-2.5e-3, 2.5e-3)))
 CORNER = Placement(-8.2e-3, 1.13e-3, np.radians(35), np.radians(45))
@@ -39,7 +38,7 @@ EACH = [(name, sensor) for name in CONTACTS for sensor in ("digit", "biotac")]
 @case("{}_{}_fast", HARD_OF, MECHANICS_FAST,
       "converges and is off the full tier by no more than it states, or says that it cannot", *EACH, slow=["biotac"]
       )  # fmt: skip
-def _fast(name: str, sensor: str) -> Found:
+def test_fast(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
     if name == SUNK:
         return refusal(lambda: press(sensor, indenter, place, friction).at_depth(depth), "sunk")
@@ -52,7 +51,7 @@ def _fast(name: str, sensor: str) -> Found:
 @case("{}_{}_full", HARD_OF, MECHANICS_FULL,
       "no node in the indenter or pulled, forces balanced, no cell inside out; or says that it cannot", *EACH,
       slow=["biotac"])  # fmt: skip
-def _full(name: str, sensor: str) -> Found:
+def test_full(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
     if name == SUNK:
         return refusal(lambda: full(sensor, indenter, place, depth, friction), "sunk")
@@ -66,7 +65,7 @@ def _full(name: str, sensor: str) -> Found:
 @case("{}_{}_full_against_reference", HARD_OF, MECHANICS_FULL,
       "differs from the reference tier by no more than it states of itself",
       ("edge", "digit"), ("ring", "digit"), ("two_patches", "digit"), slow=["digit"])  # fmt: skip
-def _against_reference(name: str, sensor: str) -> Found:
+def test_against_reference(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
     found = full(sensor, indenter, place, depth, friction)
     truth = solve(sensor, indenter, place, depth=depth, tier="reference", friction=friction)
