@@ -89,7 +89,7 @@ class Store:
                 f"at most {MAX_FRAMES:,} frames and {MAX_BYTES / 2**30:.0f} GB",
                 "Split the recording",
             )
-        return self._loaded(name).astype(dtype)
+        return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
         """Read the array, or return None where the file does not hold it."""

@@ -56,21 +56,26 @@ def silent(electrodes: np.ndarray) -> np.ndarray:
     electrodes for `FROZEN` frames repeats an old answer.
     """
     same = _lasting(alike(electrodes))
-    change = np.diff(electrodes, axis=0) != 0
+    change = electrodes[1:] != electrodes[:-1]
     if same.all() or (len(electrodes) >= FROZEN and not change.any()):
         return np.ones(len(electrodes), bool)
+    found = same | _frozen(change & ~same[1:, None])
+    if not found.any():
+        return found
     answers = electrodes[~same]
     answers = answers[np.isfinite(answers).all(axis=1)]
     if not len(answers) or not (np.median(answers) > RAW_LEVEL or full_scale(answers)):
         return np.zeros(len(electrodes), bool)
-    return same | _frozen(change & ~same[1:, None])
+    return found
 
 
 def alike(electrodes: np.ndarray) -> np.ndarray:
     """Mark the frames (T,) bool in which most electrodes (T, e) read the same end of the range, in any unit."""
-    middle = np.median(electrodes, axis=1)
-    same = (electrodes == middle[:, None]).mean(axis=1) >= ALIKE
-    return same & ((middle <= 0) | (middle >= COUNT_MAX) | np.isin(middle, list(FULL_SCALES)))
+    found = (electrodes[:, 1:] == electrodes[:, :-1]).any(axis=1)  # where most are the same, two neighbours are
+    middle = np.median(electrodes[found], axis=1)
+    same = (electrodes[found] == middle[:, None]).mean(axis=1) >= ALIKE
+    found[found] = same & ((middle <= 0) | (middle >= COUNT_MAX) | np.isin(middle, list(FULL_SCALES)))
+    return found
 
 
 def _lasting(same: np.ndarray) -> np.ndarray:
@@ -143,9 +148,13 @@ def _still(readings: np.ndarray) -> np.ndarray:
     """
     still = np.zeros(readings.shape, bool)
     for j in range(readings.shape[1]):
-        change = np.diff(readings[:, j]) != 0
+        column = readings[:, j].copy()
+        change = column[1:] != column[:-1]
         bounds = np.r_[0, np.flatnonzero(change) + 1, len(readings)]
-        for run in np.flatnonzero(np.diff(bounds) >= DEAD_FRAMES):
+        runs = np.flatnonzero(np.diff(bounds) >= DEAD_FRAMES)
+        if not len(runs):
+            continue
+        for run in runs:
             first, last = bounds[run], bounds[run + 1]
             if last - first == len(readings) or _moves(readings[first:last]):
                 still[first:last, j] = True

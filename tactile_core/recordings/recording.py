@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -114,7 +115,7 @@ class Recording(Summary):
         labels = {name: column[frames] for name, column in self.labels.items()}
         return replace(self, **rows, labels=labels, truth=None if self.truth is None else self.truth.at(frames))
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Frames per second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
         steps = np.diff(self.time)

@@ -14,6 +14,7 @@ LEVEL = 10.0  # counts that the level may have moved during any glitch, whatever
 STEEPER = 3.0  # times the jump must exceed the calmer neighbouring step: a steep press is steep on both sides (assumed)
 ALONE = 3  # electrodes that jump together in a stuck run; a real contact moves most of the 19 (assumed)
 ROUNDS = 12  # glitches within glitches are peeled off one by one; a backstop
+BLOCK = 2**12  # samples whose steps are taken at a time
 MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothing is repaired (assumed)
 
 
@@ -53,9 +54,10 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     for _ in range(ROUNDS):
         if not is_time_series(found):
             break  # nothing will be repaired, and noise has such runs everywhere: hours in a long file
-        new = (_short_runs(values) | _end_runs(values)) & ~found
+        jumping = _jumping(values)
+        new = (_short_runs(values, jumping) | _end_runs(values)) & ~found
         if not new.any():
-            new = _stuck_runs(values) & ~found
+            new = _stuck_runs(values, jumping) & ~found
         if not new.any():
             break
         found |= new
@@ -65,25 +67,28 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
 
 def is_time_series(glitches: np.ndarray) -> bool:
     """Return false where so many frames look like glitches that neighbouring rows cannot belong together."""
-    return float(glitches.any(axis=1).mean()) <= MAX_SHARE
+    return not glitches.any() or float(glitches.any(axis=1).mean()) <= MAX_SHARE
 
 
-def _short_runs(values: np.ndarray) -> np.ndarray:
+def _jumping(values: np.ndarray) -> np.ndarray:
+    """Return the electrodes of values (T, C) that jump anywhere; in parts, which bounds the memory."""
+    most = np.zeros(values.shape[1])
+    for start in range(0, len(values) - 1, BLOCK):
+        steps = np.diff(values[start : start + BLOCK + 1].astype(float), axis=0)
+        np.maximum(most, np.abs(steps, out=steps).max(axis=0), out=most)
+    return np.flatnonzero(most > LIMIT)
+
+
+def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
     """Glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
     frames = len(values)
     found = np.zeros(values.shape, bool)
-    jumping = [j for j in range(values.shape[1]) if np.abs(_steps(values, j)).max(initial=0.0) > LIMIT]
     for length in range(1, min(SHORT, frames - 2) + 1):
         for j in jumping:
             _mark_short(values[:, j].astype(float), found[:, j], length)
         if not is_time_series(found):
             break
     return found
-
-
-def _steps(values: np.ndarray, j: int) -> np.ndarray:
-    """Return the steps (T - 1,) of one electrode of values (T, C): those of all would take as much memory as they."""
-    return np.diff(values[:, j].astype(float))
 
 
 def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
@@ -138,16 +143,14 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
     return found
 
 
-def _stuck_runs(values: np.ndarray) -> np.ndarray:
+def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
     """Runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
     found = np.zeros(values.shape, bool)
-    large = np.empty((len(values) - 1, values.shape[1]), bool)
-    for column_index in range(values.shape[1]):
-        large[:, column_index] = np.abs(_steps(values, column_index)) > LIMIT
-    alone = large.sum(axis=1) <= ALONE
-    for j in np.flatnonzero(large.any(axis=0)):
+    large = np.array([np.abs(np.diff(values[:, j].astype(float))) > LIMIT for j in jumping])
+    alone = large.sum(axis=0) <= ALONE
+    for j, jumps in zip(jumping, large, strict=True):
         column, ended = values[:, j].astype(float), -1
-        for start, end, around in _opposite_jumps(column, np.flatnonzero(large[:, j] & alone)):
+        for start, end, around in _opposite_jumps(column, np.flatnonzero(jumps & alone)):
             samples = column[start : end + 2, None]
             if start != ended and _is_flat_jump(samples, around)[0] and _leaves_usual(column, start, end + 1):
                 found[start + 1 : end + 1, j] = True

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import TactileError
+from .signal_kind import WHOLE, counted, median
 
 WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
 FEWEST = 8  # frames of a window, at slow rates
@@ -25,7 +27,8 @@ TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be
 TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
 TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
 LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet: robust as a least value (assumed)
-BLOCK = 2**14  # frames whose changes are made at a time, which bounds the memory of a long recording
+BLOCK = 2**12  # frames whose changes are made at a time, which bounds the memory of a long recording
+STRETCH = 256  # windows that are compared with a level at once
 NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
 
 
@@ -40,7 +43,7 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all windows of n frames, by start frame: sums (W, 19), calm, pdc or None, middle (s) (W,).
+    """Statistics of all windows of n frames, by start frame: sums (19, W), calm, pdc or None, middle (s) (W,).
 
     The sums are in single precision where that is exact, as it is of counts: in double they are twice the recording.
     """
@@ -51,19 +54,11 @@ class _Windows:
     pdc: np.ndarray | None
     middle: np.ndarray
 
-    def mean_of(self, electrode: int) -> np.ndarray:
-        """Return the means (W,) of one electrode."""
-        return self.sums[:, electrode].astype(float) / self.n
-
-    def mean_at(self, window: int) -> np.ndarray:
-        """Return the means (19,) of one window."""
-        return self.sums[window].astype(float) / self.n
-
     def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Return the largest (W,) of what the electrodes' means (W,) are changed to."""
-        found = change(self.mean_of(0))
-        for electrode in range(1, self.sums.shape[1]):
-            np.maximum(found, change(self.mean_of(electrode)), out=found)
+        found = change(self.sums[0].astype(float) / self.n)
+        for sums in self.sums[1:]:
+            np.maximum(found, change(sums.astype(float) / self.n), out=found)
         return found
 
 
@@ -89,9 +84,10 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
         )
     windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
     accepted = _rest_rectified(windows) if kind == "rectified" else _rest_signed(windows, kind, len(electrodes) / rate)
-    mask = np.zeros(len(electrodes), bool)
-    for start in np.flatnonzero(accepted):
-        mask[start : start + n] = True
+    ends = np.zeros(len(electrodes) + 1, np.int8)  # 1 where the first window over a frame begins, -1 behind the last
+    ends[:-n] += accepted
+    ends[n:] -= accepted
+    mask = np.cumsum(ends[:-1]) > 0
     parts = _runs(mask)
     by = "calm electrodes and the lowest PDC" if windows.pdc is not None else "calm electrodes (no PDC to confirm it)"
     evidence = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
@@ -101,11 +97,10 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
     """Return the window for rest where nothing is quiet: of lowest PDC if there is one, else of least movement."""
     n = min(window_frames(rate), len(electrodes))
-    windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
-    if windows.pdc is not None:
-        start = int(np.argmin(windows.pdc))
+    if pdc is not None and np.isfinite(pdc).all():
+        start = int(np.argmin(_sums(pdc, n)))
     else:
-        start = int(np.argmin(np.max([_spread(column.astype(float), n) for column in electrodes.T], axis=0)))
+        start = int(np.argmin(np.max([_spread(column - median(column), n) for column in electrodes.T], axis=0)))
     return slice(start, start + n)
 
 
@@ -121,13 +116,20 @@ class Baseline:
         """Make the baseline that is at counts (19,) in every frame."""
         return cls(np.zeros(1), np.asarray(counts, float)[None])
 
+    @functools.cached_property
+    def _slopes(self) -> np.ndarray:
+        """Counts a frame (P, 19) after each of the frames, none after the last."""
+        return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
+
     def at(self, frames: np.ndarray) -> np.ndarray:
         """Return the readings (n, 19) counts, not to be written to, in frames (n,)."""
         if len(self.levels) == 1:
             return np.broadcast_to(self.levels[0], (len(frames), self.levels.shape[1]))
-        found = np.empty((len(frames), self.levels.shape[1]))
-        for j, levels in enumerate(self.levels.T):
-            found[:, j] = np.interp(frames, self.frames, levels)
+        before = np.maximum(np.searchsorted(self.frames, frames, "right") - 1, 0)
+        since = np.clip(frames, self.frames[0], self.frames[-1]) - self.frames[before]
+        found = self._slopes[before]
+        found *= since[:, None]
+        found += self.levels[before]
         return found
 
 
@@ -144,7 +146,7 @@ class Changes:
         return self._count
 
     def __getitem__(self, rows: slice | np.ndarray) -> np.ndarray:
-        frames = np.arange(self._count)[rows] if isinstance(rows, slice) else rows
+        frames = np.arange(*rows.indices(self._count)) if isinstance(rows, slice) else rows
         first = self._of(frames[:BLOCK])
         if len(frames) <= BLOCK:
             return first
@@ -186,34 +188,43 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 def level(samples: np.ndarray) -> np.ndarray:
     """Return the mean (19,) of the middle half of (n, 19) samples: robust like the median, but not whole counts."""
     cut = len(samples) // 4
-    return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)
+    counts = counted(samples)
+    if counts is None:
+        return np.sort(samples, axis=0)[cut : len(samples) - cut].mean(axis=0, dtype=float)
+    last = np.cumsum(counts, axis=1)
+    inside = np.minimum(last, len(samples) - cut) - np.maximum(last - counts, cut)
+    return np.maximum(inside, 0) @ WHOLE / (len(samples) - 2 * cut)
 
 
 def _sums(values: np.ndarray, n: int) -> np.ndarray:
-    total = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
-    return total[n:] - total[:-n]
+    """Sums (..., W) of each window of n values (..., T)."""
+    total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
+    np.cumsum(values, axis=-1, out=total[..., 1:])
+    return total[..., n:] - total[..., :-n]
 
 
-def _spread(values: np.ndarray, n: int) -> np.ndarray:
-    """Standard deviation (W,) of values (T,) within each window."""
-    centred = values - np.median(values)  # keeps the squares small
+def _spread(centred: np.ndarray, n: int) -> np.ndarray:
+    """Standard deviation (..., W) within each window of values (..., T) about 0, which keeps their squares small."""
     mean = _sums(centred, n) / n
-    return np.sqrt(np.maximum(_sums(centred**2, n) / n - mean**2, 0.0))
+    return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
 
 
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
-    sums, calm = np.zeros((count, electrodes.shape[1]), np.float32), np.ones(count, bool)
-    for j, column in enumerate(electrodes.T):  # one at a time: sums of all would take seven times the recording
-        column = column.astype(float)
-        halves = _sums(column, half) / half
-        trend = halves[n - half : n - half + count] - halves[:count]
-        calm &= (_spread(column, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)
-        total = _sums(column, n)
-        if sums.dtype == np.float32 and not np.array_equal(total, total.astype(np.float32)):
+    medians = np.array([[median(column)] for column in electrodes.T])
+    sums, calm = np.zeros((electrodes.shape[1], count), np.float32), np.ones(count, bool)
+    for start in range(0, count, BLOCK):  # sums of all would take seven times the recording
+        part = electrodes[start : start + BLOCK + n - 1].T.astype(float, order="C")
+        exact = _sums(part, n)
+        windows = slice(start, start + exact.shape[1])
+        halves = _sums(part, half) / half
+        trend = halves[:, n - half : n - half + exact.shape[1]] - halves[:, : exact.shape[1]]
+        calm[windows] = ((_spread(part - medians, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)).all(axis=0)
+        sums[:, windows] = exact
+        if (sums[:, windows] != exact).any():
             sums = sums.astype(float)
-        sums[:, j] = total
+            sums[:, windows] = exact
     pressure = _sums(pdc, n) / n if pdc is not None else None
     return _Windows(n, sums, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
 
@@ -241,36 +252,43 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
     off = windows.largest(lambda mean: np.abs(mean - mean[anchor]))
     if windows.pdc is None:
         agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
-        return agree & _tracked(windows.mean_at, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
-    pressure, pressures = windows.pdc - windows.pdc[anchor], windows.pdc[:, None]
+        return agree & _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
+    pressure = windows.pdc - windows.pdc[anchor]
     agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
-    agree &= _tracked(windows.mean_at, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
-    return agree & _tracked(lambda window: pressures[window], windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
+    agree &= _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    return agree & _tracked(windows.pdc[None], 1, windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
 
 
 def _tracked(
-    values: Callable[[int], np.ndarray],
+    sums: np.ndarray,
+    n: int,
     middle: np.ndarray,
     possible: np.ndarray,
     anchor: int,
     level: float,
     rate: float,
 ) -> np.ndarray:
-    """Mark windows (W,) bool whose values, (C,) of each, lie near a level that follows them from the anchor on.
+    """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
 
     The level moves at ``rate`` a second at most: drift over an hour can exceed a press.
     """
     accepted = np.ones(len(middle), bool)
-    if np.abs(middle - middle[anchor]).max() <= TRACKED:
-        return accepted
     candidates = np.flatnonzero(possible)
+    near = level + rate * TRACKED
+    # The level stays among the means that it follows: where these lie together, none can be far from it.
+    if np.abs(middle - middle[anchor]).max() <= TRACKED or max(np.ptp(row[candidates]) for row in sums) <= near * n:
+        return accepted
     for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
-        now, last = values(anchor), middle[anchor]
-        for k in way:
-            since, off = abs(middle[k] - last), values(k) - now
-            accepted[k] = np.abs(off).max() <= level + rate * (since + TRACKED)
-            if accepted[k]:
-                now, last = now + np.clip(off, -rate * since, rate * since), middle[k]
+        now, last = sums[:, anchor].astype(float) / n, float(middle[anchor])
+        for start in range(0, len(way), STRETCH):
+            rows = way[start : start + STRETCH]
+            means, times = sums[:, rows].T.astype(float) / n, middle[rows].tolist()
+            all_near = np.abs(means - now).max() + rate * abs(times[-1] - last) <= near
+            for k, mean, time in zip(rows, means, times, strict=True):
+                step = rate * abs(time - last)
+                accepted[k] = all_near or np.abs(mean - now).max() <= near + step
+                if accepted[k]:
+                    now, last = np.minimum(np.maximum(mean, now - step), now + step), time
     return accepted
 
 

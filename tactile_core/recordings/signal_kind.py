@@ -11,6 +11,7 @@ RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Rupp
 # Larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed).
 SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
+WHOLE = np.arange(-(2**15), 2**15)  # numbers that are counted one by one
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
 # Readings at the top of the range, of raw readings that are not counts of 12 bit (assumed: the usual exports).
 FULL_SCALES = {
@@ -18,8 +19,40 @@ FULL_SCALES = {
     255.0: "counts of 8 bit", 1023.0: "counts of 10 bit",
 }  # fmt: skip
 AT_REST = 0.55, 0.97  # shares of the range between which a unit's electrodes rest in the median (2,600 to 3,500 counts)
+BEYOND = 1.01  # times the range, that no reading exceeds but by noise (assumed)
 LEAST_RAW = 0.3  # share of the range below which raw readings of an electrode do not fall (assumed)
 MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assumed)
+
+
+def counted(columns: np.ndarray) -> np.ndarray | None:
+    """Count how often each whole number from -32,768 on is in each column (T, e), finite; returns (e, 65536) int.
+
+    None where other numbers occur, and of short columns: sorting long ones takes twice their memory and most of the
+    time that a recording takes.
+    """
+    if len(columns) < len(WHOLE):
+        return None
+    counts = np.empty((columns.shape[1], len(WHOLE)), int)
+    for j, column in enumerate(columns.T):
+        whole = column.astype(np.int32)
+        if (whole != column).any() or whole.min() < WHOLE[0] or whole.max() > WHOLE[-1]:
+            return None
+        counts[j] = np.bincount(whole - WHOLE[0], minlength=len(WHOLE))
+    return counts
+
+
+def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
+    """Return the percentiles of numbers of which so many (65536,) are equal to each of `WHOLE`, as numpy's."""
+    place = np.array(shares) / 100 * (counts.sum() - 1)
+    below = np.floor(place)
+    low, high = (WHOLE[np.searchsorted(np.cumsum(counts), rank, "right")] for rank in (below, np.ceil(place)))
+    return low + (high - low) * (place - below)
+
+
+def median(column: np.ndarray) -> float:
+    """Return the median of a column (T,), finite."""
+    counts = counted(column[:, None])
+    return float(np.median(column)) if counts is None else float(percentiles(counts[0], [50])[0])
 
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
@@ -27,10 +60,12 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 
     electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0
     """
-    low, high = np.percentile(electrodes, [1, 99], axis=0)
-    levels = np.median(electrodes, axis=0)
+    beyond = (electrodes > BEYOND * max(FULL_SCALES)).mean(axis=0) > 0.5
+    if beyond.mean() > 1 - MOST_OF:  # counts, seen without sorting them
+        return None
+    low, levels, high = np.transpose([np.percentile(column, [1, 50, 99]) for column in electrodes.T])
     for full, words in FULL_SCALES.items():
-        within = (low >= LEAST_RAW * full) & (high <= 1.01 * full)
+        within = (low >= LEAST_RAW * full) & (high <= BEYOND * full)
         if within.mean() >= MOST_OF and AT_REST[0] <= np.median(levels[within]) / full <= AT_REST[1]:
             return COUNT_MAX / full, words
     return None
@@ -38,12 +73,15 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:
     """Return kind and the evidence for it in words. electrodes : (T, 19) float, finite, as in the file."""
-    levels = np.median(electrodes, axis=0)
-    low, high = np.percentile(electrodes, [0.5, 99.5])
-    counts = sum(
-        int((np.abs(column - np.rint(column)) < 1e-9).sum()) for column in electrodes.T
-    )  # one at a time: memory
-    whole = counts / electrodes.size
+    counts = counted(electrodes)
+    if counts is not None:
+        levels = np.array([percentiles(each, [50])[0] for each in counts])
+        low, high = percentiles(counts.sum(axis=0), [0.5, 99.5])
+        whole = 1.0
+    else:  # a column at a time: memory
+        levels = np.array([np.median(column) for column in electrodes.T])
+        low, high = np.percentile(electrodes, [0.5, 99.5])
+        whole = sum(int((np.abs(column - np.rint(column)) < 1e-9).sum()) for column in electrodes.T) / electrodes.size
     negative = float(np.mean(electrodes < 0))
     numbers = "whole numbers" if whole > WHOLE_SHARE else f"{1 - whole:.0%} fractions"
     span = f"{numbers} from {low:.4g} to {high:.4g}"

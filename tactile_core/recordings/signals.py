@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -170,7 +169,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     kind, evidence = _kind(recording, readings, options)
     unit = _counts_per_unit(recording, readings, kind, options, warnings)
     if unit != 1:
-        readings = readings * unit
+        readings = np.multiply(readings, unit, dtype=float)
         if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
             kind, evidence = detect(readings)
         if kind == "raw" and recording.pdc is not None and np.nanmax(recording.pdc) <= 1.01 * COUNT_MAX / unit:
@@ -196,7 +195,8 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
     flags |= np.uint16(polarity.doubt)
     warnings += polarity.warnings
-    change = change.then(partial(np.multiply, polarity.sign))
+    if polarity.sign < 0:
+        change = change.then(np.negative)
     pdc = _pressure_change(recording, kind, quiet, unit_rest)
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))
@@ -313,7 +313,9 @@ def _counts_per_unit(
         return found[0]
     if kind != "scaled":
         return 1.0
-    largest = np.abs(readings - np.median(readings, axis=0)).max(axis=1)
+    largest = np.zeros(len(readings))
+    for column in readings.T:
+        np.maximum(largest, np.abs(column - np.median(column)), out=largest)
     peak = float(np.percentile(largest, 95))
     factor = SCALED_PEAK / peak if peak > 1e-12 else 1.0
     warnings.append(

@@ -108,7 +108,8 @@ def _of_finger(style: str, finger: int) -> list[str]:
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
     """Read the array (T, 19) of that name. Raises TactileError for another sensor's, or another shape."""
-    shape, _ = store.shapes[name]
+    shape, kind = store.shapes[name]
     if len(shape) == 2 and shape[1] != ELECTRODES:
         check_electrodes(store.path, shape[1], name)
-    return store.array(name, (None, ELECTRODES))
+    exact = kind.kind in "iu" and kind.itemsize <= 2  # in single precision, half the memory of a long recording
+    return store.array(name, (None, ELECTRODES), np.float32 if exact else np.float64)
