@@ -12,8 +12,8 @@ from ..sensors import SOURCE, electrode_count, typical_rest
 from .assemble import check_electrodes
 from .electrode_faults import silent as silent_frames
 from .flags import Flag
+from .quiet import tare_frames
 from .recording import Recording
-from .rest_level import tare_frames
 from .signals import EVERY, PrepareOptions, Signals, prepare_all
 
 

@@ -19,7 +19,8 @@ from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, POLARITIES, RISES, Fluid
 from .doubt import Doubt, Reason
 from .flags import Flag
-from .rest_level import BLOCK, Framewise
+from .recording import BLOCK
+from .rest_level import Framewise
 
 AUTO = "auto"
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing

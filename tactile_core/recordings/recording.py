@@ -12,6 +12,7 @@ import numpy as np
 from ..files.short_text import Summary
 from ..sensors import SAMPLE_RATE, SOURCE
 
+BLOCK = 2**12  # frames that are worked on at a time, which bounds the memory of a long recording
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
 
 

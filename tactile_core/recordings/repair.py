@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from .recording import BLOCK
+
 LIMIT = 30.0  # counts from the level around it; a glitch (docs/sources.md, BioTac read-out)
 SHORT = 5  # samples; the longest glitch that a median of 11 samples can see
 STUCK = 50  # samples; longest stay of a single electrode at a wrong level that is still repaired (assumed, 0.5 s)
@@ -14,7 +16,6 @@ LEVEL = 10.0  # counts that the level may have moved during any glitch, whatever
 STEEPER = 3.0  # times the jump must exceed the calmer neighbouring step: a steep press is steep on both sides (assumed)
 ALONE = 3  # electrodes that jump together in a stuck run; a real contact moves most of the 19 (assumed)
 ROUNDS = 12  # glitches within glitches are peeled off one by one; a backstop
-BLOCK = 2**12  # samples whose steps are taken at a time
 MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothing is repaired (assumed)
 
 

@@ -15,23 +15,10 @@ from .doubt import LAW, Doubt, Reason, without
 from .electrode_faults import dead, saturated
 from .flags import Flag
 from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor
-from .recording import Recording
+from .quiet import TARED_PDC, Quiet, calmest, find_quiet, tare_frames, window_frames
+from .recording import BLOCK, Recording
 from .repair import fill, find_glitches, is_time_series, smooth
-from .rest_level import (
-    BLOCK,
-    TARED_PDC,
-    Baseline,
-    Changes,
-    Framewise,
-    Quiet,
-    baseline,
-    calmest,
-    find_quiet,
-    level,
-    pressure_rest,
-    tare_frames,
-    window_frames,
-)
+from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
 from .signal_kind import KINDS, detect, full_scale
 from .tables.column_map import ColumnMap
 

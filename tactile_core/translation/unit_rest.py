@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import TactileError
 from ..recordings import Recording
+from ..recordings.quiet import TARED_PDC, window_frames
 from ..recordings.repair import fill
-from ..recordings.rest_level import TARED_PDC, level, window_frames
+from ..recordings.rest_level import level
 from ..recordings.signal_kind import detect
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)

@@ -10,7 +10,7 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.errors import TactileError
-from tactile_core.recordings import chunks, rest_level
+from tactile_core.recordings import chunks, quiet, rest_level
 from tactile_core.recordings.tables import table
 from tactile_core.recordings.tables.column_map import ColumnMap
 
@@ -112,7 +112,7 @@ def test_rest_that_drifts_is_found_without_a_copy_of_the_recording():
     electrodes, mask = np.zeros((20_000, 19), np.float32), np.zeros(20_000, bool)
     mask[:30] = mask[-30:] = True
     tracemalloc.start()
-    rest = rest_level.baseline(electrodes, rest_level.Quiet(mask, ((0, 30), (19_970, 20_000)), ""), drift=True)
+    rest = rest_level.baseline(electrodes, quiet.Quiet(mask, ((0, 30), (19_970, 20_000)), ""), drift=True)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 0.05 * electrodes.nbytes  # the levels of two parts; of every frame it would be twice the recording

@@ -12,6 +12,7 @@ from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_faults import _still
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.quiet import find_quiet
 from tactile_core.recordings.signal_kind import KINDS
 
 NOISE = 0.6  # counts; 1.2 over 175 quiet and 225 held frames deviate by 0.13; 4.5 deviations for the largest of 19
@@ -232,3 +233,12 @@ def test_a_pressure_that_is_no_number_is_said(make):
     signals = recordings.prepare(recording)
     assert f"PDC has no number in 7 of {len(recording)} frames" in "\n".join(signals.warnings)
     assert np.isnan(signals.pdc[:7]).all() and np.isfinite(signals.pdc[7:]).all()
+
+
+def test_rest_is_followed_where_it_drifts_further_than_a_press():
+    frames = np.arange(40_000)
+    drift = np.interp(frames, [0, 20_000, 40_000], [0, 16, 0])[:, None] * np.linspace(-1, 1, 19)
+    electrodes = 3000 + drift + np.random.default_rng(1).normal(0, 0.7, (len(frames), 19))
+    electrodes[38_000:39_000] -= 15.0  # a steady grip as large as the drift, which after so long may be rest
+    quiet = find_quiet(electrodes, None, 100.0, "raw").mask
+    assert quiet[:37_000].mean() > 0.9 and quiet[39_100:].mean() > 0.9 and not quiet[38_000:39_000].any()

@@ -9,7 +9,8 @@ import numpy as np
 from ...recordings.electrode_faults import alike
 from ...recordings.flags import Flag
 from ...recordings.polarity import AUTO, TOUCHING, Basis, Polarity, polarity_of, polarity_of_sensor
-from ...recordings.rest_level import find_quiet, level, tare_frames, window_frames
+from ...recordings.quiet import find_quiet, tare_frames, window_frames
+from ...recordings.rest_level import level
 from ...recordings.signal_kind import detect, full_scale
 from ...recordings.signals import Rest, Signals
 from ...sensors import SAMPLE_RATE, SOURCE, contacts_of, electrode_count

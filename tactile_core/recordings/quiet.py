@@ -1,0 +1,240 @@
+"""Find the parts of a recording without contact, wherever they lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import TactileError
+from .recording import BLOCK
+from .signal_kind import median
+
+WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
+FEWEST = 8  # frames of a window, at slow rates
+# Counts within a window: noise is 0.7-1.5 (docs/sources.md), plus 4 deviations of its estimate from 30 samples.
+CALM_STD = 2.4
+CALM_TREND = 2.5  # counts from the first to the second half of a window: 4 deviations of that difference at 1.5 counts
+QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
+RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
+RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
+# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s).
+LEVEL, LEVEL_RATE = 3.0, 0.1
+LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
+PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
+TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be as large as a press (assumed)
+TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
+TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
+STRETCH = 256  # windows that are compared with a level at once
+NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """Quiet parts; mask : (T,) bool; parts : first and one-past-last frame of each quiet part; evidence in words."""
+
+    mask: np.ndarray
+    parts: tuple[tuple[int, int], ...]
+    evidence: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Windows:
+    """Statistics of all windows of n frames, by start frame: sums (19, W), calm, pdc or None, middle (s) (W,).
+
+    The sums are in single precision where that is exact, as it is of counts: in double they are twice the recording.
+    """
+
+    n: int
+    sums: np.ndarray
+    calm: np.ndarray
+    pdc: np.ndarray | None
+    middle: np.ndarray
+
+    def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return the largest (W,) of what the electrodes' means (W,) are changed to."""
+        found = change(self.sums[0].astype(float) / self.n)
+        for sums in self.sums[1:]:
+            np.maximum(found, change(sums.astype(float) / self.n), out=found)
+        return found
+
+
+def window_frames(rate: float) -> int:
+    """Return the number of frames of the tare window at this rate (Hz)."""
+    return max(FEWEST, round(WINDOW * rate))
+
+
+def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
+    """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
+
+    electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz.
+
+    A held press is calm too. PDC separates it from rest: the fluid pressure is lowest without contact. Without PDC,
+    calm parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is
+    near zero.
+    Known limit: a raw recording of one steady contact from its first frame to its last looks like rest.
+    """
+    n = window_frames(rate)
+    if len(electrodes) < n:
+        return Quiet(
+            np.zeros(len(electrodes), bool), (), f"{len(electrodes)} frames are fewer than the {n} of the tare window"
+        )
+    windows = _running(electrodes, pdc if pdc is not None and np.isfinite(pdc).all() else None, n, rate)
+    accepted = _rest_rectified(windows) if kind == "rectified" else _rest_signed(windows, kind, len(electrodes) / rate)
+    ends = np.zeros(len(electrodes) + 1, np.int8)  # 1 where the first window over a frame begins, -1 behind the last
+    ends[:-n] += accepted
+    ends[n:] -= accepted
+    mask = np.cumsum(ends[:-1]) > 0
+    parts = _runs(mask)
+    by = "calm electrodes and the lowest PDC" if windows.pdc is not None else "calm electrodes (no PDC to confirm it)"
+    evidence = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
+    return Quiet(mask, parts, evidence)
+
+
+def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
+    """Return the window for rest where nothing is quiet: of lowest PDC if there is one, else of least movement."""
+    n = min(window_frames(rate), len(electrodes))
+    if pdc is not None and np.isfinite(pdc).all():
+        start = int(np.argmin(_sums(pdc, n)))
+    else:
+        start = int(np.argmin(np.max([_spread(column - median(column), n) for column in electrodes.T], axis=0)))
+    return slice(start, start + n)
+
+
+def _sums(values: np.ndarray, n: int) -> np.ndarray:
+    """Sums (..., W) of each window of n values (..., T)."""
+    total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
+    np.cumsum(values, axis=-1, out=total[..., 1:])
+    return total[..., n:] - total[..., :-n]
+
+
+def _spread(centred: np.ndarray, n: int) -> np.ndarray:
+    """Standard deviation (..., W) within each window of values (..., T) about 0, which keeps their squares small."""
+    mean = _sums(centred, n) / n
+    return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
+
+
+def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
+    half = max(1, n // 2)
+    count = len(electrodes) - n + 1
+    medians = np.array([[median(column)] for column in electrodes.T])
+    sums, calm = np.zeros((electrodes.shape[1], count), np.float32), np.ones(count, bool)
+    for start in range(0, count, BLOCK):  # sums of all would take seven times the recording
+        part = electrodes[start : start + BLOCK + n - 1].T.astype(float, order="C")
+        exact = _sums(part, n)
+        windows = slice(start, start + exact.shape[1])
+        halves = _sums(part, half) / half
+        trend = halves[:, n - half : n - half + exact.shape[1]] - halves[:, : exact.shape[1]]
+        calm[windows] = ((_spread(part - medians, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)).all(axis=0)
+        sums[:, windows] = exact
+        if (sums[:, windows] != exact).any():
+            sums = sums.astype(float)
+            sums[:, windows] = exact
+    pressure = _sums(pdc, n) / n if pdc is not None else None
+    return _Windows(n, sums, calm, pressure, (np.arange(count) + 0.5 * (n - 1)) / rate)
+
+
+def _rest_rectified(windows: _Windows) -> np.ndarray:
+    """Mark windows (W,) bool at rest. Rectified readings are zero at the tare, so rest is small and calm."""
+    largest = windows.largest(lambda mean: mean)
+    if windows.pdc is None:
+        return windows.calm & (largest <= RECTIFIED_LEVEL)
+    return windows.calm & (windows.pdc < QUIET_PDC) & (largest <= RECTIFIED_LEVEL_PDC)
+
+
+def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
+    """Mark windows (W,) bool at rest: one calm window is chosen, with all calm ones that agree with it."""
+    possible = windows.calm
+    if kind != "raw":
+        possible = possible & (windows.largest(np.abs) <= TARED_LEVEL)
+        if windows.pdc is not None and np.median(windows.pdc) < TARED_PDC:
+            possible &= windows.pdc < QUIET_PDC
+    calm = np.flatnonzero(possible)
+    if len(calm) == 0:
+        return possible
+    anchor = _anchor(windows, calm, kind, duration)
+    apart = np.abs(windows.middle - windows.middle[anchor])
+    off = windows.largest(lambda mean: np.abs(mean - mean[anchor]))
+    if windows.pdc is None:
+        agree = possible & (off <= LEVEL + LEVEL_RATE * apart)
+        return agree & _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL, LEVEL_RATE)
+    pressure = windows.pdc - windows.pdc[anchor]
+    agree = possible & (pressure < QUIET_PDC + PDC_RATE * apart) & (off <= LEVEL_PDC + LEVEL_PDC_RATE * apart)
+    agree &= _tracked(windows.sums, windows.n, windows.middle, agree, anchor, LEVEL_PDC, LEVEL_PDC_RATE)
+    return agree & _tracked(windows.pdc[None], 1, windows.middle, agree, anchor, QUIET_PDC, PDC_RATE)
+
+
+def _tracked(
+    sums: np.ndarray,
+    n: int,
+    middle: np.ndarray,
+    possible: np.ndarray,
+    anchor: int,
+    level: float,
+    rate: float,
+) -> np.ndarray:
+    """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
+
+    The level moves at ``rate`` a second at most: drift over an hour can exceed a press.
+    """
+    accepted = np.ones(len(middle), bool)
+    candidates = np.flatnonzero(possible)
+    near = level + rate * TRACKED
+    # The level stays among the means that it follows: where these lie together, none can be far from it.
+    if np.abs(middle - middle[anchor]).max() <= TRACKED or max(np.ptp(row[candidates]) for row in sums) <= near * n:
+        return accepted
+    for way in (candidates[candidates >= anchor], candidates[candidates < anchor][::-1]):
+        now, last = sums[:, anchor].astype(float) / n, float(middle[anchor])
+        for start in range(0, len(way), STRETCH):
+            rows = way[start : start + STRETCH]
+            means, times = sums[:, rows].T.astype(float) / n, middle[rows].tolist()
+            all_near = np.abs(means - now).max() + rate * abs(times[-1] - last) <= near
+            for k, mean, time in zip(rows, means, times, strict=True):
+                step = rate * abs(time - last)
+                accepted[k] = all_near or np.abs(mean - now).max() <= near + step
+                if accepted[k]:
+                    now, last = np.minimum(np.maximum(mean, now - step), now + step), time
+    return accepted
+
+
+def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
+    if windows.pdc is not None:
+        low = windows.pdc[calm]
+        calm = calm[low <= low.min() + 0.5 * QUIET_PDC]
+    if kind != "raw":
+        return int(calm[np.argmin(windows.largest(np.abs)[calm])])
+    early = windows.middle[calm] <= NEAR_END + 0.5 * WINDOW
+    late = windows.middle[calm] >= duration - NEAR_END - 0.5 * WINDOW
+    if early.any():
+        return int(calm[0])
+    return int(calm[-1]) if late.any() else int(calm[0])
+
+
+def _runs(mask: np.ndarray) -> tuple[tuple[int, int], ...]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
+
+
+def tare_frames(asked: slice | str, count: int) -> slice:
+    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside these `count` frames."""
+    if isinstance(asked, slice):
+        tare = asked
+    else:
+        ends = asked.split(":")
+        try:
+            tare = slice(*(int(end) if end.strip() else None for end in ends))
+        except (ValueError, TypeError):
+            ends = []
+        if len(ends) != 2:
+            raise TactileError("option tare", repr(asked), "frames A:B, such as 0:50, or 'none'")
+    first = 0 if tare.start is None else tare.start + (count if tare.start < 0 else 0)
+    last = count if tare.stop is None else tare.stop + (count if tare.stop < 0 else 0)
+    if tare.step not in (None, 1) or not 0 <= first < last <= count:
+        raise TactileError(
+            "option tare",
+            f"frames {asked if isinstance(asked, str) else f'{tare.start}:{tare.stop}'}",
+            f"A:B inside {count} frames, without a step",
+            "Name frames without contact",
+        )
+    return slice(first, last)
