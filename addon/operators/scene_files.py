@@ -101,7 +101,7 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         require("msgspec")
-        from ...tactile_core.simulation.scene_text import write_scene
+        from ...tactile_core.simulation.scene import write_scene
 
         path = Path(bpy.path.abspath(self.filepath))
         if path.name != "scene.toml":

@@ -40,7 +40,7 @@ class TACTILE_OT_simulate(JobOperator):
     def begin(self, context: bpy.types.Context) -> None:
         """See ``JobOperator``."""
         require("h5py", "msgspec", "scipy")
-        from ...tactile_core.simulation.scene_text import write_scene
+        from ...tactile_core.simulation.scene import write_scene
 
         properties.check_own(*simulation_result.sensors_in(context.scene))
         found = scene_bridge.authored(context)

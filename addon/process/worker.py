@@ -101,8 +101,7 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
     from tactile_core.errors import TactileError
     from tactile_core.mechanics.placement import Placement, pose_at
     from tactile_core.mechanics.solve import solve
-    from tactile_core.simulation.scene import load_scene
-    from tactile_core.simulation.scene_text import to_toml
+    from tactile_core.simulation.scene import load_scene, to_toml
 
     scene = load_scene(folder)[0]
     spec = scene.recording

@@ -36,8 +36,7 @@ from tactile_core.mechanics.error_estimate import measured  # noqa: E402
 from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
 from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
 from tactile_core.mechanics.fast.press import CorrectedPress, FastContact  # noqa: E402
-from tactile_core.mechanics.placement import FRICTION, pose_at  # noqa: E402
-from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under  # noqa: E402
+from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under  # noqa: E402  # noqa: E402
 from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: E402
 from tactile_core.pictures.renderer import Renderer  # noqa: E402
 

@@ -31,9 +31,8 @@ from benchmarks.mechanics.random_contacts import random_contacts
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
-from tactile_core.mechanics.placement import pose_at
+from tactile_core.mechanics.placement import pose_at, thickness_under
 from tactile_core.mechanics.solve import solve
-from tactile_core.mechanics.thickness import thickness_under
 from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map

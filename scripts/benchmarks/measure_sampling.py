@@ -23,9 +23,8 @@ from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.files.shipped import shipped
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import Placement, pose_at, thickness_under
 from tactile_core.mechanics.solve import Solution, solve
-from tactile_core.mechanics.thickness import thickness_under
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.perspective import bilinear, slopes
 from tactile_core.recordings import prepare, read

@@ -34,8 +34,8 @@ from benchmarks.mechanics.tier_truth import write_truth
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, TABLE
+from tactile_core.mechanics.placement import DEPTH_LIMIT
 from tactile_core.mechanics.solve import Sensor, Tier
-from tactile_core.mechanics.thickness import DEPTH_LIMIT
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
 

@@ -18,10 +18,9 @@ from ..files import array_pack, atomic, checksummed
 from ..mechanics.electrodes.law import SHEET
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
-from ..simulation.scene import Scene
+from ..simulation.scene import Scene, to_toml
 from ..simulation.scene_grid import combinations, name_of, with_values
 from ..simulation.scene_recording import DEFAULT, check_places, recording_of
-from ..simulation.scene_text import to_toml
 from .engine import job as jobs
 from .engine import result_parts, scene_input
 from .engine import run as runs

@@ -19,10 +19,9 @@ from .. import accuracy, sensors
 from ..errors import TactileError
 from ..files.installed import advice
 from ..geometry.indenters import Sphere
-from ..mechanics.body_contact import BodyContact, leaning, patch_radius
 from ..mechanics.fast.compliance import compliance_of
-from ..mechanics.inverse_contact import pressing_traction
 from ..mechanics.node_areas import node_areas
+from ..mechanics.skin_contact import BodyContact, leaning, patch_radius, pressing_traction
 from ..recordings.flags import Flag
 from ..sensors import TARGET
 from ..sensors.unrolling import node_normals

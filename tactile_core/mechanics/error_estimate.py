@@ -15,7 +15,7 @@ import numpy as np
 from ..files.shipped import shipped
 from .fast.compliance_rows import surface_motion
 from .fast.contact_state import Contact
-from .sharpness import RESOLVED_RADIUS
+from .penetration import RESOLVED_RADIUS
 
 Errors = tuple[float, float]  # shape, m rms, and relative, of the force
 

@@ -7,8 +7,8 @@ import numpy as np
 from ..errors import TactileError
 from ..geometry.catmull_rom import on_grid
 from ..geometry.indenters import Indenter, Pose
+from ..geometry.indenters.pose import same_line
 from ..geometry.lattice import Lattice
-from .pose_path import same_line
 
 _ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
 _TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch

@@ -8,7 +8,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from ..errors import TactileError
-from .thickness import DEPTH_LIMIT
+from .placement import DEPTH_LIMIT
 
 # Relative, of the force asked for, in every tier: a twentieth of the error of the fast tier's, a tenth of the full
 # one's. A contact states the force that it has.

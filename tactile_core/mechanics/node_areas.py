@@ -1,4 +1,4 @@
-"""Area of a sensor's surface that belongs to each of its nodes, and normals there; force over area is traction."""
+"""Area of a sensor's surface that belongs to each of its nodes; force over area is traction."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import functools
 
 import numpy as np
 
-from .. import sensors
 from .solids.elasticity import quadratic
 from .solids.hex_mesh import outer_faces, solid_mesh
 
@@ -44,14 +43,3 @@ def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     found = np.zeros((len(areas), 3))
     found[nodes] = force / areas[nodes, None]
     return found
-
-
-@functools.cache
-def rest_normals(sensor: str) -> np.ndarray:
-    """Return the unit outward normals (n, 3) of a sensor's resting surface; not to be written to."""
-    from ..sensors.unrolling import node_normals
-
-    surface = sensors.sensor_surface(sensor)
-    outward = node_normals(surface.rest, surface.faces)
-    outward.flags.writeable = False
-    return outward

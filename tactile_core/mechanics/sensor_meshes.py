@@ -2,17 +2,165 @@
 
 from __future__ import annotations
 
+import base64
 import os
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import TactileError
+from ..files import atomic
 from ..sensors import sensor_surface
-from . import mesh_files
+from ..sensors.unrolling import node_normals
+from .solids import stress
+from .solids.finite_strain import FiniteStrainSolid, State
 from .solids.hex_mesh import HexMesh, solid_mesh
 from .solution import Sensor, Solution
+
+Data = Mapping[str, np.ndarray]
+TRIANGLE, TRIQUADRATIC_HEXAHEDRON = 5, 29  # cell types of VTK
+_VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int64": "Int64", "uint8": "UInt8"}
+
+
+def vtk_order() -> np.ndarray:
+    """Return the node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
+
+    VTK counts corners, then edges, faces -x +x -y +y -z +z and the middle, bottom before top and the bottom's edges
+    before the upright ones last: Schroeder, Martin, Lorensen, The Visualization Toolkit, vtkTriQuadraticHexahedron.
+    """
+    square = [(0, 0), (2, 0), (2, 2), (0, 2)]
+    sides = [(1, 0), (2, 1), (1, 2), (0, 1)]
+    places = [(a, b, c) for c in (0, 2) for a, b in square]
+    places += [(a, b, c) for c in (0, 2) for a, b in sides] + [(a, b, 1) for a, b in square]
+    places += [(0, 1, 1), (2, 1, 1), (1, 0, 1), (1, 2, 1), (1, 1, 0), (1, 1, 2), (1, 1, 1)]
+    a, b, c = np.array(places).T
+    return a + 3 * b + 9 * c
+
+
+def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data | None = None) -> None:
+    """Write a surface with outward unit normals, binary PLY: float32 x y z nx ny nz, then ``columns``.
+
+    nodes : (n, 3) m; faces : (m, 3) int, normals outward
+    columns : values (n,) or (n, 3) by name, written as float32; a vector ``force`` becomes force_x force_y force_z
+    Raises TactileError for values of another length or not finite, and where the file cannot be written.
+    """
+    vertex = {"": nodes, "n": node_normals(nodes, faces)} | dict(columns or {})
+    fields = {}
+    for name, values in vertex.items():
+        values = _checked(path, name or "nodes", values, len(nodes))
+        if values.ndim == 1:
+            fields[name] = values
+        else:
+            fields |= {_component(name, axis): values[:, k] for k, axis in enumerate("xyz")}
+    head = ["ply", "format binary_little_endian 1.0", "comment tactile-core, metres and newtons"]
+    head += [f"element vertex {len(nodes)}", *(f"property float {name}" for name in fields)]
+    head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
+    triangles = np.zeros(len(faces), [("count", "u1"), ("nodes", "<i4", 3)])
+    triangles["count"], triangles["nodes"] = 3, faces
+    rows = np.column_stack(list(fields.values())).astype("<f4")
+    _write(path, ("\n".join(head) + "\n").encode() + rows.tobytes() + triangles.tobytes())
+
+
+def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> None:
+    """Write a surface, binary STL: triangles and their unit normals, float32, m. Raises what ``write_ply`` raises."""
+    corners = _checked(path, "nodes", nodes, len(nodes))[faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    rows = np.zeros(len(faces), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    rows["normal"], rows["corners"] = normal, corners
+    _write(path, b"tactile-core, metres".ljust(80) + struct.pack("<I", len(faces)) + rows.tobytes())
+
+
+def write_vtu(
+    path: str | os.PathLike, mesh: HexMesh, solid: FiniteStrainSolid | None = None, state: State | None = None
+) -> None:
+    """Write a volume of triquadratic hexahedra, at rest or with a solved ``state`` of its ``solid``.
+
+    At points ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that the outside exerts on each node
+    (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and ``von_mises`` Pa of it, see
+    ``stress.at_nodes``; in cells ``von_mises``, mean over the cell's volume, and ``pressure`` Pa, compression positive.
+    Raises what ``write_ply`` raises, and FloatingPointError for a state that is turned inside out.
+    """
+    point_data: Data = {"clamped": mesh.clamped.astype(np.uint8)}
+    cell_data: Data = {}
+    if solid is not None and state is not None:
+        points, cell_data = solid_data(solid, state)
+        point_data = {**point_data, **points}
+    write_cells(path, mesh.nodes, mesh.cells[:, vtk_order()], TRIQUADRATIC_HEXAHEDRON, point_data, cell_data)
+
+
+def solid_data(solid: FiniteStrainSolid, state: State) -> tuple[Data, Data]:
+    """Return the point and cell data of ``write_vtu`` by name."""
+    cauchy = stress.cauchy(solid, state)
+    at_nodes = stress.at_nodes(solid, cauchy)
+    six = [at_nodes[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
+    mean = (stress.von_mises(cauchy) * solid.weight).sum(1) / solid.weight.sum(1)
+    points = {
+        "displacement": state.displacement, "force": stress.nodal_force(solid, state),
+        "stress": np.column_stack(six), "von_mises": stress.von_mises(at_nodes),
+    }  # fmt: skip
+    return points, {"von_mises": mean, "pressure": -state.pressure[:, 0]}
+
+
+def write_cells(
+    path: str | os.PathLike,
+    nodes: np.ndarray,
+    cells: np.ndarray,
+    kind: int,
+    point_data: Data | None = None,
+    cell_data: Data | None = None,
+) -> None:
+    """Write cells of one kind as VTK's XML unstructured grid, base64 inside.
+
+    nodes : (n, 3) m; cells : (m, k) int in VTK's order; kind : VTK's cell type, such as TRIANGLE
+    point_data, cell_data : values (n or m,) or (n or m, k) by name; floats become float32
+    Raises what ``write_ply`` raises.
+    """
+    offsets = cells.shape[1] * np.arange(1, len(cells) + 1, dtype=np.int64)
+    lines = [
+        '<?xml version="1.0"?>',
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">',
+        f'<UnstructuredGrid><Piece NumberOfPoints="{len(nodes)}" NumberOfCells="{len(cells)}">',
+        "<Points>", _array("Points", _checked(path, "nodes", nodes, len(nodes)).astype(np.float64)), "</Points>",
+        "<Cells>", _array("connectivity", cells.astype(np.int64).ravel()), _array("offsets", offsets),
+        _array("types", np.full(len(cells), kind, np.uint8)), "</Cells>",
+    ]  # fmt: skip
+    for tag, data, count in (("PointData", point_data, len(nodes)), ("CellData", cell_data, len(cells))):
+        values = {name: _checked(path, name, given, count) for name, given in (data or {}).items()}
+        lines += [f"<{tag}>", *(_array(name, given) for name, given in values.items()), f"</{tag}>"]
+    lines += ["</Piece></UnstructuredGrid>", "</VTKFile>", ""]
+    _write(path, "\n".join(lines).encode())
+
+
+def _array(name: str, values: np.ndarray) -> str:
+    """Format one DataArray; VTK wants the number of bytes before them, inside the same base64."""
+    little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
+    text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
+    width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
+    return f'<DataArray type="{_VTK_NAMES[values.dtype.name]}" Name="{name}"{width} format="binary">{text}</DataArray>'
+
+
+def _component(name: str, axis: str) -> str:
+    return f"{name}_{axis}" if len(name) > 1 else name + axis
+
+
+def _checked(path: str | os.PathLike, name: str, values: np.ndarray, count: int) -> np.ndarray:
+    values = np.asarray(values)
+    if len(values) != count or values.ndim > 2:
+        raise TactileError(path, f"{name} of shape {values.shape}", f"{count} rows")
+    if values.dtype.kind == "f":
+        if not np.isfinite(values).all():
+            raise TactileError(path, f"{name} holds nan or infinity", "finite values")
+        return values if name == "nodes" else values.astype(np.float32)
+    return values.astype(np.uint8 if values.dtype.kind == "b" else values.dtype)
+
+
+def _write(path: str | os.PathLike, content: bytes) -> None:
+    with atomic.writing(path, "a place in a writable folder with room", ""):
+        atomic.write_bytes(path, content)
+
 
 SUFFIXES = (".ply", ".stl", ".vtu")
 
@@ -27,7 +175,7 @@ def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
     """Write the resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface. Raises as the writers do."""
     check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
-        mesh_files.write_vtu(path, solid_mesh(sensor))
+        write_vtu(path, solid_mesh(sensor))
     else:
         write_surface(path, sensor, np.zeros_like(sensor_surface(sensor).rest), {})
 
@@ -47,17 +195,15 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
         return
     solid, state = volume
     if Path(path).suffix.lower() == ".vtu":
-        mesh_files.write_vtu(path, solid.mesh, solid, state)
+        write_vtu(path, solid.mesh, solid, state)
         return
     nodes, faces = outer_surface(solid.mesh)
     moved = (solid.mesh.nodes + state.displacement)[nodes]
     if Path(path).suffix.lower() == ".stl":
-        mesh_files.write_stl(path, moved, faces)
+        write_stl(path, moved, faces)
         return
-    points, _ = mesh_files.solid_data(solid, state)
-    mesh_files.write_ply(
-        path, moved, faces, {name: points[name][nodes] for name in ("displacement", "force", "von_mises")}
-    )
+    points, _ = solid_data(solid, state)
+    write_ply(path, moved, faces, {name: points[name][nodes] for name in ("displacement", "force", "von_mises")})
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
@@ -84,8 +230,8 @@ def write_surface(
     suffix = Path(path).suffix.lower()
     columns = {"displacement": displacement, **columns}
     if suffix == ".stl":
-        mesh_files.write_stl(path, lattice.rest + displacement, lattice.faces)
+        write_stl(path, lattice.rest + displacement, lattice.faces)
     elif suffix == ".ply":
-        mesh_files.write_ply(path, lattice.rest + displacement, lattice.faces, columns)
+        write_ply(path, lattice.rest + displacement, lattice.faces, columns)
     else:
-        mesh_files.write_cells(path, lattice.rest, lattice.faces, mesh_files.TRIANGLE, columns)
+        write_cells(path, lattice.rest, lattice.faces, TRIANGLE, columns)

@@ -18,11 +18,10 @@ from .fast.contact_state import Contact
 from .fast.press import CorrectedPress
 from .finite_strain.load_path import LoadPath
 from .force_search import MOST_FORCE, UnreachableError, unreachable
-from .node_areas import rest_normals, traction
-from .placement import FRICTION, Placement, on_gel, pose_at
-from .sharpness import RESOLVED_RADIUS, sharpest
+from .node_areas import traction
+from .penetration import RESOLVED_RADIUS, sharpest
+from .placement import DEPTH_LIMIT, FRICTION, Placement, on_gel, pose_at, thickness_under
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
-from .thickness import DEPTH_LIMIT, thickness_under
 
 _LIGHTEST = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
@@ -197,5 +196,5 @@ def _fast_errors(
     radius = sharpest(indenter, contact.pose, moved)
     shape, force = error_estimate.of_fast(table, depth, len(contact.nodes), radius)
     return shape + (
-        error_estimate.unsure_side(contact, rest_normals(sensor), radius) if radius < RESOLVED_RADIUS else 0.0
+        error_estimate.unsure_side(contact, sensors.rest_normals(sensor), radius) if radius < RESOLVED_RADIUS else 0.0
     ), force

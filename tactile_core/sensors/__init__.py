@@ -7,6 +7,8 @@ camera and lights are in its calibration, see ``calibration_file``.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ..geometry.lattice import Lattice
@@ -18,13 +20,14 @@ from .fluid_sensor import FALLS, Fluid
 from .gel_sensor import Gel
 from .gel_shape import shape_of
 from .skin_shape import skin_of
+from .unrolling import node_normals, roll_up
 
 __all__ = [
     "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PAIR", "PRESSURE_PER_COUNT", "REST_COUNTS",
     "SAMPLE_RATE", "SOURCE", "TARGET", "Lattice", "Material", "biotac_surface", "contact_pressures_of", "contacts_of",
     "describe", "digit_surface", "electrode_count", "electrodes", "excitation_electrodes", "from_maker",
-    "from_syntouch", "is_gel", "places_of", "sensor_surface", "shape_of", "skin_of", "thickness", "title",
-    "typical_rest",
+    "from_syntouch", "is_gel", "places_of", "rest_normals", "sensor_surface", "shape_of", "skin_of", "surface_point",
+    "thickness", "thickness_at", "title", "typical_rest",
 ]  # fmt: skip
 
 PAIR = SOURCE, TARGET = "biotac", "digit"  # of the weights that ship, and where no other sensors are named
@@ -89,6 +92,36 @@ def digit_surface() -> Lattice:
 def sensor_surface(sensor: str) -> Lattice:
     """The resting surface of a sensor that is there, as ``"biotac"`` or ``"digit"``."""
     return shape_of(sensor).surface() if is_gel(sensor) else skin_of(sensor).skin_surface("outer")
+
+
+@functools.cache
+def rest_normals(sensor: str) -> np.ndarray:
+    """Return the unit outward normals (n, 3) of a sensor's resting surface; not to be written to."""
+    surface = sensor_surface(sensor)
+    outward = node_normals(surface.rest, surface.faces)
+    outward.flags.writeable = False
+    return outward
+
+
+def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the point (3,) m of a resting surface at (x, z) m of the common plane, and its outward unit normal (3,).
+
+    On a skin it is the place of the pad that rolls onto (x, z).
+    """
+    return shape_of(sensor).dome_point(x, z) if is_gel(sensor) else roll_up(np.array([x, z]), sensor)
+
+
+@functools.cache
+def thickness_at(sensor: str, node: int) -> float:
+    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal there.
+
+    To the flat back of a gel; through skin and fluid to the core, or to the finger's axis where the normal passes the
+    core by. Kept, for a path asks again at each step.
+    """
+    point = sensor_surface(sensor).rest[node]
+    if is_gel(sensor):
+        return shape_of(sensor).thickness_below(point)
+    return skin_of(sensor).thickness_below(point, rest_normals(sensor)[node])
 
 
 def is_gel(sensor: str) -> bool:

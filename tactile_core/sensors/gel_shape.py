@@ -86,6 +86,11 @@ class GelShape:
         normal = np.array([-(height[2] - height[1]) / (2 * step), -1.0, -(height[4] - height[3]) / (2 * step)])
         return np.array([x, self.back_y - height[0], z]), normal / np.linalg.norm(normal)
 
+    def thickness_below(self, point: np.ndarray) -> float:
+        """Distance, m, from a point (3,) m of the resting surface along its inward normal to the flat back."""
+        on_dome, outward = self.dome_point(float(point[0]), float(point[2]))
+        return float((self.back_y - on_dome[1]) / -outward[1])
+
     def _half_width_at(self, x: np.ndarray) -> np.ndarray:
         corner = self._outline.corner_radius
         if self._outline.tip == ROUND:

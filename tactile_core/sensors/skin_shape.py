@@ -13,6 +13,8 @@ from .descriptor import of_kind
 from .fluid_sensor import Fluid
 from .profiles import read_radii
 
+_STEP = 20e-6  # m, of the march from the surface to the core; the last step is divided linearly
+_FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
 _ROUNDING = 0.5e-3  # m, by which the corner of a flat inner cap, where the table ends, is rounded as the outer one is
 
 
@@ -106,6 +108,20 @@ class SkinShape:
     def core_radius(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Radius of the rigid core, m, at stations x (n,) m and angles theta (n,) rad; NaN off the core."""
         return self._radius("core", x, theta)
+
+    def thickness_below(self, point: np.ndarray, outward: np.ndarray) -> float:
+        """Distance, m, from a point (3,) m of the skin along its inward normal to the core, or to the axis."""
+        distance = np.arange(0, _FARTHEST, _STEP)
+        x, y, z = (point - distance[:, None] * outward).T
+        radius = np.hypot(y - self.axis_y, z)
+        over = radius - self.core_radius(x, np.arctan2(z, self.axis_y - y))
+        inside = np.flatnonzero(over <= 0)
+        if not len(inside):
+            return float(distance[np.argmin(radius)])
+        last = int(inside[0])
+        before = over[last - 1] if last else np.nan
+        back = over[last] / (over[last] - before) if np.isfinite(before) else 0.0
+        return float(distance[last] - back * _STEP)
 
     def _radius(self, layer: str, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
         table = self.table

@@ -18,10 +18,9 @@ from ..geometry.indenters import Box, Indenter, Ring
 from ..mechanics.first_touch import surface_drop
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import Placement, pose_at
+from ..mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at
 from ..mechanics.solution import Solution, Step
 from ..mechanics.solve import solve, solve_path
-from ..mechanics.thickness import DEPTH_LIMIT, depth_at
 from .pair_sampling import draw_place, pair_row, paired
 from .scene import Scene
 

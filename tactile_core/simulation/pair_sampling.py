@@ -14,10 +14,9 @@ from ..geometry.indenters import Indenter
 from ..mechanics.electrodes.law import SHEET, signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import Placement, on_gel, pose_at
+from ..mechanics.placement import Placement, depth_at, on_gel, pose_at
 from ..mechanics.solution import Sensor, Solution, Step
 from ..mechanics.solve import solve_path
-from ..mechanics.thickness import depth_at
 from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from .pairs_file import quantise
 from .scene import PairSpec, Scene

@@ -13,10 +13,9 @@ from ..errors import TactileError
 from ..mechanics.error_estimate import expected_error, measured
 from ..mechanics.fast.compliance import stored
 from ..mechanics.force_search import UnreachableError
-from ..mechanics.placement import Placement
+from ..mechanics.placement import DEPTH_LIMIT, Placement
 from ..mechanics.solution import TIERS
 from ..mechanics.solve import solve
-from ..mechanics.thickness import DEPTH_LIMIT
 from ..sensors import title
 from .scene import RecordingSpec, load_scene
 

@@ -8,9 +8,8 @@ from tactile_core import sensors
 from tactile_core.geometry.indenters import Indenter, Pose
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.press import CorrectedPress, FastContact
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, pose_at, thickness_under
 from tactile_core.mechanics.solve import Solution, solve
-from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 
 PENETRATION = 1e-6  # m, the target at any node
 BALANCE = 1e-3  # of the whole force, where iterations end at 1e-7 to 3e-6 of the largest nodal force

@@ -7,9 +7,8 @@ import pytest
 
 from tactile_core.geometry.indenters import Edge, Sphere
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, expected_error, measured
-from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement
 from tactile_core.mechanics.solve import TIERS, solve
-from tactile_core.mechanics.thickness import DEPTH_LIMIT
 
 SENSORS = "digit", "biotac"
 MIDDLE = Placement(-8.2e-3, 1.13e-3)

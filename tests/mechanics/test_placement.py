@@ -8,8 +8,7 @@ from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
 from tactile_core.mechanics.first_touch import first_touch
 from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.mechanics.thickness import thickness
-from tactile_core.sensors import digit, unrolling
+from tactile_core.sensors import digit
 
 PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.5, 4.0)]
 INDENTERS = [Sphere(3.5e-3), Cylinder(3.5e-3, 0.5e-3), Box((14e-3,) * 3, 0.5e-3), Ring(2.5e-3, 1e-3)]
@@ -76,11 +75,16 @@ def test_ball_set_on_a_smooth_place_stays_there():
 
 
 def test_thickness_of_the_gel_and_of_skin_and_fluid():
-    on_dome, _ = digit.dome_point(-8e-3, 0.0)
+    def at(sensor):
+        """Node nearest to the middle of the pad, and the thickness there."""
+        rest, (point, _) = sensors.sensor_surface(sensor).rest, sensors.surface_point(sensor, -8e-3, 0.0)
+        node = int(np.argmin(np.linalg.norm(rest - point, axis=1)))
+        return rest[node], sensors.thickness_at(sensor, node)
+
+    on_dome, thick = at("digit")
     # at the top of the dome the normal is nearly upright
-    assert thickness("digit", on_dome) == pytest.approx(digit.BACK_Y - on_dome[1], rel=1e-3)
-    on_skin, _ = unrolling.roll_up(np.array([-8e-3, 0.0]))
+    assert thick == pytest.approx(digit.BACK_Y - on_dome[1], rel=1e-3)
     # docs/sources.md, BioTac skin and fluid: skin 1.58 mm and a fluid film of up to 2.45 mm
-    assert 1.58e-3 + 0.5e-3 < thickness("biotac", on_skin) < 1.63e-3 + 2.45e-3
+    assert 1.58e-3 + 0.5e-3 < at("biotac")[1] < 1.63e-3 + 2.45e-3
     with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
-        thickness("finger", on_skin)
+        at("finger")

@@ -13,7 +13,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.mechanics import error_estimate
 from tactile_core.mechanics.fast import compliance
-from tactile_core.mechanics.thickness import DEPTH_LIMIT
+from tactile_core.mechanics.placement import DEPTH_LIMIT
 from tactile_core.simulation import scene_recording, tier_choice
 
 

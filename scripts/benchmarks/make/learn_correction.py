@@ -20,8 +20,7 @@ from tactile_core.mechanics.fast.contact_state import Contact
 from tactile_core.mechanics.fast.correction import Correction, PatchFrame, features, frame
 from tactile_core.mechanics.fast.edge_contact import EdgeContactProblem
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, Sensor, graded_body
-from tactile_core.mechanics.placement import pose_at
-from tactile_core.mechanics.thickness import depth_at
+from tactile_core.mechanics.placement import depth_at, pose_at
 
 from ..mechanics.random_contacts import RandomContact
 from .correction_fit import MOST, WHOLE, Known, choices, fit

@@ -11,9 +11,8 @@ import numpy as np
 
 from tactile_core import accuracy, sensors
 from tactile_core.mechanics.first_touch import surface_drop
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, thickness_under
 from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
-from tactile_core.mechanics.thickness import DEPTH_LIMIT, depth_at, thickness_under
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.simulation.scene import Scene
 from tactile_core.training.step_errors import true_displacement

@@ -9,9 +9,8 @@ import numpy as np
 
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.placement import FRICTION, pose_at
+from tactile_core.mechanics.placement import FRICTION, depth_at, pose_at
 from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
-from tactile_core.mechanics.thickness import depth_at
 
 from .random_contacts import RandomContact, random_contacts
 from .tiers import TIME_TARGETS

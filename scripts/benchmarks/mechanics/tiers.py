@@ -11,10 +11,9 @@ from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.geometry.cubic_spline import EvenSpline
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.placement import FRICTION, Placement, pose_at
+from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, Placement, pose_at, thickness_under
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solve import TIERS, Sensor, Solution, Step, Tier, solve, solve_path
-from tactile_core.mechanics.thickness import DEPTH_LIMIT, thickness_under
 from tactile_core.sensors import digit
 
 from .incompressible import quality_rows

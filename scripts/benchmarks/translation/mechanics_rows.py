@@ -15,8 +15,7 @@ import numpy as np
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter
-from tactile_core.mechanics.body_contact import BodyContact
-from tactile_core.mechanics.skin_contact import likely_contacts
+from tactile_core.mechanics.skin_contact import BodyContact, likely_contacts
 from tactile_core.simulation.full_pairs import REGION_X
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.simulation.scene import load_scene

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import TactileError
-from .spline_grid import SplineGrid
-from .tip_grid import BAND, TipGrid
+from .spline_grid import BAND, SplineGrid, TipGrid
 
 MARGIN = 1e-3  # m, how far the grid reaches beyond the body
 MAX_NODES = 8_000_000  # 32 MB kept, about 300 MB while it is built

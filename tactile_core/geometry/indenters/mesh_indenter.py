@@ -21,8 +21,7 @@ from ...files.installed import needing
 from ...files.short_text import Summary
 from . import mesh_file, mesh_grid
 from .indenter import Indenter
-from .spline_grid import SplineGrid
-from .tip_grid import TipGrid
+from .spline_grid import SplineGrid, TipGrid
 
 log = logging.getLogger(__name__)
 _FORMAT = 2  # raise when the meaning of the cached arrays changes

@@ -11,8 +11,7 @@ from ...errors import TactileError
 from ...sensors import divider
 from ..fast.contact_state import Contact
 from ..solution import Solution
-from .biotac_sheet import sensing_films, signal_of_gaps
-from .reduced_sheet import reduced_sheet
+from .biotac_sheet import reduced_sheet, sensing_films, signal_of_gaps
 
 SHEET, GAP = LAWS = ("sheet", "gap")
 

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters.pose import between, same_place
 from ..penetration import check_follows
-from ..pose_path import between, same_place
 from .active_set import UnsolvedError, Work
 from .candidates import Candidates, first_contact, project
 from .compliance import Compliance

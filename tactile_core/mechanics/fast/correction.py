@@ -158,8 +158,7 @@ def node_frames(sensor: str) -> np.ndarray:
     if sensors.is_gel(sensor):
         axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
         return np.broadcast_to(axes, (len(sensors.sensor_surface(sensor).rest), 3, 3))
-    lattice = sensors.sensor_surface(sensor)
-    outward = unrolling.node_normals(lattice.rest, lattice.faces)
+    outward = sensors.rest_normals(sensor)
     along = np.array([1.0, 0, 0]) - outward[:, :1] * outward
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along = np.where(length > 1e-3, along / np.maximum(length, 1e-3), [0.0, 1.0, 0.0])

@@ -10,11 +10,10 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters.pose import same_line
 from ..first_touch import surface_drop
 from ..force_search import FORCE_TOLERANCE, touch_at_force
-from ..penetration import PenetrationError
-from ..pose_path import same_line
-from ..sharpness import BENDS, sharpest
+from ..penetration import BENDS, PenetrationError, sharpest
 from .active_set import ExhaustedError, UnsolvedError, Work
 from .compliance import Compliance
 from .contact import ContactProblem

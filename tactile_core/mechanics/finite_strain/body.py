@@ -9,8 +9,7 @@ import numpy as np
 
 from ... import sensors
 from ...geometry.indenters import Indenter, Pose
-from ..penetration import BLUNT, check_follows, penetration_between
-from ..sharpness import BENDS, sharpest
+from ..penetration import BENDS, BLUNT, check_follows, penetration_between, sharpest
 from ..solids.biotac_core import Core, facing_core
 from ..solids.finite_strain import FiniteStrainSolid
 from ..solids.fluid_cavity import FluidCavity

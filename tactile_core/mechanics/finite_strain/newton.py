@@ -15,8 +15,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters.pose import between
 from ..penetration import BEHIND
-from ..pose_path import between
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.sparse_cholesky import DampedFactor, NotPositiveDefiniteError, PatternFactor, held_back

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor
-from tactile_core.mechanics.fast.sensing_points import electrode_feet
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor, reduced_sheet, signal_of_gaps
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes
 from tactile_core.sensors import biotac
 
 MIRROR = np.r_[10:16, 6, 8, 7, 9, 0:6, 16:19]  # E1..E6 and E11..E16, E8 and E9 are mirror images (docs/sources.md)
@@ -89,3 +90,66 @@ def test_the_interface_hides_a_part_of_the_film():
     np.testing.assert_array_equal(growth(rest, rest), 1)
     assert (growth(2 * rest, rest) < 2).all() and (growth(2 * rest, rest) > 1.3).all()
     assert (growth(0 * rest, rest) > 0).all()
+
+
+def dented(seed: int) -> np.ndarray:
+    """Films (k,) m with a dent 3 mm wide that leaves 0.3 of the film in its middle: unlike those of the fields."""
+    sheet, random = biotac_sheet(), np.random.default_rng(seed)
+    nodes = sheet.sheet.nodes
+    away = np.linalg.norm(nodes - nodes[random.choice(np.flatnonzero(nodes[:, 1] < -4e-3))], axis=1)
+    return np.maximum(sheet.film * (1 - 0.7 * np.clip(1 - (away / 3e-3) ** 2, 0, 1)), film_floor("biotac"))
+
+
+def test_it_is_exact_at_rest_and_in_films_of_any_one_scale():
+    sheet = biotac_sheet()
+    for scale in (1.0, 0.3):
+        films = scale * sheet.film
+        np.testing.assert_allclose(reduced_sheet().resistances(films), sheet.resistances(films), rtol=1e-8)
+
+
+def test_it_is_near_in_dented_films():
+    sheet = biotac_sheet()
+    rest = sheet.resistances(sheet.film)
+    exact = np.stack([sheet.resistances(dented(seed)) for seed in range(8)])
+    found = np.stack([reduced_sheet().resistances(dented(seed)) for seed in range(8)])
+    change, error = exact / rest - 1, (found - exact) / rest
+    # measured on contacts: 0.28 % of rest where they change 9.3 %; these dents are unlike any
+    assert np.sqrt(np.mean(error**2)) < 0.15 * np.sqrt(np.mean(change**2))
+
+
+def test_sensing_nodes_are_all_that_move_and_fill_the_sheet():
+    skin, sheet, nodes = compliance_of("biotac"), biotac_sheet(), sensing_nodes()
+    assert len(skin.watch_gap) == skin.feet + len(nodes) and len(np.unique(nodes)) == len(nodes)
+    np.testing.assert_array_equal(nodes[sheet.sensing], sheet.wet)
+    np.testing.assert_array_equal(sheet.films_of(np.zeros(len(nodes))), np.maximum(sheet.film, film_floor("biotac")))
+
+
+def test_energy_never_falls_short():
+    """Galerkin's potentials are too small for the same current: resistances of one electrode against a joined rest."""
+    sheet, films = biotac_sheet(), dented(3)
+    exact = sheet.sheet.potentials(films, sheet.fluid.conductivity)
+    fields, patches = reduced_sheet().fields, sheet.sheet.patches[1:]
+    stiffness = sheet.sheet.matrix(films, sheet.fluid.conductivity)[1:, 1:]
+    seen = fields.T @ patches
+    found = seen.T @ np.linalg.solve(fields.T @ (stiffness @ fields), seen)
+    assert np.linalg.eigvalsh(exact - found).min() > -1e-9 * np.abs(exact).max()
+
+
+def test_rest_gaps_lie_in_the_published_range():
+    gap = electrode_feet().gap
+    assert len(gap) == 19
+    # 0.51 to 1.76 mm from the public mesh (docs/sources.md); ours from its profile table, 0.05 mm rms apart
+    assert 0.46e-3 < gap.min() < 0.56e-3 and 1.71e-3 < gap.max() < 1.81e-3
+
+
+def test_no_change_without_deformation_and_growth_with_thinning():
+    rest = electrode_feet().gap
+    np.testing.assert_array_equal(signal_of_gaps(rest), 0)
+    steps = np.stack([signal_of_gaps(rest * share) for share in (1.2, 1.0, 0.8, 0.5, 0.1)])
+    assert (np.diff(steps * sensors.COUNT_SIGN, axis=0) > 0).all()
+
+
+def test_films_thinner_than_the_floor_do_not_blow_up():
+    rest = electrode_feet().gap
+    np.testing.assert_array_equal(signal_of_gaps(np.full(19, -1e-3)), signal_of_gaps(np.full(19, film_floor("biotac"))))
+    assert np.isfinite(signal_of_gaps(rest * 0)).all()

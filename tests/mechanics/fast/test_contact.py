@@ -11,8 +11,7 @@ from slab import slab_compliance
 from tactile_core.geometry.indenters import Cylinder, Sphere, pose_on
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
-from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.mechanics.thickness import thickness_under
+from tactile_core.mechanics.placement import Placement, pose_at, thickness_under
 from tactile_core.sensors import Material, unrolling
 
 THICKNESS, RADIUS = 3e-3, 3.5e-3

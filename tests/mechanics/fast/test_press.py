@@ -6,8 +6,7 @@ import pytest
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.press import FORCE_TOLERANCE, CorrectedPress
-from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.mechanics.thickness import depth_at
+from tactile_core.mechanics.placement import Placement, depth_at, pose_at
 
 BALL, PLACE = Sphere(3.5e-3), Placement(-8e-3, 0.0)
 
