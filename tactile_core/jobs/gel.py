@@ -21,11 +21,10 @@ from .. import sensors
 from ..errors import TactileError
 from ..files.installed import require
 from ..geometry.indenters import Indenter, Pose, as_indenter
-from ..geometry.indenters.pose import same_line
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
-from ..mechanics.first_touch import first_touch_on_line
+from ..mechanics.first_touch import first_touch_on_line, same_line
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, FRICTION, thickness_under

@@ -1,4 +1,7 @@
-"""Find where an indenter first touches a sensor's resting surface as it moves in: depth is counted from there."""
+"""The way of an indenter: between two poses, and to where it first touches a sensor's resting surface.
+
+Depth is counted from there.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ import numpy as np
 from ..errors import TactileError
 from ..geometry.catmull_rom import on_grid
 from ..geometry.indenters import Indenter, Pose
-from ..geometry.indenters.pose import same_line
 from ..geometry.lattice import Lattice
 
 _ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
@@ -26,6 +28,34 @@ _NARROW = 2e-3  # m, four spacings of the coarser lattice, the BioTac's: a body 
 _BESIDE = 1e-3  # m, at most from the line that a body's foremost point moves on to the node nearest to it
 _FRONT = 4e-3  # m, what lies this much behind the front is the far side of the sensor
 _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
+_SAME = 1e-12  # m, sideways, of poses that differ in depth alone
+
+
+def same_place(first: Pose, second: Pose) -> bool:
+    """Return true if two poses are equal."""
+    return np.array_equal(first.apex, second.apex) and np.array_equal(first.axes, second.axes)
+
+
+def same_line(first: Pose, second: Pose) -> bool:
+    """Return true if two poses differ in depth alone."""
+    apart = second.apex - first.apex
+    sideways = apart - (apart @ first.direction) * first.direction
+    return bool(np.abs(sideways).max() < _SAME and np.array_equal(first.axes, second.axes))
+
+
+def between(first: Pose, second: Pose, share: float) -> Pose:
+    """Return the pose at a share 0..1 of the way: apex on a straight line, axes turned about one axis (Rodrigues)."""
+    apex = first.apex + share * (second.apex - first.apex)
+    turn = second.axes @ first.axes.T
+    twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    size = np.linalg.norm(twice)
+    angle = np.arctan2(size, np.trace(turn) - 1)
+    if size < 1e-15:
+        return Pose(apex, second.axes, second.push)
+    x, y, z = twice / size
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    part = np.eye(3) + np.sin(share * angle) * cross + (1 - np.cos(share * angle)) * (cross @ cross)
+    return Pose(apex, part @ first.axes, second.push)
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
@@ -47,32 +77,10 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation. Raises TactileError for an indenter
     that passes the sensor by.
     """
-    return _touched(lattice, indenter, pose)[0]
-
-
-def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
-    """Find the first touch of an indenter that comes along a pose's direction, wherever on that line the pose lies.
-
-    Raises TactileError where it passes the sensor by.
-    """
-    before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
-    return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
-
-
-def touching_point(lattice: Lattice, indenter: Indenter, touch: Pose) -> np.ndarray:
-    """Return the point (3,) m of the resting surface, at a node or between, that an indenter at first touch meets."""
-    there, points = _touched(lattice, indenter, touch)
-    return points[np.argmin(there.distance(indenter, points)[0])]
-
-
-def _touched(lattice: Lattice, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
-    """The pose at first touch, and points (j, 3) m of the surface of which it touches one."""
     rows, columns = lattice.shape
     met = in_front(lattice.axes, indenter, pose, closed=lattice.closed) if indenter.least_side < _NARROW else None
     pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
-    before_tip = nodes < len(lattice.rest)
-    tip = np.empty((0, 2)) if met is None or before_tip.all() else met[0]
-    found = lattice.rest[nodes[before_tip]]
+    tip = np.empty((0, 2)) if met is None or (nodes < len(lattice.rest)).all() else met[0]
     nodes = nodes[nodes < rows * columns]
     places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
     for finer in _FINER if places.size else ():
@@ -84,9 +92,18 @@ def _touched(lattice: Lattice, indenter: Indenter, pose: Pose) -> tuple[Pose, np
         if len(best) > 1:  # neighbours find the same place
             row, column = tried[:, best]
             best = best[np.unique(_MANY * row + column, return_index=True)[1]]
-        places, found = tried[:, best], points[best]
-        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), found)
-    return pose, found
+        places = tried[:, best]
+        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best])
+    return pose
+
+
+def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
+    """Find the first touch of an indenter that comes along a pose's direction, wherever on that line the pose lies.
+
+    Raises TactileError where it passes the sensor by.
+    """
+    before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
+    return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
 
 
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:

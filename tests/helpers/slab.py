@@ -6,6 +6,7 @@ import numpy as np
 
 from tactile_core.geometry.lattice import Lattice, grid_faces
 from tactile_core.mechanics.fast.compliance import Compliance, Solid, build
+from tactile_core.mechanics.solids.elasticity import cell_stiffness
 from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
 from tactile_core.sensors import Material
 
@@ -25,3 +26,15 @@ def slab_compliance(x: np.ndarray, z: np.ndarray, y: np.ndarray, material: Mater
     mesh, lattice = slab_mesh(x, z, y)
     touchable = np.flatnonzero(np.hypot(lattice.rest[:, 0], lattice.rest[:, 2]) < reach)
     return Compliance("slab", lattice, touchable, **build(Solid("slab", lattice, touchable, mesh, material)))
+
+
+def assemble(mesh: HexMesh, material: Material):
+    """Assemble the global stiffness, scipy CSC (3 n, 3 n) N/m, degree of freedom 3 node + axis, nothing clamped."""
+    import scipy.sparse
+
+    local = cell_stiffness(mesh.nodes[mesh.cells], material)
+    dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(len(mesh.cells), 81)
+    rows = np.repeat(dofs, 81, axis=1).ravel()
+    columns = np.tile(dofs, (1, 81)).ravel()
+    size = 3 * len(mesh.nodes)
+    return scipy.sparse.coo_matrix((local.ravel(), (rows, columns)), shape=(size, size)).tocsc()

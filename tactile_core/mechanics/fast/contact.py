@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
-from ...geometry.indenters.pose import between, same_place
+from ..first_touch import between, same_place
 from ..penetration import check_follows
 from .active_set import UnsolvedError, Work
 from .candidates import Candidates, first_contact, project
@@ -71,10 +71,6 @@ class ContactProblem:
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
         """Solve the contact at a given depth, m, going on from ``start`` where there is one."""
         return self._walk(self.pose.moved(depth), None, start)
-
-    def at_force(self, axial_force: float, start: Contact) -> Contact:
-        """Solve the contact whose force along the motion is ``axial_force`` N, in or out from where it stands."""
-        return self._walk(start.pose, axial_force, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
         """Solve the contact of the indenter at another pose, moved there from ``start`` in one step.

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
-from ...geometry.indenters.pose import same_line
-from ..first_touch import surface_drop
+from ..first_touch import same_line, surface_drop
 from ..force_search import FORCE_TOLERANCE, touch_at_force
 from ..penetration import BENDS, PenetrationError, sharpest
 from .active_set import ExhaustedError, UnsolvedError, Work

@@ -10,12 +10,11 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
-from ...geometry.indenters.pose import same_line
 from ...sensors import sensor_surface, skin_of
 from .. import error_estimate
 from ..electrodes.biotac_sheet import biotac_sheet
 from ..fast.sensing_points import electrode_feet
-from ..first_touch import surface_drop
+from ..first_touch import same_line, surface_drop
 from ..force_search import touch_at_force
 from ..penetration import PenetrationError, sharpest
 from ..solution import OnDemand, Sensor, Solution, Step, centre_of_pressure

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
-from ...geometry.indenters.pose import between
+from ..first_touch import between
 from ..penetration import BEHIND
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity

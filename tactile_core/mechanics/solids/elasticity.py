@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...sensors import Material
-from .hex_mesh import HexMesh
 
 _POINTS, _POINT_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
@@ -62,15 +61,3 @@ def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
         mass += np.einsum("e,p,r->epr", weight, linear[q], linear[q])
     swelling = np.einsum("epi,epj->eij", divergence, np.linalg.solve(mass, divergence), optimize=True)
     return stiffness.reshape(n, 81, 81) + bulk * swelling
-
-
-def assemble(mesh: HexMesh, material: Material):  # noqa: ANN201 (scipy is imported only where it is needed)
-    """Assemble the global stiffness, scipy CSC (3 n, 3 n) N/m, degree of freedom 3 node + axis, nothing clamped."""
-    import scipy.sparse
-
-    local = cell_stiffness(mesh.nodes[mesh.cells], material)
-    dofs = (3 * mesh.cells[..., None] + np.arange(3)).reshape(len(mesh.cells), 81)
-    rows = np.repeat(dofs, 81, axis=1).ravel()
-    columns = np.tile(dofs, (1, 81)).ravel()
-    size = 3 * len(mesh.nodes)
-    return scipy.sparse.coo_matrix((local.ravel(), (rows, columns)), shape=(size, size)).tocsc()

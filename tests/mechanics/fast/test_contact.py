@@ -84,7 +84,8 @@ def test_force_control_meets_the_force_and_agrees_with_depth_control():
     ball, place = Sphere(3.5e-3), PLACES[0]
     for compliance, pose in sensors_and_poses(ball, place):
         problem = ContactProblem(compliance, ball, pose, 1.2e-3)
-        by_force = problem.at_force(0.3, problem.at_depth(0.3e-3))
+        start = problem.at_depth(0.3e-3)
+        by_force = problem.at_pose(start.pose, start, 0.3)
         by_depth = problem.at_depth(by_force.depth)
         assert by_force.axial_force == pytest.approx(0.3, rel=1e-9)
         # gaps are closed to 0.05 um of about 500 um

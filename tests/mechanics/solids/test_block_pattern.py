@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 import scipy.sparse
-from slab import slab_mesh
+from slab import assemble, slab_mesh
 
 from tactile_core.mechanics.solids import sparse_cholesky as factors
-from tactile_core.mechanics.solids.elasticity import assemble
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solids.sparse_cholesky import NotPositiveDefiniteError, PatternFactor
 from tactile_core.sensors import Material

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from slab import slab_mesh
+from slab import assemble, slab_mesh
 
-from tactile_core.mechanics.solids.elasticity import assemble, cell_stiffness
+from tactile_core.mechanics.solids.elasticity import cell_stiffness
 from tactile_core.mechanics.solids.hex_mesh import gel_mesh, skin_mesh
 from tactile_core.sensors import Material
 

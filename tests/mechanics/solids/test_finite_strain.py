@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
-from slab import slab_mesh
+from slab import assemble, slab_mesh
 
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.solids.elasticity import assemble
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.sensors import Material
 
