@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Collection, Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+import os
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..files.shipped import shipped
 from ..sensors import PAIR, TARGET, title
+
+if TYPE_CHECKING:
+    from ..simulation.tier_choice import TierChoice
 
 COSTS, TIERS = shipped("costs.json"), shipped("mechanics_tiers.json")
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
@@ -63,25 +66,23 @@ def costs() -> dict[str, Any]:
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 
-def of_scene(path: Path, keep: Collection[str], um: float | None = None) -> Plan:
-    """Plan `tactile simulate`; keep : words of ``scene_recording.outputs``; um : bound on the error, None without.
+def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[str, TierChoice]) -> Plan:
+    """Plan `tactile simulate`; keep : words of ``scene_recording.outputs``; choices : the tier of each of its sensors.
 
-    Raises TactileError for what cannot be read, or a bound that nothing meets.
+    Raises TactileError for what cannot be read.
     """
-    from ..simulation import scene_recording, tier_choice
+    from ..simulation import scene_recording
     from ..simulation.scene import load_scene
 
     spec = scene_recording.recording_of(load_scene(path)[0], path)
     time, place, force = scene_recording.motion(spec)
     frames, pressed = len(time), int((force > 0).sum())
     contacts = len({(*at, newtons) for at, newtons in zip(place.tolist(), force.tolist(), strict=True) if newtons > 0})
-    used = scene_recording.sensors_of(keep)
-    choices = tier_choice.choose_for_scene(path, used, um)
     start, extent = _part("simulate_nothing"), f"{frames} frames, {pressed} in contact; indenter {spec.indenter}"
     parts = [Part("start", extent, start["start"], start["mb"])]
-    for sensor in used:
+    for sensor, choice in choices.items():
         kept = pressed if f"displacement_{sensor}" in keep else 0
-        parts += [_matrices(sensor), _contacts(sensor, choices[sensor], contacts, spec.friction > 0, kept)]
+        parts += [_matrices(sensor), _contacts(sensor, choice, contacts, spec.friction > 0, kept)]
     if "electrodes" in keep:
         disk = _part("simulate_electrodes")["kb"] * frames / 1e3
         parts.append(Part("electrodes", "from the film over each; noise and drift", disk=disk))
@@ -138,7 +139,7 @@ def _matrices(sensor: str) -> Part:
     return Part(what, extent, BUILD_S[sensor], BUILD_MB, MATRICES_MB[sensor])
 
 
-def _contacts(sensor: str, choice: Any, contacts: int, rough: bool, kept: int) -> Part:
+def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept: int) -> Part:
     """The solves of one sensor, in its tier: of contacts that differ, of which so many frames are kept.
 
     rough : with friction, which takes the full tier several times as long

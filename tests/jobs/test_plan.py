@@ -12,6 +12,7 @@ from tactile_core.jobs import plan
 from tactile_core.mechanics.fast import compliance
 from tactile_core.pictures import presets
 from tactile_core.simulation import tier_choice
+from tactile_core.simulation.scene_recording import sensors_of
 from tactile_core.simulation.tier_choice import TierChoice
 
 ROOT = Path(__file__).parents[2]
@@ -38,7 +39,8 @@ def tables(monkeypatch):
 
 
 def plan_for(path=PRESS, keep="", um=None):
-    return plan.of_scene(path, keep.split(","), um)
+    words = keep.split(",")
+    return plan.of_scene(path, words, tier_choice.choose_for_scene(path, sensors_of(words), um))
 
 
 def built(found):

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import agree, bar, duration, next_step, say, tell
 from . import engine
 from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
+
+if TYPE_CHECKING:
+    from ...jobs.plan import Plan
+    from ...simulation.tier_choice import TierChoice
 
 BRIEF = "simulate the recording that a scene describes"
 TEXT = """\
@@ -65,22 +71,19 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate the scene; returns the exit status."""
     check_seed(options.seed)
+    keep = _keep(options.keep)
     if options.grid:
-        return _run_grid(options)
+        return _run_grid(options, keep)
     for name in ("workers", "cluster", "restart"):
         if getattr(options, name):
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
-    bound = None if options.error is None else _bound(options.error)
     if options.plan:
-        from ...jobs.plan import of_scene
-
-        tell("\n".join(of_scene(Path(options.scene), _keep(options.keep), bound).lines()))
+        tell("\n".join(_planned(options, keep)[1].lines()))
         return 0
     with bar("simulate", "frame", options.progress) as shown:
         from ...simulation.scene_recording import simulate_recording
 
-        keep = _keep(options.keep)
-        tiers = {} if bound is None else _tiers(options, keep, bound)
+        tiers = {} if options.error is None else _tiers(options, keep)
         simulate_recording(
             options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
         )
@@ -108,31 +111,32 @@ def _keep(text: str | None) -> tuple[str, ...]:
     return tuple(word for word in known if word in words)
 
 
-def _bound(text: str) -> float:
-    from ...jobs.sampling_error import parse_budget
-
-    return parse_budget(text).only("um", "Pictures are drawn by `tactile render`")
-
-
-def _tiers(options: argparse.Namespace, keep: tuple[str, ...], bound: float) -> dict[str, str]:
-    """Choose the cheapest tiers within the bound, um, and give the reason.
-
-    Raises TactileError for a long simulation without consent.
-    """
+def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mapping[str, TierChoice], Plan]:
+    """Choose the cheapest tiers within the bound of --error, or the fast one without it, and plan the simulation."""
     from ...jobs.plan import of_scene
+    from ...jobs.sampling_error import parse_budget
     from ...simulation.scene_recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
 
-    found = choose_for_scene(options.scene, sensors_of(keep), bound)
-    for sensor, choice in found.items():
+    bound = options.error and parse_budget(options.error).only("um", "Pictures are drawn by `tactile render`")
+    choices = choose_for_scene(options.scene, sensors_of(keep), bound)
+    return choices, of_scene(options.scene, keep, choices)
+
+
+def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, str]:
+    """Return the tiers within the bound, and print the reason.
+
+    Raises TactileError for a long simulation without consent.
+    """
+    choices, cost = _planned(options, keep)
+    for sensor, choice in choices.items():
         say(choice.describe(sensor))
-    if any(choice.tier != "fast" for choice in found.values()):
-        cost = of_scene(Path(options.scene), keep, bound)
+    if any(choice.tier != "fast" for choice in choices.values()):
         agree(f"about {duration(cost.seconds)} and {cost.memory:.0f} MB of memory", cost.seconds, options.yes)
-    return {sensor: choice.tier for sensor, choice in found.items()}
+    return {sensor: choice.tier for sensor, choice in choices.items()}
 
 
-def _run_grid(options: argparse.Namespace) -> int:
+def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
     """Simulate many."""
     engine.check_counts(options, "workers", "restart")
     if options.error:
@@ -140,7 +144,6 @@ def _run_grid(options: argparse.Namespace) -> int:
     from ...jobs import simulate
     from ...jobs.engine import result_parts
 
-    keep = _keep(options.keep)
     job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
     if options.plan:
         engine.tell_planned_parts(result_parts.write(options.out, job))
