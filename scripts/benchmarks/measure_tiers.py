@@ -28,9 +28,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is 
 
 from benchmarks.measured_rows import read_table
 from benchmarks.mechanics import tiers
-from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved
+from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved, write_truth
 from benchmarks.mechanics.random_contacts import RandomContact
-from benchmarks.mechanics.tier_truth import write_truth
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, TABLE

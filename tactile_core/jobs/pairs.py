@@ -25,8 +25,7 @@ from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
 from ..sensors.gel_sensor import Gel
-from ..simulation.pairs_card import card, card_path
-from ..simulation.pairs_file import merge
+from ..simulation.pairs_writer import Made, card, card_path, merge
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import result_parts, scene_input
@@ -62,7 +61,7 @@ def make_pairs(
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
     progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
-        ``tactile batch``, which is removed at the end; the file's card (``pairs_card``) is written beside it.
+        ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
     workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
     electrodes : the law of their counts, of ``law.LAWS``; pair : the sensors, source and target
     keep : words of ``pairs_file.KEEPABLE``
@@ -75,7 +74,7 @@ def make_pairs(
         open_place = place or (InProcess if workers == 1 else lambda folder: Local(folder.resolve(), workers))
         where = open_place(folder)
         result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
-        merge(blocks(folder, job), count, out, text, seed, names, electrodes, pair, keep)
+        merge(blocks(folder, job), count, out, Made(text, names, seed, electrodes, pair, keep))
         atomic.write_json(card_path(out), card(out, *pair))
         result_parts.finished(folder)
 

@@ -99,7 +99,7 @@ def _turn(scene: Scene, number: int) -> int:
 
 
 def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Solve a press; return its rows as in the file, see ``pairs_file.units``, and a record of the solving.
+    """Solve a press; return its rows as in the file, see ``pairs_writer.units``, and a record of the solving.
 
     The record: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
     """

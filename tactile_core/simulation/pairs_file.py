@@ -6,8 +6,6 @@ import dataclasses
 import hashlib
 import json
 import os
-import pathlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,12 +13,9 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from ..files import array_pack, atomic
 from ..files.hdf5_checked import declared, open_checked
-from ..files.hdf5_writer import Disk
-from ..files.version import __version__
-from ..mechanics.electrodes.law import LAWS, SHEET
-from ..sensors import PAIR, SOURCE, TARGET
+from ..mechanics.electrodes.law import LAWS
+from ..sensors import PAIR
 from ..sensors.descriptor import OWN
 from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import FALLS
@@ -30,7 +25,7 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile-pairs-2"
 ADVICE = "Make the file again with `tactile pairs`"
-ATTRIBUTES = ("electrodes", "indenters", "polarity", "scene", "seed", "version")  # and two of ``_NODES``
+ATTRIBUTES = ("electrodes", "indenters", "polarity", "scene", "seed", "version")  # and two of ``NODES``
 MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
 # dataset of the pair that ships -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many
 # nodes as the surface has, or electrodes as the source has
@@ -53,22 +48,7 @@ SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
 KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's surface, with its unit
-_NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
-
-
-def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
-    """Return the unit of each dataset that is written; the leading axis counts contacts.
-
-    Datasets are named after the two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words
-    of ``KEEPABLE``, of what is written beside
-    """
-    fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
-    return fields | {
-        f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
-        f"force_{target}": "N", "pressure": "Pa", f"depth_{source}": "m", f"depth_{target}": "m",
-        "contact_center": "m", "place": "m, m, rad, rad", "slide": "m", f"contact_patch_{source}": "1",
-        f"contact_patch_{target}": "1", f"beyond_{target}": "1", "press": "1", "indenter": "1",
-    }  # fmt: skip
+NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
 
 
 @dataclass(frozen=True)
@@ -138,7 +118,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             if found != FORMAT:
                 raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
             pair = _pair(file, path)
-            wanted = sorted((*ATTRIBUTES, *(f"{sensor}{_NODES}" for sensor in pair)))
+            wanted = sorted((*ATTRIBUTES, *(f"{sensor}{NODES}" for sensor in pair)))
             missing = [name for name in wanted if name not in file.attrs]
             if missing:
                 raise TactileError(path, f"no attribute {missing[0]}", ", ".join(wanted), ADVICE)
@@ -180,7 +160,7 @@ def _pair(file: h5py.File, path: str | os.PathLike) -> tuple[str, str]:
 
     Of a file that names no two sensors they are those that ship.
     """
-    of = sorted(name.removesuffix(_NODES) for name in file.attrs if name.endswith(_NODES))
+    of = sorted(name.removesuffix(NODES) for name in file.attrs if name.endswith(NODES))
     if len(of) != 2:
         return PAIR
     unknown = [name for name in of if name not in known_sensors()]
@@ -280,64 +260,6 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
     return Split(*(np.flatnonzero(np.isin(press, group)) for group in groups))
 
 
-def merge(
-    files: list[pathlib.Path], count: int, out: pathlib.Path, text: str, seed: int, names: list[str],
-    electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = (),
-) -> None:  # fmt: skip
-    """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed.
-
-    pair : the sensors, source and target; keep : words of ``KEEPABLE``
-    """
-    try:
-        _write_merged(files, count, out, text, seed, names, electrodes, pair, keep)
-    except (OSError, RuntimeError) as error:  # h5py reports a full disk as either
-        raise no_room(out, error) from error
-
-
-def _write_merged(files, count, out, text, seed, names, electrodes, pair, keep) -> None:  # noqa: ANN001
-    import h5py
-
-    with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
-        file.attrs.update({
-            "format": FORMAT, "scene": text, "seed": seed, "version": __version__, "indenters": json.dumps(names),
-            **{f"{sensor}{_NODES}": sensors.sensor_surface(sensor).sha256 for sensor in pair}, "polarity": FALLS,
-            "electrodes": electrodes,
-        })  # fmt: skip
-        done, unit_of = 0, units(pair[0], pair[1], keep)
-        for path in files:
-            block = array_pack.read(path)
-            take = min(int(block["count"]), count - done)
-            for name in unit_of if take else ():
-                _append(file, name, unit_of[name], block[name][:take], count, done)
-            done += take
-            disk.check()
-
-
-def _append(file, name: str, unit: str, values: np.ndarray, count: int, start: int) -> None:  # noqa: ANN001
-    if name not in file:
-        chunk = (min(32, count), *values.shape[1:])
-        dataset = file.create_dataset(
-            name,
-            (count, *values.shape[1:]),
-            values.dtype,
-            chunks=chunk,
-            compression="gzip",
-            compression_opts=1,
-            shuffle=True,
-            track_times=False,
-        )
-        dataset.attrs["unit"] = unit
-        if values.dtype == np.int16 and name.startswith("displacement"):
-            dataset.attrs["scale"] = SCALE
-    file[name][start : start + len(values)] = values
-
-
 def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
     """Convert displacement in m to int16 steps of ``scale`` m."""
     return np.round(displacement / scale).astype(np.int16)
-
-
-def no_room(path: pathlib.Path, error: OSError | RuntimeError) -> TactileError:
-    """Return the error for a file that cannot be written."""
-    reason = getattr(error, "strerror", None) or str(error).split("\n")[0]
-    return TactileError(path, f"cannot be written ({reason})", "room for it", "Make room, then give the command again")

@@ -84,8 +84,8 @@ def simulate_recording(
     wiring = wiring or _wiring(spec)
     if wiring.tared:
         raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
-    atomic.claim(out)
     check_places(scene_path, spec, [sensor for sensor in used if sensors.is_gel(sensor)])
+    atomic.claim(out)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = motion(spec)
     frames: list[_Frame] = []

@@ -17,9 +17,9 @@ from tactile_core.jobs.pairs import make_pairs, plan, wanted
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
-from tactile_core.simulation import pairs_file
+from tactile_core.simulation import pairs_file, pairs_writer
 from tactile_core.simulation.pair_sampling import pair_row, press_rows
-from tactile_core.simulation.pairs_card import card, card_path
+from tactile_core.simulation.pairs_writer import card, card_path
 from tactile_core.simulation.scene import load_scene
 
 SCENE = "scenes/press_sphere"
@@ -44,7 +44,7 @@ def test_file_holds_what_it_says(made):
         assert file.attrs["format"] == pairs_file.FORMAT
         assert file.attrs["biotac_nodes_sha256"] == sensors.biotac_surface().sha256
         assert json.loads(file.attrs["indenters"]) == ["sphere_7mm", "sphere_14mm"]
-        assert set(file) == set(pairs_file.units())
+        assert set(file) == set(pairs_writer.units())
         assert all(len(file[name]) == 40 and file[name].attrs["unit"] for name in file)
         biotac, digit = file["force"][()], file["force_digit"][()]
         depth, press = file["depth_biotac"][()], file["press"][()]
@@ -218,7 +218,7 @@ def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
 def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
     out = tmp_path / "pairs.h5"
     full = OSError(errno.ENOSPC, "No space left on device")
-    monkeypatch.setattr(pairs_file.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
+    monkeypatch.setattr(pairs_writer.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
     with pytest.raises(TactileError, match="No space left"):
         make_pairs(scene, 5, 7, out)
     assert not out.exists()
@@ -247,7 +247,7 @@ def test_a_gel_of_ones_own_is_one_folder(request, scene, tmp_path, monkeypatch):
     out = tmp_path / "pairs.h5"
     make_pairs(scene, 5, 7, out, pair=("biotac", "coarse_gel"), keep=["traction"])
     with h5py.File(out) as file:
-        assert set(file) == {*pairs_file.units("biotac", "coarse_gel"), "traction_biotac", "traction_coarse_gel"}
+        assert set(file) == {*pairs_writer.units("biotac", "coarse_gel"), "traction_biotac", "traction_coarse_gel"}
         for sensor, force in (("biotac", file["force"][:]), ("coarse_gel", file["force_coarse_gel"][:])):
             assert file[f"traction_{sensor}"].attrs["unit"] == "Pa"
             total = np.einsum("tnk,n->tk", file[f"traction_{sensor}"][:], node_areas(sensor))

@@ -22,7 +22,7 @@ from tactile_core.mechanics.force_search import FORCE_TOLERANCE
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.sensors import digit
-from tactile_core.simulation import full_pairs, pairs_file
+from tactile_core.simulation import full_pairs, pairs_file, pairs_writer
 from tactile_core.simulation.full_pairs import REGION_X, draw_press, full_rows
 from tactile_core.simulation.scene import load_scene
 
@@ -180,7 +180,7 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
     assert card == json.loads((tmp_path / "set.h5.card.json").read_text(encoding="utf-8"))
     assert card["contacts"] == card["contacts_wanted"] == 1 and card["lost"] == {}
     with h5py.File(out) as file:
-        assert set(file) == set(pairs_file.units())
+        assert set(file) == set(pairs_writer.units())
         assert file.attrs["tier"] == "full" and file.attrs["format"] == pairs_file.FORMAT
         assert file.attrs["digit_nodes_sha256"] == sensors.digit_surface().sha256
         assert file.attrs["unseen_region_x"] == REGION_X

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `benchmarks` is 
 
 from scipy.interpolate import PchipInterpolator
 
-from benchmarks.mechanics.pressed_disc import disc_mesh, pressed
+from benchmarks.mechanics.axisymmetric import disc_mesh, pressed
 from tactile_core.files import atomic
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.pictures.calibrate.ball_print import TABLE

@@ -24,8 +24,8 @@ sys.path.insert(0, str(ROOT))
 SCENE = ROOT / "scenes" / "training"
 
 from tactile_core.files import array_pack, atomic  # noqa: E402
-from tactile_core.simulation import full_pairs, pairs_file  # noqa: E402
-from tactile_core.simulation.pairs_card import card, card_path  # noqa: E402
+from tactile_core.simulation import full_pairs, pairs_writer  # noqa: E402
+from tactile_core.simulation.pairs_writer import Made, card, card_path  # noqa: E402
 from tactile_core.simulation.scene import load_scene  # noqa: E402
 
 STEP = 1e-6  # m, of the displacements in the file: 0.3 um rms of rounding, a tenth of the least target
@@ -65,7 +65,7 @@ def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
     scene, text = load_scene(SCENE)
     with atomic.new_file(out) as partial, tempfile.TemporaryDirectory() as scratch:
         fine = pathlib.Path(scratch) / "fine.h5"
-        pairs_file.merge(files, sum(counts), fine, text, seed, [spec.name for spec in scene.indenters])
+        pairs_writer.merge(files, sum(counts), fine, Made(text, [spec.name for spec in scene.indenters], seed))
         _coarsen(fine, partial)
     record = {**card(out), "tier": "full", "contacts_wanted": wanted, "presses_solved": len(files), "lost": lost}
     atomic.write_json(card_path(out), record)

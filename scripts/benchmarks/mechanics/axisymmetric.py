@@ -3,6 +3,8 @@
 Quadratic quadrilaterals with a linear discontinuous pressure a cell. Coordinates (x, y, z) = (radius, axis, hoop).
 A node keeps three degrees of freedom, of which the hoop's is fixed, so that ``newton.FiniteStrainContact`` takes this
 solid as it takes the one in space. Forces and energies are those of the whole turn.
+
+``pressed`` is the contact of a ball pressed into the middle of a disc that is bonded below.
 """
 
 from __future__ import annotations
@@ -11,10 +13,14 @@ import dataclasses
 
 import numpy as np
 
+from tactile_core.geometry.indenters import Indenter, pose_on
+from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
+from tactile_core.mechanics.finite_strain.solved_contact import ContactState, Tolerance
 from tactile_core.mechanics.solids.block_pattern import BlockPattern
 from tactile_core.mechanics.solids.elasticity import quadratic
 from tactile_core.mechanics.solids.finite_strain import Linearised, State
-from tactile_core.mechanics.solids.neo_hookean import Law
+from tactile_core.mechanics.solids.neo_hookean import Law, NeoHookean
+from tactile_core.sensors import Material
 
 _POINT, _WEIGHT = np.polynomial.legendre.leggauss(3)
 _ENTRIES = [0, 1, 3, 4, 8]  # of F (3, 3) as 9 numbers: those that axial symmetry leaves
@@ -153,3 +159,33 @@ def _reference() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     (fx, dx), (fy, dy) = (quadratic(t) for t in (xi, eta))
     shape, along, across = (np.einsum("qa,qb->qba", x, y).reshape(9, 9) for x, y in ((fx, fy), (dx, fy), (fx, dy)))
     return np.column_stack([xi, eta]), np.outer(_WEIGHT, _WEIGHT).ravel(), shape, np.stack([along, across], -1)
+
+
+# Where the indenter has left, or cells are a thousand times as large as the contact, forces are rounding and their
+# balance says nothing: a last step of 1e-13 m ends the iteration, too.
+_TOLERANCE = Tolerance(gap=1e-9, balance=1e-8, step=1e-13)
+
+
+def disc_mesh(
+    radius: float, thickness: float, reach: float, spacing: float, fine_depth: float, growth: float = 1.1
+) -> QuadMesh:
+    """Nodes ``spacing`` m apart out to ``reach`` and down to ``fine_depth``, steps growing by ``growth`` beyond."""
+    heights = thickness - graded(fine_depth, spacing, thickness, growth)[::-1]
+    heights[0] = 0.0
+    return disc(graded(reach, spacing, radius, growth), heights)
+
+
+def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) -> FiniteStrainContact:
+    """The contact of a ball that touches the middle; nodes within ``reach`` m of the axis may touch it."""
+    near = mesh.surface[mesh.nodes[mesh.surface, 0] < reach]
+    middle = mesh.nodes[mesh.surface[0]]
+    solid = AxisymmetricSolid(mesh, NeoHookean.from_material(material))
+    pose = pose_on(ball, middle, np.array([0, -1.0, 0]))
+    return FiniteStrainContact(solid, near, ball, pose, fixed=mesh.fixed, tolerance=_TOLERANCE)
+
+
+def contact_radius(contact: FiniteStrainContact, touch: ContactState) -> float:
+    """Radius at rest, m: halfway between the last node that touches and the first that does not."""
+    radii = np.sort(contact.solid.mesh.nodes[contact.touchable, 0])
+    last = int(np.searchsorted(radii, contact.solid.mesh.nodes[touch.nodes, 0].max()))
+    return float(radii[last : last + 2].mean())

@@ -52,7 +52,8 @@ def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
     ball = Sphere(2e-3)
     pose = pose_on(ball, np.array([_SIDE / 2, -_SIDE, _SIDE / 2]), np.array([0, -1.0, 0]))
     solid = FiniteStrainSolid(mesh, Material(1e6, 0.48))
-    contact = FiniteStrainContact(solid, mesh.surface, ball, pose, cavity if full else None, pumped)
+    fluid = {"cavity": cavity, "pre_inflation": pumped} if full else {}
+    contact = FiniteStrainContact(solid, mesh.surface, ball, pose, **fluid)
     touch = contact.press(_DEPTH, step=_DEPTH / 3)
     return touch, cavity.volume(mesh.nodes + touch.state.displacement)
 

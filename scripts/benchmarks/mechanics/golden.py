@@ -15,8 +15,8 @@ from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.sensors import Material
 
+from .axisymmetric import disc_mesh, pressed
 from .bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
-from .pressed_disc import disc_mesh, pressed
 
 TARGET = 0.5  # percent (docs/sources.md, Targets)
 MATERIAL = Material(1e6, 0.49)

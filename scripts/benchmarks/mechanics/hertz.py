@@ -13,7 +13,7 @@ from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
 from tactile_core.mechanics.finite_strain.solved_contact import ContactState
 from tactile_core.sensors import Material
 
-from .pressed_disc import contact_radius, disc_mesh, pressed
+from .axisymmetric import contact_radius, disc_mesh, pressed
 
 TARGET = 1.0  # percent (docs/sources.md, Targets)
 BALL, YOUNGS = 10e-3, 1e6  # m, Pa

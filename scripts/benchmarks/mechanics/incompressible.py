@@ -13,9 +13,9 @@ from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solids.hex_mesh import HexMesh
 from tactile_core.sensors import Material
 
+from .axisymmetric import disc_mesh, pressed
 from .block import block
 from .bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS
-from .pressed_disc import disc_mesh, pressed
 
 ITERATIONS = 10  # prototypes took 3 to 7 (docs/sources.md, Mechanics); more says that the tangent does not belong
 _DEPTHS = np.arange(1, 10) * 0.2e-3  # m, to 60 % of the disc

@@ -12,8 +12,8 @@ from tactile_core.accuracy import Row, row
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.sensors import Material
 
+from .axisymmetric import disc_mesh, pressed
 from .bonded_layer import dimitriadis, exact_layer
-from .pressed_disc import disc_mesh, pressed
 
 TARGET, THIN_TARGET = 1.0, 3.0  # percent (docs/sources.md, Targets)
 THICKNESS, YOUNGS = 3e-3, 1e6  # m, Pa

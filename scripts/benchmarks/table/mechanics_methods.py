@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.mechanics.contact_tiers import fast_misses, miss, solved
-from benchmarks.mechanics.tier_truth import read_truth
+from benchmarks.mechanics.contact_tiers import fast_misses, miss, read_truth, solved
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.files import compiled

@@ -11,9 +11,11 @@ import dataclasses
 
 import numpy as np
 
+from .coulomb import FORCE_NOISE
+
 _PATIENCE = 5  # exchanges of all wrong nodes that may bring no progress before nodes change one by one
 _MOST_EXCHANGES = 400
-_FORCE_NOISE, _GAP_NOISE = 1e-9, 1e-10  # N, m: below what single precision of the compliance resolves
+_GAP_ROUNDING = 1e-10  # m: below what single precision of the compliance resolves
 
 
 class UnsolvedError(ArithmeticError):
@@ -86,7 +88,7 @@ def complement(
         open_gap = gap + matrix @ pressing
         if along is not None:
             open_gap -= step * along
-        wrong = np.where(active, pressing < -_FORCE_NOISE, open_gap < -_GAP_NOISE)
+        wrong = np.where(active, pressing < -FORCE_NOISE, open_gap < -_GAP_ROUNDING)
         count = int(wrong.sum())
         if not count:
             return Pressing(pressing, active, step, factor)

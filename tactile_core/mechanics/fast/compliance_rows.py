@@ -12,7 +12,7 @@ from .condense import axes_of
 
 # Relative stiffness added to each node: 1e-6 moves a gap by nanometres and keeps single precision definite, also where
 # one node presses two faces of a concave corner.
-_RIDGE = 1e-6
+RIDGE = 1e-6
 _INNER = 2**40  # more than a surface has degrees of freedom
 
 
@@ -120,14 +120,14 @@ class ComplianceBlock:
 
     def normal(self, normals: np.ndarray) -> np.ndarray:
         """Return the compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
-        return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, _RIDGE)
+        return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
         """Update ``normal`` to ``normals`` (k, 3), where those of the nodes ``at`` (j,) have turned."""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)
-        strips[np.arange(len(at)), at] *= 1 + _RIDGE
+        strips[np.arange(len(at)), at] *= 1 + RIDGE
         matrix = matrix.copy()
         matrix[at, :k], matrix[:k, at] = strips, strips.T
         if self.c:

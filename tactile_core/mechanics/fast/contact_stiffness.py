@@ -11,9 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from .active_set import UnsolvedError
-from .compliance_rows import ComplianceBlock
+from .compliance_rows import RIDGE, ComplianceBlock
 
-RIDGE = 1e-6  # relative, of the compliance: keeps single precision definite
 _MOST_UPDATES = 50  # of one inverse, before it is made anew: rounding adds up
 _SMALL = 90  # rows, of inverses that are made anew as soon as they are changed
 _GOES, _COMES, _FEW = 2, 4, 0.8  # operations by the square of the size; up to this share of the whole changes are made

@@ -260,29 +260,28 @@ def correct(compliance: Compliance, contact: Contact, parts: Correction | None =
 def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.ndarray, scale: float) -> np.ndarray:
     """Return a displacement (n, 3) m plus ``scale`` m times a field on the grid (g, 3), in the sensor's axes."""
     return _add_field(
-        displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, REACH, LINES,
-        field, scale,
-    )  # fmt: skip
+        displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, field, scale
+    )
 
 
 @Loop
-def _add_field(displacement, plane, frames, centre, radius, reach, lines, field, scale):  # noqa: ANN001, ANN202
+def _add_field(displacement, plane, frames, centre, radius, field, scale):  # noqa: ANN001, ANN202
     """``displacement`` (n, 3) plus ``scale`` times a field on a grid, float64: bilinear, 0 beyond it."""
-    moved, per_line = np.empty(displacement.shape), (lines - 1) / 2 / np.arcsinh(reach)
-    middle = (lines - 1) / 2
+    moved, per_line = np.empty(displacement.shape), (LINES - 1) / 2 / np.arcsinh(REACH)
+    middle = (LINES - 1) / 2
     for node in range(len(plane)):
         x, z = (plane[node, 0] - centre[0]) / radius, (plane[node, 1] - centre[1]) / radius
         for i in range(3):
             moved[node, i] = displacement[node, i]
-        if max(abs(x), abs(z)) >= reach:
+        if max(abs(x), abs(z)) >= REACH:
             continue
         u, v = np.arcsinh(x) * per_line + middle, np.arcsinh(z) * per_line + middle
-        row, column = min(int(u), lines - 2), min(int(v), lines - 2)
+        row, column = min(int(u), LINES - 2), min(int(v), LINES - 2)
         u, v = u - row, v - column
-        corner = row * lines + column
+        corner = row * LINES + column
         for j in range(3):
-            local = (1 - v) * ((1 - u) * field[corner, j] + u * field[corner + lines, j])
-            local += v * ((1 - u) * field[corner + 1, j] + u * field[corner + lines + 1, j])
+            local = (1 - v) * ((1 - u) * field[corner, j] + u * field[corner + LINES, j])
+            local += v * ((1 - u) * field[corner + 1, j] + u * field[corner + LINES + 1, j])
             for i in range(3):
                 moved[node, i] += scale * frames[i, j, node] * local
     return moved

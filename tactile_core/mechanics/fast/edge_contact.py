@@ -15,7 +15,7 @@ import numpy as np
 from ...geometry.catmull_rom import stencil
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.lattice import Lattice
-from ..penetration import check_follows, penetration_between
+from ..penetration import SLACK, check_follows, penetration_between
 from .active_set import Work
 from .candidates import Candidates
 from .compliance import Compliance
@@ -24,7 +24,6 @@ from .contact import ContactProblem
 from .contact_state import Contact, Loads
 from .frictionless import Frictionless, Try
 
-_SLACK = 20e-6  # m, in which the points do not push, as in the full tier (``penalty_points``)
 # Of a spring, over a surface node's by itself: of 14 rings 1 to 1.9 mm deep 13 settled with 10, all with 20, which left
 # them 34 to 70 um deep in between nodes.
 _STIFFNESS = 20.0
@@ -61,7 +60,7 @@ class EdgeContactProblem(ContactProblem):
         at = np.where(mirrored, image[compliance.touchable], compliance.touchable)
         own = [np.median(compliance.move[3 * row + axis, 3 * at + axis]) for axis in range(3)]
         self._softness = float(np.mean(own)) / _STIFFNESS
-        self._slack = np.repeat([0.0, _SLACK], [self._m, len(self._points.nodes)])
+        self._slack = np.repeat([0.0, SLACK], [self._m, len(self._points.nodes)])
         super().__init__(compliance, indenter, pose, reach, work=work)
 
     @property

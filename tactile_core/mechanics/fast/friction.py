@@ -14,7 +14,7 @@ from . import coulomb, newton_step
 from .active_set import UnsolvedError
 from .compliance_rows import ComplianceBlock
 from .contact_stiffness import ContactStiffness
-from .frictionless import FORCE_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
+from .frictionless import AXIAL_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pace, Try
 
 MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that do not settle
 LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
@@ -129,7 +129,7 @@ class Friction:
         return min(max(float(step), -LARGEST_STEP), LARGEST_STEP)
 
     def _bears(self, force: np.ndarray, axial_force: float) -> bool:
-        return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
+        return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
 
     def _spare(self, force: np.ndarray) -> float:
         """Friction, N, that a wavering node may bear beyond its limit, of forces (k, 3) N."""

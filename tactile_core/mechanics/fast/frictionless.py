@@ -20,7 +20,7 @@ from .compliance_rows import ComplianceBlock
 
 GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
-FORCE_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
+AXIAL_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
 MAX_ITERATIONS = 60
 _FEELS_CURVATURE = 0.1  # least curvature x force x compliance of such a direction
 _FEELS_AT_ONCE, _LATER = 0.4, 5  # from the second iteration on only for more than this: plain iterations are cheaper
@@ -259,7 +259,7 @@ class Frictionless:
         if pressing.min() < 0 or state.core_force.min(initial=0.0) < 0:
             return False
         axial = float(state.force.sum(0) @ self.pose.direction)
-        return axial_force is None or abs(axial - axial_force) <= FORCE_TOLERANCE * abs(axial_force)
+        return axial_force is None or abs(axial - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
 
 
 def _stiffness(mode: np.ndarray) -> np.ndarray:

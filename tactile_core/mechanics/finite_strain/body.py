@@ -58,7 +58,7 @@ class Body:
         near = mesh.surface[distance < _REACH]
         poses = (pose, pose.moved(depth)) if every_edge else (pose.moved(depth),)
         return FiniteStrainContact(
-            self.solid, near[~mesh.clamped[near]], indenter, pose, self.cavity, friction=friction,
+            self.solid, near[~mesh.clamped[near]], indenter, pose, cavity=self.cavity, friction=friction,
             core=Core(self.sensor) if len(self.core_nodes) else None, inner=self.core_nodes,
             factor=self.graded.factor, tolerance=_FULL if self.tier == "full" else EXACT,
             first_share=_first_share(self.sensor),

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,7 @@ class FiniteStrainContact:
         touchable: np.ndarray,
         indenter: Indenter,
         pose: Pose,
+        *,
         cavity: FluidCavity | None = None,
         pre_inflation: float = 0.0,
         fixed: np.ndarray | None = None,
@@ -86,24 +88,13 @@ class FiniteStrainContact:
     def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
 
-        A step that fails is halved. Raises TactileError with the depth reached where a sixteenth of a step fails, or
-        where too many have failed.
+        A step that fails is halved. Raises TactileError with the part of the way that was reached where a sixteenth of
+        a step fails, or where too many have failed.
         """
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
             return dataclasses.replace(touch, steps=0)
-        begin, reach = touch, depth - touch.depth
-
-        def along(part: float) -> Pose:
-            return between(begin.pose, self.pose.moved(depth), part)
-
-        try:
-            touch = self._follow(along, begin, step / reach)
-        except solved_contact.PathEndsError as end:
-            reached = begin.depth + end.part * reach
-            found = f"no equilibrium beyond {reached * 1e3:.3f} mm"
-            raise NoEquilibriumError("finite-strain solver", found, "a smaller depth") from None
-        return dataclasses.replace(touch, depth=depth)
+        return dataclasses.replace(self.move(self.pose.moved(depth), touch, step), depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
@@ -258,12 +249,8 @@ class FiniteStrainContact:
         matrix = pattern.sparse(blocks)
         for values in (residual, swell):
             values[nodes] = np.einsum("nji,nj->ni", frames, values[nodes])
-        solve = self._factor.solver(blocks, held)
-        known = (matrix @ step.ravel()).reshape(-1, 3)
-        under_pressure = solve(swell) if self.cavity else swell
-        step, reaction, rise = self._pull(
-            solve, matrix, residual, step, known, held, swell, excess, under_pressure, outer
-        )
+        system = _System(self._factor.solver(blocks, held), matrix, residual, step, np.where(held, 0.0, swell), excess)
+        step, reaction, rise = self._pull(system, swell, outer)
         for touching in (outer, inner):
             touching.press(reaction[touching.nodes])
         loose = ~held
@@ -276,20 +263,41 @@ class FiniteStrainContact:
         step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
         return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
-    def _pull(self, solve, matrix, residual, prescribed, known, held, swell, excess, under_pressure, outer):  # noqa: ANN001, ANN202
-        """Step, reactions and rise of the fluid's pressure, with friction that follows the normal forces."""
-        rise = 0.0
+    def _pull(self, system: _System, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
+        """Step (n, 3) m, reactions (n, 3) N and rise of the fluid's pressure, Pa.
+
+        swell : (n, 3) m2, gradient of the fluid's volume. Friction follows the normal forces.
+        """
+        rise, prescribed = 0.0, system.prescribed
+        known = (system.matrix @ prescribed.ravel()).reshape(-1, 3)
+        under_pressure = system.solve(swell) if self.cavity else swell
         for _ in range(_FRICTION_SWEEPS if outer.slips else 1):
-            load = -residual - known
+            load = -system.residual - known
             load[outer.nodes] += outer.rubbing_in_frames()
-            step = prescribed + solve(load)
+            step = prescribed + system.solve(load)
             if self.cavity:
-                loose = np.where(held, 0.0, swell)
-                rise = -(excess + float((swell * step).sum())) / float((loose * under_pressure).sum())
+                lost = system.excess + float((swell * step).sum())
+                rise = -lost / float((system.loose_swell * under_pressure).sum())
                 step = step + rise * under_pressure
-            reaction = residual + (matrix @ step.ravel()).reshape(-1, 3) - rise * swell
+            reaction = system.residual + (system.matrix @ step.ravel()).reshape(-1, 3) - rise * swell
             outer.follow(reaction[outer.nodes])
         return step, reaction, rise
+
+
+class _System(NamedTuple):
+    """Linear system of a Newton step, in the frames of the nodes that touch.
+
+    solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
+    residual : (n, 3) N; prescribed : (n, 3) m, of what is held
+    loose_swell : (n, 3) m2, gradient of the fluid's volume where nothing is held; excess : m3, of the fluid's volume
+    """
+
+    solve: Callable[[np.ndarray], np.ndarray]
+    matrix: Any
+    residual: np.ndarray
+    prescribed: np.ndarray
+    loose_swell: np.ndarray
+    excess: float
 
 
 _FADING = 0.78, 0.3, 0.1, 0.03  # friction that fades, after the fast tier's own (assumed: a third each time)

@@ -12,13 +12,13 @@ import dataclasses
 
 import numpy as np
 
+from ..penetration import SLACK
 from ..solids.block_pattern import BlockPattern
 from ..solids.elasticity import quadratic
 from .contact_set import Obstacle
 
 # m: at the edges of nine contacts with balls of 7 and 14 mm quadratic faces hid up to 43 um, and 129 um once.
 LET_THROUGH = 50e-6
-_SLACK = 20e-6  # m, in which they do not push: with 5 um a 14 mm ball 0.1 mm deep was pushed 8 % too hard
 # m: of points this deep at most the normals' turn is accounted for; deeper ones are on their way out (assumed).
 _NEAR = 100e-6
 
@@ -85,9 +85,9 @@ class PenaltyPoints:
         """
         points = self._points(at)
         distance, normal = obstacle.distance(points)
-        inside = np.flatnonzero(distance < -_SLACK)
+        inside = np.flatnonzero(distance < -SLACK)
         distance, normal = distance[inside], normal[inside]
-        pull = -stiffness * (distance + _SLACK)
+        pull = -stiffness * (distance + SLACK)
         tangent = stiffness * normal[:, :, None] * normal[:, None]
         near = distance > -_NEAR
         tangent[near] -= pull[near, None, None] * obstacle.curvature(points[inside[near]])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.geometry.indenters import Pose, Ring, Sphere
+from tactile_core.mechanics import penetration
 from tactile_core.mechanics.finite_strain import penalty_points
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, graded_body
 from tactile_core.mechanics.finite_strain.contact_set import PlacedIndenter
@@ -31,7 +32,7 @@ def ball() -> PlacedIndenter:
 def energy(at: np.ndarray) -> float:
     """Of the springs, J, with the nodes at (9, 3) m."""
     points = np.array([weights @ at for weights in penalty_points._WEIGHTS])
-    deep = np.maximum(-ball().distance(points)[0] - penalty_points._SLACK, 0)
+    deep = np.maximum(-ball().distance(points)[0] - penetration.SLACK, 0)
     return float(STIFFNESS * (deep**2).sum() / 2)
 
 

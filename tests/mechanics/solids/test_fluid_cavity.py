@@ -77,7 +77,7 @@ def test_fluid_keeps_its_volume_and_pushes_back(ball):
     indenter = Sphere(3e-3)
     pose = pose_on(indenter, np.array([0, -OUTER, 0]), np.array([0, -1.0, 0]))
     full, empty = (
-        FiniteStrainContact(solid, mesh.surface, indenter, pose, fluid).press(0.4e-3, step=0.2e-3)
+        FiniteStrainContact(solid, mesh.surface, indenter, pose, cavity=fluid).press(0.4e-3, step=0.2e-3)
         for fluid in (cavity, None)
     )
     at_rest = cavity.volume(mesh.nodes)
@@ -92,7 +92,7 @@ def test_pre_inflation_raises_the_pressure(ball):
     indenter = Sphere(3e-3)
     pose = pose_on(indenter, np.array([0, -OUTER - 1e-3, 0]), np.array([0, -1.0, 0]))
     more = 0.01 * cavity.volume(mesh.nodes)
-    touch = FiniteStrainContact(solid, mesh.surface, indenter, pose, cavity, pre_inflation=more).press(0.1e-3)
+    touch = FiniteStrainContact(solid, mesh.surface, indenter, pose, cavity=cavity, pre_inflation=more).press(0.1e-3)
     assert touch.fluid > 0 and len(touch.nodes) == 0
     grown = cavity.volume(mesh.nodes + touch.state.displacement)
     assert grown == pytest.approx(cavity.volume(mesh.nodes) + more, rel=1e-12)

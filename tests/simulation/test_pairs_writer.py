@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from tactile_core.simulation.pairs_card import card, card_path
+from tactile_core.simulation.pairs_writer import card, card_path
 
 h5py = pytest.importorskip("h5py", reason="pairs files need h5py")
 
