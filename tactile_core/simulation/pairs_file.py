@@ -260,6 +260,6 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
     return Split(*(np.flatnonzero(np.isin(press, group)) for group in groups))
 
 
-def quantise(displacement: np.ndarray, scale: float = SCALE) -> np.ndarray:
-    """Convert displacement in m to int16 steps of ``scale`` m."""
-    return np.round(displacement / scale).astype(np.int16)
+def quantise(displacement: np.ndarray) -> np.ndarray:
+    """Convert displacement in m to int16 steps of ``SCALE`` m."""
+    return np.round(displacement / SCALE).astype(np.int16)

@@ -59,7 +59,6 @@ def simulate_recording(
     out: str | os.PathLike,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
-    wiring: Wiring | None = None,
     *,
     keep: Collection[str] = DEFAULT,
     tiers: Mapping[Sensor, Tier] | None = None,
@@ -70,20 +69,17 @@ def simulate_recording(
 
     The motion is linear between the scene's points. Each frame is a press of its own, straight to its force with the
     scene's friction, so rolling and sliding differ in nothing: no frame drags what the one before has moved.
-    progress : called with (frames done, frames). wiring : in place of the scene's noise and drift.
+    progress : called with (frames done, frames).
     keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
     electrodes : the law of their counts, of ``law.LAWS``.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked,
-    tractions of another tier than the fast one, or tared wiring: this kind of file holds raw counts.
+    or tractions of another tier than the fast one.
     """
     scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
     used = sensors_of(keep)
     _check_tiers(keep, tiers or {})
-    wiring = wiring or _wiring(spec)
-    if wiring.tared:
-        raise TactileError("wiring, tared", "True", "raw counts in a simulated recording", "Tare it when it is read")
     check_places(scene_path, spec, [sensor for sensor in used if sensors.is_gel(sensor)])
     atomic.claim(out)
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
@@ -103,7 +99,7 @@ def simulate_recording(
     if "electrodes" in keep:
         pressure = _pressure(frames)
         change = np.stack([frame.change for frame in frames])
-        electrode_counts, pdc = readings(change, time, wiring, seed), pdc_counts(pressure)
+        electrode_counts, pdc = readings(change, time, _wiring(spec), seed), pdc_counts(pressure)
         still = np.full(len(time), _STILL_COUNT, np.int16)
         fluid = " " + _describe_fluid(pressure, electrodes)
     write_simulated(

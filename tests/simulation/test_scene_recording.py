@@ -12,7 +12,6 @@ from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.recordings import info
 from tactile_core.recordings.simulated import read_truth
 from tactile_core.sensors import PRESSURE_PER_COUNT
-from tactile_core.sensors.readout import Wiring
 from tactile_core.simulation import scene_recording as recording_room
 from tactile_core.simulation.scene_recording import PRESSURE_AT_REST, pdc_counts, sensors_of, simulate_recording
 
@@ -82,27 +81,15 @@ def test_a_press_that_comes_again_is_solved_once(tmp_path, monkeypatch):
     np.testing.assert_array_equal(moved[1], moved[5])
 
 
-def test_same_seed_same_bytes(scene, seed_4, tmp_path):
+def test_same_seed_same_bytes_and_another_changes_the_counts_alone(scene, seed_4, tmp_path):
     again, other = tmp_path / "again.h5", tmp_path / "other.h5"
     simulate_recording(scene, again, seed=4)
     simulate_recording(scene, other, seed=5)
-    assert seed_4.read_bytes() == again.read_bytes() != other.read_bytes()
-
-
-def test_wiring_changes_the_counts_and_nothing_else(scene, seed_4, tmp_path):
-    ideal = tmp_path / "ideal.h5"
-    simulate_recording(scene, ideal, seed=4, wiring=Wiring(rest_spread=0, drift=0, noise=0))
-    one, other = recordings.read(seed_4), recordings.read(ideal)
-    assert (one.electrodes != other.electrodes).any()
-    assert (other.electrodes[:41] == sensors.REST_COUNTS).all()
-    np.testing.assert_array_equal(one.truth.displacement_biotac, other.truth.displacement_biotac)
-    np.testing.assert_array_equal(one.pdc, other.pdc)
-
-
-def test_the_file_holds_raw_counts_only(scene, tmp_path):
-    with pytest.raises(TactileError, match="wiring, tared"):
-        simulate_recording(scene, tmp_path / "x.h5", wiring=Wiring(tared=True))
-    assert not (tmp_path / "x.h5").exists()
+    assert seed_4.read_bytes() == again.read_bytes()
+    one, two = recordings.read(seed_4), recordings.read(other)
+    assert (one.electrodes != two.electrodes).any()
+    np.testing.assert_array_equal(one.truth.displacement_biotac, two.truth.displacement_biotac)
+    np.testing.assert_array_equal(one.pdc, two.pdc)
 
 
 def test_pdc_counts_hold_a_hundred_kilopascal():

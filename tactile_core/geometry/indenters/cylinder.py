@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+from typing import ClassVar
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from . import extrusion
 from .indenter import NEAREST, SQUARE, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
+_ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # by its axis: those across; own ones in an extrusion's order
+
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder(Indenter):
@@ -21,6 +24,7 @@ class Cylinder(Indenter):
     radius: float
     edge: float
     length: float = 10e-3
+    axis: ClassVar[int] = 2  # the own axis that it is round about
 
     def __post_init__(self) -> None:
         for name in ("radius", "edge", "length"):
@@ -31,31 +35,30 @@ class Cylinder(Indenter):
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact."""
         inner, half = self.radius - self.edge, self.length / 2
-        return from_cylinder(contiguous(points), 2, self._middle, inner, half - self.edge, self.edge, NEAREST)
+        return _from_cylinder(contiguous(points), self.axis, self._middle, inner, half - self.edge, self.edge, NEAREST)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """See ``Indenter.curvature``."""
-        return extrusion.curvature(*self._prism(points))
+        arm, (across, own) = points - self._middle, _ORDER[self.axis]
+        outline = extrusion.disc(arm[:, across], self.radius - self.edge)
+        return extrusion.curvature(outline, arm[:, self.axis], self.length / 2 - self.edge)[:, own][:, :, own]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """See ``Indenter.support``."""
-        ring = np.hypot(direction[0], direction[1])
-        radial = np.array([direction[0], direction[1], 0.0]) / ring if ring > SQUARE else np.zeros(3)
-        upward = np.array([0.0, 0.0, sign_of(direction[2])])
-        inner = (self.radius - self.edge) * radial + (self.length / 2 - self.edge) * upward
-        return np.array([0.0, 0.0, self.length / 2]) + inner + self.edge * direction
+        across, inner = _ORDER[self.axis][0], np.zeros(3)
+        ring = np.hypot(*direction[across])
+        if ring > SQUARE:
+            inner[across] = (self.radius - self.edge) * (direction[across] / ring)
+        inner[self.axis] = (self.length / 2 - self.edge) * sign_of(direction[self.axis])
+        return self._middle + inner + self.edge * direction
 
     @functools.cached_property
     def _middle(self) -> np.ndarray:
-        return np.array([0.0, 0.0, self.length / 2])
-
-    def _prism(self, points: np.ndarray) -> tuple[extrusion.Outline, np.ndarray, float]:
-        outline = extrusion.disc(points[:, :2], self.radius - self.edge)
-        return outline, points[:, 2] - self.length / 2, self.length / 2 - self.edge
+        return np.array([0.0, 0.0, self.length / 2 if self.axis == 2 else self.radius])
 
 
 @Loop
-def from_cylinder(points, axis, middle, radius, half_span, edge, nearest):  # noqa: ANN001, ANN201
+def _from_cylinder(points, axis, middle, radius, half_span, edge, nearest):  # noqa: ANN001, ANN202
     """Distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along an own axis about a middle."""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     first, second = (axis + 1) % 3, (axis + 2) % 3

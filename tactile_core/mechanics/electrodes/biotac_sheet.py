@@ -74,12 +74,11 @@ class BiotacSheet:
 
 
 @functools.cache
-def biotac_sheet(sensor: str = sensors.SOURCE, *, core_of_mesh: bool = False) -> BiotacSheet:
+def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
     """The sheet of the resting finger; a solve takes 10 ms.
 
-    core_of_mesh : whether the film ends on the public mesh's core. By default it ends on a core that carries the
-    electrodes, so that films over electrodes are the published gaps: the mesh's core stands 0.25 mm over the electrodes
-    of the trunk and 0.6 mm under those of the tip.
+    The film ends on a core that carries the electrodes, so that films over electrodes are the published gaps: the
+    public mesh's core stands 0.25 mm over the electrodes of the trunk and 0.6 mm under those of the tip.
     """
     skin, mesh, thinnest = sensors.skin_of(sensor), skin_mesh(sensor), film_floor(sensor)
     inner = skin.skin_surface("inner")
@@ -91,9 +90,8 @@ def biotac_sheet(sensor: str = sensors.SOURCE, *, core_of_mesh: bool = False) ->
     positions = np.concatenate([read, sensors.excitation_electrodes(sensor)])
     face, weights, feet = closest_on_triangles(Lattice(inner.rest.copy(), faces, inner.shape), positions)
     corners = faces[face]
-    if not core_of_mesh:
-        gap = np.linalg.norm(feet - positions, axis=1)[: len(read)]
-        film = film + _spread(feet[: len(read)], gap - (weights * film[corners]).sum(1)[: len(read)], inner.rest)
+    gap = np.linalg.norm(feet - positions, axis=1)[: len(read)]
+    film = film + _spread(feet[: len(read)], gap - (weights * film[corners]).sum(1)[: len(read)], inner.rest)
     middle = inner.rest - outward * film[:, None] / 2
     centers = np.einsum("ek,ekd->ed", weights, middle[corners])
     wet, faces = np.unique(_connected(faces[(film > thinnest)[faces].all(1)]), return_inverse=True)

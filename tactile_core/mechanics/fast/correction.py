@@ -245,9 +245,9 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
     return parts.factor(features(compliance, contact, frame(compliance, contact)))
 
 
-def correct(compliance: Compliance, contact: Contact, parts: Correction | None = None) -> Corrected:
+def correct(compliance: Compliance, contact: Contact) -> Corrected:
     """Correct a fast contact to what the full tier gives at the same depth; not on a sensor without a correction."""
-    parts = parts or learned().get(compliance.name)
+    parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)

@@ -18,6 +18,7 @@ from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid
 from .sparse_cholesky import PatternFactor
 
 _WIDEST_GEL, _WIDEST_SKIN = 10.0, 6.0  # lattice lines, the widest cell; the skin bends everywhere
+_GROWTH = 1.5  # of a cell, with its distance from the fine part
 _KEPT = 6  # patterns kept, each with the analysis and the last factor of its matrix: about 100 MB
 
 
@@ -26,14 +27,13 @@ class Footprint:
     """Area where a lattice is refined, in row and column numbers of the lattice.
 
     low, high : (row, column) of the fine part's corners
-    spacing : of the nodes there, in lattice lines; growth : of a cell with its distance from the fine part
+    spacing : of the nodes there, in lattice lines
     refine : divides every cell, for a mesh that many times as fine
     """
 
     low: tuple[float, float]
     high: tuple[float, float]
     spacing: float = 1.0
-    growth: float = 1.5
     refine: int = 1
 
 
@@ -146,7 +146,7 @@ def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: floa
     low, high = footprint.low[axis], footprint.high[axis]
     at = np.linspace(marks[0], marks[-1], 20 * (marks[-1] - marks[0]) + 1)
     beyond = np.maximum(np.maximum(low - at, at - high), 0)
-    width = np.minimum(2 * footprint.spacing + footprint.growth * beyond, widest)
+    width = np.minimum(2 * footprint.spacing + _GROWTH * beyond, widest)
     middle = (1 / width[:-1] + 1 / width[1:]) / 2 * np.diff(at)
     cells = np.r_[0, np.cumsum(middle)]  # cells wanted up to each place
     wanted = np.diff(np.interp(marks, at, cells))
