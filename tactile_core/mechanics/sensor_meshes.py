@@ -16,7 +16,7 @@ from ..sensors import sensor_surface
 from ..sensors.unrolling import node_normals
 from .solids import stress
 from .solids.finite_strain import FiniteStrainSolid, State
-from .solids.hex_mesh import HexMesh, solid_mesh
+from .solids.hex_mesh import HexMesh, outer_faces, solid_mesh
 from .solution import Sensor, Solution
 
 Data = Mapping[str, np.ndarray]
@@ -188,27 +188,23 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
     Raises what the writers raise.
     """
     check_suffix(path)
-    volume = solution.volume
-    if volume is None:
-        columns = {"contact": solution.contact_patch.astype(np.float32)}
-        write_surface(path, sensor, solution.displacement, columns)
+    if solution.volume is None:
+        contact = solution.contact_patch.astype(np.float32)
+        write_surface(path, sensor, solution.displacement, {"contact": contact})
         return
-    solid, state = volume
+    solid, state = solution.volume
     if Path(path).suffix.lower() == ".vtu":
         write_vtu(path, solid.mesh, solid, state)
         return
     nodes, faces = outer_surface(solid.mesh)
-    moved = (solid.mesh.nodes + state.displacement)[nodes]
-    if Path(path).suffix.lower() == ".stl":
-        write_stl(path, moved, faces)
-        return
     points, _ = solid_data(solid, state)
-    write_ply(path, moved, faces, {name: points[name][nodes] for name in ("displacement", "force", "von_mises")})
+    columns = {name: points[name][nodes] for name in ("displacement", "force", "von_mises")}
+    _write_triangles(path, (solid.mesh.nodes + state.displacement)[nodes], faces, columns)
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
     """Return the touchable side's mesh nodes (n,) and triangles (m, 3), outward: eight a quadratic face."""
-    faces = mesh.cells[:, 18:][np.isin(mesh.cells[:, 18:], mesh.surface).all(axis=1)].reshape(-1, 3, 3)
+    faces = outer_faces(mesh).reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T
     triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
@@ -227,11 +223,16 @@ def write_surface(
     """
     check_suffix(path)
     lattice = sensor_surface(sensor)
-    suffix = Path(path).suffix.lower()
     columns = {"displacement": displacement, **columns}
-    if suffix == ".stl":
-        write_stl(path, lattice.rest + displacement, lattice.faces)
-    elif suffix == ".ply":
-        write_ply(path, lattice.rest + displacement, lattice.faces, columns)
-    else:
+    if Path(path).suffix.lower() == ".vtu":
         write_cells(path, lattice.rest, lattice.faces, TRIANGLE, columns)
+    else:
+        _write_triangles(path, lattice.rest + displacement, lattice.faces, columns)
+
+
+def _write_triangles(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data) -> None:
+    """Write a surface as PLY, or as STL, which has no room for columns."""
+    if Path(path).suffix.lower() == ".stl":
+        write_stl(path, nodes, faces)
+    else:
+        write_ply(path, nodes, faces, columns)

@@ -94,7 +94,8 @@ class FiniteStrainContact:
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
             return dataclasses.replace(touch, steps=0)
-        return dataclasses.replace(self.move(self.pose.moved(depth), touch, step), depth=depth)
+        touch = self._along(touch, self.pose.moved(depth), step / (depth - touch.depth), "a smaller depth")
+        return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
@@ -103,12 +104,16 @@ class FiniteStrainContact:
         """
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
+        touch = self._along(start, pose, step / max(way, turned, 1e-12), "a shorter way, or less force")
+        return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
+
+    def _along(self, start: ContactState, pose: Pose, step: float, wanted: str) -> ContactState:
+        """Go straight to a pose, in load steps of at most a share ``step`` of the way."""
         try:
-            touch = self._follow(lambda part: between(start.pose, pose, part), start, step / max(way, turned, 1e-12))
+            return self._follow(lambda part: between(start.pose, pose, part), start, step)
         except solved_contact.PathEndsError as end:
             found = f"no equilibrium beyond {end.part:.0%} of the way"
-            raise NoEquilibriumError("finite-strain solver", found, "a shorter way, or less force") from None
-        return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
+            raise NoEquilibriumError("finite-strain solver", found, wanted) from None
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve a contact without friction at another pose as ``move`` does, by a way with friction that then fades.
