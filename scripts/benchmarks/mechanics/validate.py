@@ -1,6 +1,6 @@
 """Hold contact mechanics against known answers, and its fast tier against its reference tier.
 
-    python scripts/validate_mechanics.py                       every row; docs/mechanics.md and its plots
+    python scripts/validate_mechanics.py                       every row; tables and plots of docs/mechanics.md
     python scripts/validate_mechanics.py --quick --json FILE   under five minutes; writes FILE alone
     python scripts/validate_mechanics.py --only hertz golden   some checks; writes no report
 

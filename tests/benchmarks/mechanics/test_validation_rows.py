@@ -1,6 +1,8 @@
 """Rows and report: what counts as missed, and what is written."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 from benchmarks.measured_rows import read_table
@@ -41,13 +43,17 @@ def test_report_holds_every_row_and_small_plots(tmp_path):
         for name in ("force_error", "shape_rms") for depth in ("0.6", "1.4") for spacing in (0.4, 0.2, 0.1)
     ]  # fmt: skip
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
+    page = Path(__file__).parents[3] / "docs" / "mechanics.md"
+    shutil.copy(page, tmp_path)
     mechanics_page.write(tmp_path / "mechanics.md", {"Golden": forces, "Refined": refined, "Speed": speed})
     text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
     table = read_table(tmp_path / "mechanics.csv")
     assert [each["name"] for each in table] == [each["name"] for each in forces + refined + speed]
     assert {each["part"] for each in table} == {"Golden", "Refined", "Speed"}
     assert [each["name"] for each in table if each["ok"] == "False"] == ["digit_fast_0.2mm_shape_rms"]
-    assert "| Speed | 2 | 1 | `digit_fast_0.2mm_shape_rms` 3 um |" in text
+    assert "| Speed | 2 | 1 | `digit_fast_0.2mm_shape_rms` 3 um |" in text and "Patch test" not in text
+    words = [line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("|")]
+    assert [line for line in text.splitlines() if not line.startswith("|")] == words
     plots = sorted(tmp_path.glob("*.png"))
     assert [plot.name for plot in plots] == ["mechanics_force.png", "mechanics_spacing.png", "mechanics_speed.png"]
     assert all(f"({plot.name})" in text and plot.stat().st_size < 100_000 for plot in plots)
