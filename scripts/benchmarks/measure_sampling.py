@@ -106,17 +106,19 @@ def rounding() -> float:
     """Largest difference m of the shipped recording's gel in float32 from the same networks in float64."""
     signals = prepare(read(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"))
     nets = networks.load()
-    doubled = {net: {name: array.astype(float) for name, array in nets.tensors[net].items()} for net in nets.tensors}
-    double = Double(nets.tensors, nets.card)
-    double.tensors = doubled
-    gels = [
-        one.decode_digit(one.likely_latents(one.encode_signal(signals.typical[60:340:10]))[1]) for one in (nets, double)
-    ]
+    change = signals.typical[60:340:10]
+    gels = [one.decode_digit(one.likely_latents(one.encode_signal(change))[1]) for one in (nets, Double(nets))]
     return float(np.abs(gels[0] - gels[1]).max())
 
 
 class Double(networks.Networks):
     """Run the same networks in float64, all frames at once."""
+
+    def __init__(self, nets: networks.Networks) -> None:
+        super().__init__(nets.tensors, nets.card)
+        self.tensors = {
+            net: {name: array.astype(float) for name, array in found.items()} for net, found in nets.tensors.items()
+        }
 
     def _blocks(self, function: networks.Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
         return function(np.asarray(x, float))

@@ -8,6 +8,7 @@ import io
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from tactile_core.accuracy import HEADER, Row, failed, line
 from tactile_core.files import atomic
@@ -51,6 +52,15 @@ def read_table(path: Path) -> list[dict[str, str]]:
 def short(value: float | None) -> str:
     """Format with two digits, hundreds whole."""
     return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
+
+
+def png_of(figure: Any) -> bytes:
+    """Draw a figure of matplotlib as PNG, without a date; nothing of pyplot's is touched."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    content = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
+    return content.getvalue()
 
 
 def finished(rows: list[Row], json: Path | None) -> int:

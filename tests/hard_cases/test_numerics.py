@@ -6,6 +6,7 @@ import dataclasses
 import functools
 
 import numpy as np
+from benchmarks.measure_sampling import Double
 from benchmarks.mechanics.axisymmetric import disc_mesh, pressed
 from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
 from slab import slab_compliance
@@ -250,27 +251,13 @@ def test_single_compliance() -> Found:
     return Found(float(np.abs(single - double).max()) * 1e6, "um", 0.1)
 
 
-class _Double(networks.Networks):
-    """The same networks with every tensor and every frame in double precision."""
-
-    def __init__(self, nets: networks.Networks) -> None:
-        super().__init__(nets.tensors, nets.card)
-        self.tensors = {
-            net: {name: array.astype(np.float64) for name, array in found.items()}
-            for net, found in nets.tensors.items()
-        }
-
-    def _blocks(self, function, x, shape, name):
-        return function(np.asarray(x, np.float64))
-
-
 @case("networks_in_single_precision", "single precision against double", TRANSLATION,
       "from counts to the gel float32 moves no node by 0.5 um, a fortieth of the chain's own error")  # fmt: skip
 def test_single_networks() -> Found:
     """Frames of the shipped recording through both."""
     nets = networks.load()
     change = prepared()[1].change[100::60]
-    single, double = (n.decode_digit(n.likely_latents(n.encode_signal(change))[1]) for n in (nets, _Double(nets)))
+    single, double = (n.decode_digit(n.likely_latents(n.encode_signal(change))[1]) for n in (nets, Double(nets)))
     words = f"{len(change)} frames, nodes move up to {np.abs(double).max() * 1e6:.0f} um"
     return Found(float(np.abs(single - double).max()) * 1e6, "um", 0.5, words=words)
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.measured_rows import png_of
 from tactile_core.accuracy import Row
 from tactile_core.files import atomic, provenance
 
@@ -82,7 +82,6 @@ def short(value: float | None) -> str:
 
 def plot(methods: Sequence[Method]) -> bytes:
     """Draw a PNG, a panel a stage: error over time, logarithmic; the Pareto front, and doing nothing, as lines."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]
@@ -92,9 +91,7 @@ def plot(methods: Sequence[Method]) -> bytes:
         axes = figure.add_subplot(-(-len(panels) // columns), columns, number)
         sensor = f", {part[0].name.split('_')[0]}" if stage == "mechanics" else ""
         draw(axes, part, title + sensor)
-    content = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
-    return content.getvalue()
+    return png_of(figure)
 
 
 def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.measured_rows import png_of
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
 from benchmarks.translation.noise import as_read
 from benchmarks.translation.test_set import SEED
@@ -204,7 +204,6 @@ def scene_rows(translator: Translator, name: str) -> tuple[list[Row], str]:
 
 def plot(promises: Sequence[Promise]) -> bytes:
     """Draw a PNG: measured errors over stated bounds, both logarithmic, a panel each; on the line they are equal."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import LogLocator
 
@@ -225,6 +224,4 @@ def plot(promises: Sequence[Promise]) -> bytes:
             axis.set_minor_formatter("")
         axes.set_title(f"{promise.name.replace('_', ' ')}: {promise.covered():.1%} below")
         axes.legend(fontsize=8)
-    content = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
-    return content.getvalue()
+    return png_of(figure)

@@ -98,7 +98,7 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
     found += sequence_rows.full_rows(network, pairs)
-    found += [*two_contact_rows.rows(pairs), *test_set.speed_rows(network, pairs)]
+    found += two_contact_rows.rows(pairs)
     apart = [translate.load_translator(folder) for folder in options.held_out]
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)

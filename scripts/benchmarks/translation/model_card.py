@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translator import Translator
 
-from ..measured_rows import short, write_table
+from ..measured_rows import png_of, short, write_table
 from .noise import as_read
 from .test_set import SEED
 
@@ -154,7 +153,6 @@ def _apart(trainings: list[dict]) -> str:
 
 def _cases(translator: Translator, pairs: Pairs) -> bytes:
     """Draw a PNG: true, translated and difference of the gel's depth, for three contacts."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     nets, gel = translator.nets, sensors.digit_surface()
@@ -178,6 +176,4 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
             ax.set(aspect="equal", title=title, xlabel="z, mm")
         axes[row, 0].set_ylabel(f"{word}: {names[pairs.indenter[contact]]}\nx, mm")
         figure.colorbar(drawn, ax=axes[row], label="depth, mm")
-    content = io.BytesIO()
-    FigureCanvasAgg(figure).print_png(content, metadata={"Software": None})
-    return content.getvalue()
+    return png_of(figure)

@@ -9,8 +9,8 @@ from tactile_core.sensors.readout import NOISE
 GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac read-out)
 
 
-def as_read(change: np.ndarray, seed: int, frames: int = 1) -> np.ndarray:
-    """Add seeded noise to true changes (C, 19) counts, as the mean over ``frames`` of a resting contact reads them."""
+def as_read(change: np.ndarray, seed: int) -> np.ndarray:
+    """Add seeded noise and gains to true changes (C, 19) counts."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
-    return (gain * change + NOISE / np.sqrt(frames) * random.standard_normal(change.shape)).astype(np.float32)
+    return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
-from tactile_core.sensors import SAMPLE_RATE
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.error_summary import metric_row, metric_rows, slices
 from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_metrics
@@ -29,10 +26,6 @@ TARGETS = {
 UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter that was kept from the training
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 BASELINE_METRICS = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
-FROM_SIGNALS = ("S2MPN_rms_um", "S2MPN_position_mm", "force_percent", "chain_rms_um")
-WINDOW = 3  # frames
-BATCHES = {1: 0.8, 500: 0.25}  # frames a call -> target, ms a frame
-ROUNDS = 7  # calls, of which the fastest counts: what else runs only ever slows
 SEED = 7  # of the readings' noise
 
 
@@ -58,18 +51,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         each = {metric: np.where(at, columns[metric], np.nan) for metric in (*EACH_INDENTER, *BASELINE_METRICS)}
         found += [one for one in metric_rows(each, pairs, rows, name, {}) if one["value"] is not None]
     found += mechanics_rows(pairs, bodies)
-    found += window_rows(translator, pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
-
-
-def window_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure what a short causal window gains over single frames, and how much later its result comes."""
-    rows, name = np.arange(len(pairs.press)), f"causal mean over {WINDOW} frames"
-    columns = translation_metrics(translator.nets, pairs, rows, as_read(pairs.signal, SEED, WINDOW), bodies)
-    found = metric_rows(
-        {metric: columns[metric] for metric in (*FROM_SIGNALS, *BASELINE_METRICS)}, pairs, rows, name, {}
-    )
-    return [*found, row("window_delay_ms", 1e3 * (WINDOW - 1) / 2 / SAMPLE_RATE, "ms", of=name)]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
@@ -119,29 +101,3 @@ def _share_row(name: str, value: float, low: float | None, high: float | None, s
     """A row with a target from below, from above, or both."""
     found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
     return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
-
-
-def speed_rows(translator: Translator, pairs: Pairs) -> list[Row]:
-    """Measure ms a frame, from changes to both displacements, and with expected errors and confidence."""
-    nets, found = translator.nets, []
-
-    def surfaces(change: np.ndarray) -> None:
-        biotac, digit = nets.likely_latents(nets.encode_signal(change))
-        nets.decode_biotac(biotac), nets.decode_digit(digit)
-
-    def trust(change: np.ndarray) -> None:
-        surfaces(change)
-        nets.expected_error(change)
-        translator.out_of_range(change)
-
-    for frames, target in BATCHES.items():
-        change = np.resize(pairs.signal, (frames, pairs.signal.shape[1]))
-        for name, work, aim in (("translation_ms", surfaces, target), ("translation_with_confidence_ms", trust, None)):
-            took = []
-            for _ in range(ROUNDS * (1 + 200 // frames)):
-                began = time.perf_counter()
-                work(change)
-                took.append(time.perf_counter() - began)
-            value = 1e3 * min(took) / frames
-            found.append(metric_row(name, value, None, aim, f"{frames} frames a call"))
-    return found
