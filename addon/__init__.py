@@ -14,7 +14,6 @@ from .operators import (
     import_recording,
     preview,
     render_engine,
-    render_properties,
     render_setup,
     scene_files,
     set_style,
@@ -31,7 +30,6 @@ from .ui import add_menu, asset_library, panels, workspace
 # In the order of registration: properties before what uses them.
 PARTS = (
     properties,
-    render_properties,
     preferences,
     asset_library,
     check_llvm,

@@ -24,6 +24,7 @@ import re
 import subprocess
 import sys
 import venv
+from collections.abc import Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -42,15 +43,6 @@ TOOLS = {
 }
 STAMP = "tactile-dev.json"
 LOG = "tactile-install.log"
-# Download in MB of each extra on Linux, as pip reported it; of torch, its CPU build and PyPI's Linux build with CUDA.
-SIZES_MB = {
-    "": "50",
-    "plain": "430",
-    "dev": "590",
-    "check": "40",
-    "docs": "30",
-    "train": "190 (CPU build) to 3,000 (PyPI's Linux build, which brings CUDA)",
-}
 NETWORK_SIGNS = (
     "NewConnectionError",
     "NameResolutionError",
@@ -98,7 +90,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.command == "test-blender":
             return run_in_binary(options.binary, rest) if options.binary else run_in_bpy(options, rest)
         if options.command in TOOLS:
-            return run_tools(options.venv, options.command)
+            return run_all(install(options.venv, (options.command,)), TOOLS[options.command], environment())
         return run_demo(options.venv) if options.command == "demo" else run_tests(options, rest)
     except SetupError as error:
         print(f"dev.py: error: {error}", file=sys.stderr)
@@ -146,21 +138,15 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
         pytest_arguments = [*pytest_arguments, "-n", str(workers), "--dist", "worksteal"]
         for name in THREADS:
             variables.setdefault(name, "1")
+    return run_all(python, (["ruff", "check", "."], ["pytest", *pytest_arguments]), variables)
+
+
+def run_all(python: Path, commands: Iterable[list[str]], variables: dict[str, str]) -> int:
+    """Run modules of Python's, each whatever the others report; returns the status of the first that fails."""
     failed = []
-    for command in (["ruff", "check", "."], ["pytest", *pytest_arguments]):
+    for command in commands:
         say(" ".join(command))
         status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=variables)
-        failed += [status] if status else []
-    return failed[0] if failed else 0
-
-
-def run_tools(folder: Path, extra: str) -> int:
-    """Run every tool of an extra, whatever the others report; returns the status of the first that fails."""
-    python = install(folder, (extra,))
-    failed = []
-    for command in TOOLS[extra]:
-        say(" ".join(command))
-        status = subprocess.call([str(python), "-m", *command], cwd=str(ROOT), env=environment())
         failed += [status] if status else []
     return failed[0] if failed else 0
 
@@ -239,10 +225,9 @@ def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> 
     if not missing:
         return python
     what = "tactile-core" + ("[{}]".format(",".join(extras)) if extras else "")
-    sizes = " + ".join(SIZES_MB[extra] for extra in missing)
-    say(f"installing {what} into {relative(folder)}; downloads up to about {sizes} MB")
+    say(f"installing {what} into {relative(folder)}; downloads some 50 to 650 MB")
     if "train" in missing:
-        say("for torch's small CPU build on Linux: PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu")
+        say("torch takes up to 3,000 MB; its CPU build 190: PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu")
     write_stamp(folder, dict(wanted, extras=[], state="installing"))
     failure = pip_install(python, folder, extras, numpy)
     write_stamp(folder, dict(wanted, extras=[] if failure else sorted(there | {"", *extras}), state="ready"))

@@ -17,6 +17,8 @@ class TactileError(Exception):
     advice : what the user can do, an imperative sentence
     """
 
+    second: float | None = None  # of a recording, where the error is of a moment in it
+
     def __init__(self, where: str | os.PathLike, found: str, expected: str = "", advice: str = "") -> None:
         self.where, self.found, self.expected, self.advice = os.fspath(where), found, expected, advice
         super().__init__(self._sentence())

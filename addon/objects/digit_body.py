@@ -12,7 +12,7 @@ from ...tactile_core.pictures.mitsuba.window import ACRYLIC
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import Camera, Led
 from ..settings import properties
-from . import digit_materials, held_light, image_frame, led_receivers, surfaces
+from . import digit_materials, held_light, image_frame, surfaces
 
 _CHIP = np.array([1.6e-3, 0.8e-3, 0.6e-3])  # m, sides of an LED package (0603)
 _WALL = 1.5e-3  # m of housing beyond the LEDs' reach, and its depth below them
@@ -54,7 +54,7 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         place_camera(lens, gel, unit.camera)
     if held_light.NODE not in coating_of(gel).node_tree.nodes:
         _hold_light(gel, unit)
-    led_receivers.link(gel, leds_of(gel))
+    _link_light(gel)
 
 
 def reset(gel: bpy.types.Object, unit: Calibration) -> None:
@@ -64,12 +64,30 @@ def reset(gel: bpy.types.Object, unit: Calibration) -> None:
         thing = leds_of(gel).get(led.colour) or _add_led(gel, led)
         thing.animation_data_clear(), thing.data.animation_data_clear()
         _place_led(thing, gel, led, unit)
-    led_receivers.link(gel, leds_of(gel))
+    _link_light(gel)
     lens = camera_of(gel)
     lens.animation_data_clear(), lens.data.animation_data_clear()
     place_camera(lens, gel, unit.camera)
     digit_materials.set_coating(coating_of(gel), unit.coating)
     _hold_light(gel, unit)
+
+
+def _link_light(gel: bpy.types.Object) -> None:
+    """Let LEDs light the gel, its acrylic and its housing alone, by Blender's light linking; not those linked by hand.
+
+    The gel throws no shadow, so that without it their light would fall on what stands around.
+    """
+    leds = leds_of(gel).values()
+    new = [led for led in leds if led.light_linking.receiver_collection is None]
+    if not new:
+        return
+    known = (led.light_linking.receiver_collection for led in leds)
+    lit = next(filter(None, known), None) or bpy.data.collections.new("DIGIT lit by its LEDs")
+    for thing in (gel, *gel.children_recursive):
+        if thing.tactile.role in ("DIGIT", "BODY") and thing.name not in lit.objects:
+            lit.objects.link(thing)
+    for led in new:
+        led.light_linking.receiver_collection = lit
 
 
 def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:

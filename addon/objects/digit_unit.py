@@ -12,7 +12,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
 from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
-from . import axes, digit_body, digit_materials, image_frame
+from . import axes, digit_body, digit_materials, image_frame, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 _STEP = 1e-7  # m: no movement that anybody meant
@@ -111,18 +111,14 @@ def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN0
         if thing.type != "MESH" or thing.tactile.role != "NONE" or thing.hide_render:
             continue
         now = thing.evaluated_get(depsgraph)
-        mesh = now.data
-        mesh.calc_loop_triangles()
-        nodes, faces = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
-        mesh.vertices.foreach_get("co", nodes)
-        mesh.loop_triangles.foreach_get("vertices", faces)
+        nodes, faces = surfaces.triangles_of(now.data)
         if not len(faces):
             continue
         world = np.array(now.matrix_world)
-        places = _places(gel, depsgraph, nodes.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3], camera)
+        places = _places(gel, depsgraph, nodes @ world[:3, :3].T + world[:3, 3], camera)
         inside = (np.abs(places[:, :2]) < reach).all(1) & (places[:, 2] > 0)
         if inside.any() and not (places[:, 2] > camera.apparent_height).all():
-            yield Occluder(places, faces.reshape(-1, 3))
+            yield Occluder(places, faces)
 
 
 def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coating) -> Coating:

@@ -86,14 +86,10 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """Return triangles (m, 3, 3), Blender units, modifiers applied, in the sensor's axes, from the object's origin."""
-    mesh = thing.evaluated_get(depsgraph).data
-    mesh.calc_loop_triangles()
-    nodes, corners = np.empty(len(mesh.vertices) * 3, np.float32), np.empty(len(mesh.loop_triangles) * 3, np.int32)
-    mesh.vertices.foreach_get("co", nodes)
-    mesh.loop_triangles.foreach_get("vertices", corners)
+    nodes, corners = surfaces.triangles_of(thing.evaluated_get(depsgraph).data)
     if not len(corners):
         raise TactileError(thing.name, "no faces", "a closed mesh", "Select a mesh with a surface")
-    return (nodes.reshape(-1, 3) @ relative.T)[corners].reshape(-1, 3, 3)
+    return (nodes @ relative.T)[corners]
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:

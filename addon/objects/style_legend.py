@@ -83,11 +83,8 @@ def _letters(text: str, x: float, y: float, align: str = "LEFT") -> _Part:
     curve.body, curve.size, curve.align_x, curve.resolution_u = text, _LETTERS, align, 2
     thing = bpy.data.objects.new("legend", curve)
     mesh = bpy.data.meshes.new_from_object(thing)
-    mesh.calc_loop_triangles()
-    nodes, faces = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
-    mesh.vertices.foreach_get("co", nodes)
-    mesh.loop_triangles.foreach_get("vertices", faces)
+    nodes, faces = surfaces.triangles_of(mesh)
     for made, kind in ((thing, bpy.data.objects), (curve, bpy.data.curves), (mesh, bpy.data.meshes)):
         kind.remove(made)
-    corners = nodes.reshape(-1, 3)[:, :2] + np.array([x, y])
-    return corners, faces.reshape(-1, 3), np.tile(_INK, (len(corners), 1))
+    corners = nodes[:, :2] + np.array([x, y])
+    return corners, faces, np.tile(_INK, (len(corners), 1))

@@ -30,6 +30,15 @@ def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: boo
     return bpy.data.objects.new(name, mesh)
 
 
+def triangles_of(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
+    """Return a mesh's nodes (n, 3) float32, in its own units, and its faces as triangles (m, 3)."""
+    mesh.calc_loop_triangles()
+    nodes, faces = np.empty(3 * len(mesh.vertices), np.float32), np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.vertices.foreach_get("co", nodes)
+    mesh.loop_triangles.foreach_get("vertices", faces)
+    return nodes.reshape(-1, 3), faces.reshape(-1, 3)
+
+
 def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) -> None:
     """Assign a material that shows the object's own colour, so that it can be animated and seen in every shading."""
     thing.color = colour

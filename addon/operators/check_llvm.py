@@ -7,8 +7,6 @@ from ..process.tracer_process import close_all
 from ..settings import preferences
 from ..settings.reports import TactileOperator, require
 
-_LOOK = 0.1  # s between two looks at the worker
-
 
 class TACTILE_OT_check_llvm(TactileOperator):
     """Try LLVM in another process: it needs some seconds, and a bad library ends that process alone"""
@@ -24,8 +22,7 @@ class TACTILE_OT_check_llvm(TactileOperator):
         with JobFolder() as folder:
             job = Job("variant", folder)
             try:
-                while not job.poll(_LOOK):
-                    pass
+                job.wait()
             finally:
                 job.cancel()
             verdict = (folder / "variant.txt").read_text(encoding="utf-8")

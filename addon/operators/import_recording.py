@@ -9,12 +9,11 @@ from bpy_extras.io_utils import ImportHelper
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors.electrodes import table_of
-from ..objects import axes, biotac_objects, custom_properties, electrode_markers, motion
+from ..objects import axes, biotac_objects, electrode_markers
 from ..settings import properties
 from ..settings.properties import MOTIONS, POLARITIES, POLARITY_HELP, WEIGHTS_HELP
-from ..settings.reports import TactileOperator
-from . import recording_data, timeline, view
-from .progress import shown
+from ..settings.reports import TactileOperator, shown
+from . import recording_data, set_style, view
 
 SUFFIXES = "*.csv;*.h5;*.hdf5;*.npz"
 _APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housing and a gap
@@ -68,10 +67,10 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         kept = self._keep_scene(scene)
         frames = self.first_frame + found.chosen.astype(float)
         skin = self._objects(scene, path, found, frames, placed)
-        rest, moved = properties.surface_of(skin).rest, found.translation.displacement_biotac
-        summary = motion.animate(skin, rest, moved, frames, self.motion)
+        moved = found.translation.displacement_biotac
+        summary = set_style.animate(skin, moved, frames, self.motion, found.columns())
         if self.set_timeline:
-            timeline.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
+            view.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
             firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
             scene.frame_set(int(frames[firmest]))
             view.fit_timeline(context)
@@ -121,7 +120,6 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         if placed:
             electrode_markers.add_markers(skin, group, found.signals.change, frames)
             electrode_markers.add_counts(skin, found.signals.change, frames)
-        custom_properties.write(skin, found.columns(), frames)
         return skin
 
 

@@ -32,8 +32,8 @@ class JobOperator(TactileOperator):
         """Run the job and wait for its end: without a window, or from a script."""
         try:
             self.begin(context)
-            while self._job is not None and not self._job.poll(_STEP):
-                pass
+            if self._job is not None:
+                self._job.wait()
             self.finish(context)
         finally:
             self._close(context)

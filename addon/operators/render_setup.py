@@ -1,4 +1,9 @@
-"""Set Up Render: everything that makes a rendered file hold the camera's own 8-bit values; and the engine's panel."""
+"""Set Up Render: all that makes a rendered file hold the camera's own 8-bit values; the scene's settings, their panel.
+
+A choice of preset or calibration acts on the gels and workers at once.
+"""
+
+import importlib.util
 
 import bpy
 
@@ -9,6 +14,51 @@ from ..settings import properties, render_settings, reports
 from ..settings.reports import TactileOperator
 from . import pictures
 from .render_engine import ID
+
+_FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
+_MITSUBA = (
+    ("standard", "Standard", "Direct light, traced by Mitsuba"),
+    ("quality", "Quality", "And the light that bounces once"),
+    ("reference", "Reference", "Everything, seconds a frame"),
+)
+_PACKAGE = __package__.rsplit(".", 2)[0]
+TRACED = importlib.util.find_spec(f"{_PACKAGE}.tactile_core.pictures.mitsuba") is not None
+PRESETS = (_FAST, *(_MITSUBA if TRACED else ()))
+
+
+class TactileRender(bpy.types.PropertyGroup):
+    """Render settings of each scene."""
+
+    preset: bpy.props.EnumProperty(
+        name="Preset", description="How exactly the picture is made", items=PRESETS,
+        update=lambda settings, context: _prepare(settings, context),
+    )  # fmt: skip
+    calibration: bpy.props.StringProperty(
+        name="Calibration", description="File of one unit (tactile calibrate); empty: that of the sensor, or of the"
+        " preferences for a DIGIT", subtype="FILE_PATH", options=properties.RELATIVE,
+        update=lambda settings, context: _take_calibration(settings, context),
+    )  # fmt: skip
+    error: bpy.props.StringProperty(
+        name="Largest Error", description="Largest error that the toolkit itself may add: 50um of a simulated surface,"
+        " 0.6levels of a picture, or both with a comma. Picks tier and preset; empty: the fast tier, the preset above",
+    )  # fmt: skip
+
+
+def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
+    """Put LEDs, coating and camera to those of the file that was chosen; a bad file is reported by a render."""
+    scene = settings.id_data
+    for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
+        if digit_body.leds_of(gel) and gel.library is None:
+            try:
+                digit_body.reset(gel, render_settings.calibration_of(scene, properties.sensor_name(gel)))
+            except TactileError:
+                continue
+
+
+def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
+    """Let the worker of the preset that was chosen get ready."""
+    if settings.id_data == context.scene:
+        pictures.prepare(context.scene, context.evaluated_depsgraph_get())
 
 
 class TACTILE_OT_set_up_render(TactileOperator):
@@ -101,4 +151,5 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.operator("tactile.save_as_calibration", text="Save As", icon="FILE_TICK")
 
 
-CLASSES = (TACTILE_OT_set_up_render, TACTILE_PT_render)
+CLASSES = (TactileRender, TACTILE_OT_set_up_render, TACTILE_PT_render)
+POINTERS = ((bpy.types.Scene, "tactile_render", TactileRender),)

@@ -31,6 +31,11 @@ class Authored:
     apexes: np.ndarray | None
 
 
+def rate_of(scene: bpy.types.Scene) -> float:
+    """Return a scene's frames a second."""
+    return scene.render.fps / scene.render.fps_base
+
+
 def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
     """Return the indenter to simulate: the active object if it is one, else the scene's first. Raises TactileError."""
     found = properties.of_role(context.scene, "INDENTER", context.object)
@@ -144,8 +149,7 @@ def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarra
 
 
 def _points(scene: bpy.types.Scene, frames: np.ndarray, values: dict, originals: list[dict]) -> list[dict]:
-    rate = scene.render.fps / scene.render.fps_base
-    seconds = (frames - scene.frame_start) / rate
+    seconds = (frames - scene.frame_start) / rate_of(scene)
     points = [
         {"time_s": round(float(second), DIGITS_S), "x_mm": round(1e3 * float(apex[0]), DIGITS_MM),
          "z_mm": round(1e3 * float(apex[2]), DIGITS_MM), "force_n": round(float(force), DIGITS_N)}

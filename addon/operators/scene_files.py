@@ -13,7 +13,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, curves, digit_body, digit_objects, indenter_objects
 from ..settings import properties, render_settings
 from ..settings.reports import TactileOperator, require
-from . import scene_bridge, timeline, view
+from . import scene_bridge, view
 
 _HOVER = 12e-3  # m above the sensors' frame: an indenter that presses by force is shown clear of the gel
 
@@ -73,7 +73,7 @@ def _set_motion(scene: bpy.types.Scene, found, things: list[bpy.types.Object]) -
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     rate = sensors.SAMPLE_RATE
     # A motion may begin later than 0 s: frame 0 stays time 0.
-    timeline.set_timeline(scene, rate, 0, int(np.ceil(points[-1, 0] * rate - 1e-9)))
+    view.set_timeline(scene, rate, 0, int(np.ceil(points[-1, 0] * rate - 1e-9)))
     frames = points[:, 0] * rate
     per_mm = chosen.tactile.per_metre * 1e-3
     curves.write_curve(chosen, "location", frames, points[:, 1] * per_mm, index=0)

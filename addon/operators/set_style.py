@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..objects import curves, frame_attribute, style_legend, style_nodes, styles
+from ...tactile_core.translation import gel_place
+from ..objects import curves, frame_attribute, motion, style_legend, style_nodes, styles
 from ..settings import properties
 from ..settings.reports import TactileOperator
 from . import view
@@ -88,6 +89,24 @@ def follow(thing: bpy.types.Object, before: float) -> None:
     shown = style_nodes.get_input(modifier, style_nodes.LARGEST) / unit
     by_hand = not math.isclose(shown, _largest_mm(before), rel_tol=1e-4)
     _give(thing, style, shown if by_hand else 0.0, style_nodes.get_input(modifier, style_nodes.EXAGGERATION))
+
+
+def animate(
+    thing: bpy.types.Object, moved: np.ndarray, frames: np.ndarray, how: str, values: dict[str, np.ndarray]
+) -> str:
+    """Let a sensor play displacements (T, n, 3) m at frames (T,), its contact patch, style and properties with them.
+
+    how : see ``motion.animate``; values : see ``curves.write_properties``. Returns a sentence for the user.
+    """
+    surface, before = properties.surface_of(thing), thing.tactile.largest
+    summary = motion.animate(thing, surface.rest, moved, frames, how)
+    if thing.tactile.role == "DIGIT":
+        step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+        patch = gel_place.contact_patch(moved, surface)
+        frame_attribute.add(thing, frame_attribute.PATCH, patch, frames[0], step)
+    follow(thing, before)
+    curves.write_properties(thing, values, frames)
+    return summary
 
 
 def _largest_mm(largest: float) -> float:

@@ -23,10 +23,6 @@ def _outputs(scene: bpy.types.Scene) -> list[str]:
     return ["electrodes"] * (ELECTRODES_OF in there) + [f"displacement_{sensor}" for sensor in there]
 
 
-def _rate(scene: bpy.types.Scene) -> float:
-    return scene.render.fps / scene.render.fps_base
-
-
 class TACTILE_OT_simulate(JobOperator):
     """Press the indenter into the sensors that are there over the frame range, and bake what they feel (Esc stops)"""
 
@@ -54,7 +50,7 @@ class TACTILE_OT_simulate(JobOperator):
         bound = render_settings.budget_of(context.scene).um
         self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene), um=bound,
                         placed_on=properties.sensor_name(scene_bridge.sensor_of(context)),
-                        first_frame=context.scene.frame_start, rate=_rate(context.scene))  # fmt: skip
+                        first_frame=context.scene.frame_start, rate=scene_bridge.rate_of(context.scene))  # fmt: skip
 
     def finish(self, context: bpy.types.Context) -> None:
         """See ``JobOperator``."""
@@ -80,7 +76,7 @@ class TACTILE_OT_simulate(JobOperator):
         shutil.copyfile(self._folder.path / "recording.h5", path)
         skin.tactile.recording, skin.tactile.tare = f"//tactile_simulations/{name}", "auto"
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
-        skin.tactile.samples = SAMPLE_RATE / _rate(context.scene)
+        skin.tactile.samples = SAMPLE_RATE / scene_bridge.rate_of(context.scene)
 
 
 CLASSES = (TACTILE_OT_simulate,)

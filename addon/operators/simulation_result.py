@@ -9,8 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...tactile_core.translation import gel_place
-from ..objects import axes, curves, custom_properties, frame_attribute, motion
+from ..objects import axes, curves
 from ..settings import properties
 from . import pictures, set_style, view
 
@@ -69,13 +68,8 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         moved = result.moved.get(properties.sensor_name(sensor))
         if moved is None:  # it was added while the other process worked
             continue
-        surface, before = properties.surface_of(sensor), sensor.tactile.largest
-        sentences.append(motion.animate(sensor, surface.rest, moved[sample], frames, sensor.tactile.motion))
-        custom_properties.write(sensor, {"force": force}, frames)
-        if sensor.tactile.role == "DIGIT":
-            patch = gel_place.contact_patch(moved[sample], surface)
-            frame_attribute.add(sensor, frame_attribute.PATCH, patch, frames[0], 1.0)
-        set_style.follow(sensor, before)
+        told = {"force": force}
+        sentences.append(set_style.animate(sensor, moved[sample], frames, sensor.tactile.motion, told))
         if sensor == properties.gel_of(scene):
             view.show_picture(context, pictures.update(sensor, context.evaluated_depsgraph_get()))
     if thing.tactile.press_by == "HEIGHT":

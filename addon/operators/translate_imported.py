@@ -5,13 +5,12 @@ import numpy as np
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import gel_place
-from ..objects import custom_properties, digit_body, digit_objects, frame_attribute, motion
+from ..objects import curves, digit_body, digit_objects
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
-from ..settings.reports import require
-from . import pictures, recording_data, set_style, timeline, view
+from ..settings.reports import require, shown
+from . import pictures, recording_data, set_style, view
 from .job_operator import JobOperator
-from .progress import shown
 
 _READ = ("displacement_digit", "contact_center", "force", "flags")  # of a translation, to solve its contacts
 
@@ -65,7 +64,7 @@ class TACTILE_OT_translate(JobOperator):
         if self._job is not None:
             with np.load(self._folder.path / "gel.npz") as stored:
                 self._moved, self._flags = stored["displacement"], self._flags | stored["flags"]
-            self._error = np.full(len(self._moved), custom_properties.UNKNOWN)
+            self._error = np.full(len(self._moved), curves.UNKNOWN)
             from ...tactile_core.jobs.drawer import describe_gel
 
             for words in describe_gel(self._target, self._found.translator.target):
@@ -76,27 +75,16 @@ class TACTILE_OT_translate(JobOperator):
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
         gel, new = _gel_beside(skin, self._target)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
-        summary = self._animate(gel, frames, skin.tactile.motion)
-        if new:
-            set_style.take_over(gel, skin)
-        low = timeline.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
-        view.show(context, [gel, skin])
-        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
-        self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
-
-    def _animate(self, gel: bpy.types.Object, frames: np.ndarray, how: str) -> str:
-        """Animate the gel, its contact patch and the properties of each frame; returns a sentence for the user."""
-        surface, before = properties.surface_of(gel), gel.tactile.largest
-        summary = motion.animate(gel, surface.rest, self._moved, frames, how)
-        step = frames[1] - frames[0] if len(frames) > 1 else 1.0
-        patch = gel_place.contact_patch(self._moved, surface)
-        frame_attribute.add(gel, frame_attribute.PATCH, patch, frames[0], step)
-        set_style.follow(gel, before)
         values = self._found.columns()
         told = {name: values[name] for name in ("force", "confidence")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
-        custom_properties.write(gel, told, frames)
-        return summary
+        summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)
+        if new:
+            set_style.take_over(gel, skin)
+        low = view.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
+        view.show(context, [gel, skin])
+        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
+        self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 
 def _gel_beside(skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:

@@ -1,4 +1,5 @@
-"""The window, set so that what was imported can be seen: 3D views, the sidebar's tab, and a place for the picture."""
+"""The window, set so that what was imported can be seen: 3D views, the sidebar's tab, and a place for the picture;
+and the scene's time."""
 
 from __future__ import annotations
 
@@ -9,6 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from ...tactile_core.translation.trust_words import LOW_CONFIDENCE
 from ..settings import properties
 
 # Of a new file of Blender's (File > New > General): name, type and place.
@@ -21,6 +23,8 @@ _SHARE = 0.68  # of a 3D view that it keeps beside the picture
 DRAWN = 0.2  # s, until a split view is drawn in its new size
 _FIRST = 2.0  # s, until a sidebar is drawn, of a busy machine too
 TAB = "Tactile"
+MARKER = "low confidence"
+MOST_MARKERS = 100  # more would hide the timeline
 _MARGIN = 1.1  # of a view, around what is looked at
 
 
@@ -189,3 +193,22 @@ def colour_by(context: bpy.types.Context, kind: str) -> None:
     for area in context.window.screen.areas if context.window else ():
         if area.type == "VIEW_3D":
             area.spaces.active.shading.color_type = kind
+
+
+def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> None:
+    """Play a recording of ``rate`` Hz in its own time."""
+    scene.render.fps = max(1, round(rate))
+    scene.render.fps_base = scene.render.fps / rate
+    scene.frame_start, scene.frame_end = first, last
+    scene.frame_set(first)
+
+
+def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: np.ndarray) -> int:
+    """Replace the markers, one where a doubtful part begins, its last frame in the name; returns how many parts."""
+    for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
+        scene.timeline_markers.remove(marker)
+    edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))
+    parts = list(zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1, strict=True))
+    for start, end in parts[:MOST_MARKERS]:
+        scene.timeline_markers.new(f"{MARKER} to {frames[end]:g}", frame=int(frames[start]))
+    return len(parts)

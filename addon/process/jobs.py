@@ -18,6 +18,7 @@ from types import TracebackType
 
 from ...tactile_core.errors import TactileError
 
+_LOOK = 0.05  # s between two looks at the worker
 _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
@@ -76,6 +77,11 @@ class Job:
         if self._process.wait() and not self.finished:
             raise TactileError("Tactile worker", self._last_words(), "a finished job", "See the advice in Preferences")
         return True
+
+    def wait(self) -> None:
+        """Wait for its end; raises TactileError when it failed."""
+        while not self.poll(_LOOK):
+            pass
 
     def cancel(self) -> None:
         """End the process; what it has written stays in its folder."""

@@ -19,7 +19,6 @@ from ...tactile_core.sensors import SOURCE
 from .jobs import Job, JobFolder
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
-_LOOK = 0.05  # s between two looks at the worker
 
 
 def read(path: str | os.PathLike, sensor: str = SOURCE) -> Recording:
@@ -52,9 +51,7 @@ def _hdf5_works() -> bool:
 def _read_elsewhere(path: str, sensor: str = SOURCE) -> Recording:
     """Raise TactileError as the reader does."""
     with JobFolder() as folder:
-        job = Job("read", folder, path=path, sensor=sensor)
-        while not job.poll(_LOOK):
-            pass
+        Job("read", folder, path=path, sensor=sensor).wait()
         about = json.loads((folder / "about.json").read_text(encoding="utf-8"))
         with np.load(folder / "arrays.npz", allow_pickle=False) as stored:
             arrays = dict(stored)

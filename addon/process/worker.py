@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -146,15 +145,13 @@ def _at_frame(indenter: str, job: dict, k: int, found: str, expected: str, advic
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
-    """Return the same error in the words of the scene, where it names a moment or a point of its file."""
+    """Return the same error in the words of the scene, where it is of a moment."""
     from tactile_core.simulation.scene import load_scene
 
-    spec, where = load_scene(folder)[0].recording, str(error.where)
-    moment, point = re.search(r"recording, ([\d.]+) s$", where), re.search(r"point (\d+)$", where)
-    if moment is None and point is None:
+    if error.second is None:
         return error
-    second = float(moment[1]) - spec.points[0].time_s if moment else spec.points[int(point[1]) - 1].time_s
-    k = round(second * job["rate"])
+    spec = load_scene(folder)[0].recording
+    k = round((error.second - spec.points[0].time_s) * job["rate"])
     if depths is None or k >= len(depths):
         return _at_frame(spec.indenter, job, k, error.found, error.expected, "Let it press with less force there")
     found = f"{error.found}, {1e3 * depths[k]:.2f} mm below the gel's surface"

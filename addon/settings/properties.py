@@ -14,7 +14,7 @@ from ...tactile_core.sensors import descriptor
 FORMAT = 2  # of these properties; raised when an older file needs to be read differently. 2: friction and tilt
 
 # Blender 4.5 asks for this word before it lets a path begin with "//"; older ones do not know it.
-_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
+RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"} if bpy.app.version >= (4, 5, 0) else set()
 
 ROLES = (
     ("NONE", "None", "Nothing of this add-on"),
@@ -57,12 +57,12 @@ class TactileObject(bpy.types.PropertyGroup):
     format: bpy.props.IntProperty(name="Format", description="Of these properties, to tell older files", default=0)
     per_metre: bpy.props.FloatProperty(name="Units a Metre", description="Blender units a metre", default=1000.0)
     recording: bpy.props.StringProperty(
-        name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=_RELATIVE
+        name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=RELATIVE
     )
     tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
     polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
     sensor: bpy.props.StringProperty(name="Sensor", description="Whose skin or gel it is, as its descriptor is named")
-    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH", options=_RELATIVE)
+    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH", options=RELATIVE)
     frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
     colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -71,3 +71,14 @@ class TactileOperator(bpy.types.Operator):
                 return self.work(context) or {"FINISHED"}
         except Refused:
             return {"CANCELLED"}
+
+
+@contextmanager
+def shown(context: bpy.types.Context) -> Iterator[Callable[[float], None]]:
+    """Show the progress of what runs inside an operator at the mouse pointer; gives what takes the share done, 0..1."""
+    manager = context.window_manager
+    manager.progress_begin(0, 100)
+    try:
+        yield lambda share: manager.progress_update(round(100 * share))
+    finally:
+        manager.progress_end()

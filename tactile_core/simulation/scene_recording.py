@@ -90,7 +90,11 @@ def simulate_recording(
         if (x, z, newtons) not in known:
             at = Placement(x, z, np.radians(spec.tilt_deg))
             where = f"{scene_path}, recording, {t:.2f} s"
-            solved = _solve(where, indenter, at, newtons, spec.friction, used, tiers or {})
+            try:
+                solved = _solve(where, indenter, at, newtons, spec.friction, used, tiers or {})
+            except TactileError as error:
+                error.second = t
+                raise
             known[x, z, newtons] = _frame(solved, keep, electrodes)
         frames.append(known[x, z, newtons])
         if progress:
@@ -141,11 +145,13 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Seque
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3, sensor=gel):
             shape = sensors.shape_of(gel)
             along, across = f"{1e3 * shape.tip_x:g} to {1e3 * shape.base_x:g} mm", f"{1e3 * shape.half_width:g} mm"
-            raise TactileError(
+            error = TactileError(
                 f"{scene_path}, recording.points, point {number}", f"({point.x_mm:g}, {point.z_mm:g}) mm",
                 f"a place on the {sensors.title(gel)}'s gel, x {along}, z within {across}",
                 "Move it or set its force_n to 0",
             )  # fmt: skip
+            error.second = point.time_s
+            raise error
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -67,7 +67,7 @@ def test_flags_are_kept_frame_by_frame(scene, part):
     scene.collection.objects.link(thing)
     values = {"confidence": np.ones(2), "expected_error_um": np.full(2, 370.0), "flags": np.array([0, 4], np.uint16)}
     values["force"] = np.full((2, 3), 0.1)
-    part("addon.objects.custom_properties").write(thing, values, np.array([10.0, 20.0]))
+    part("addon.objects.curves").write_properties(thing, values, np.array([10.0, 20.0]))
     said = {}
     for frame in (10, 19, 20):
         scene.frame_set(frame)
@@ -106,11 +106,11 @@ def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
 
 def test_low_confidence_is_marked_on_the_timeline(scene, part):
     confidence = np.array([1, 0.2, 0.3, 1, 1, 0.1])
-    assert part("addon.operators.timeline").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
+    assert part("addon.operators.view").mark_low_confidence(scene, confidence, np.arange(10, 16)) == 2
     assert [(m.frame, m.name) for m in scene.timeline_markers] == [
         (11, "low confidence to 12"), (15, "low confidence to 15"),
     ]  # fmt: skip
-    part("addon.operators.timeline").mark_low_confidence(scene, np.ones(6), np.arange(6))
+    part("addon.operators.view").mark_low_confidence(scene, np.ones(6), np.arange(6))
     assert not scene.timeline_markers
 
 

@@ -73,12 +73,6 @@ def test_dent_that_moves_sideways_is_seen_there() -> None:
     )  # the interpolation's largest error, 0.06 um
 
 
-def test_zero_displacement_is_exactly_rest() -> None:
-    still = np.zeros((len(sensors.digit_surface().rest), 3), np.float32)
-    np.testing.assert_array_equal(height_map(still), rest_height_map())
-    assert height_map(still).dtype == np.float32
-
-
 def test_rest_is_the_gel_above_its_lowest_point() -> None:
     rest = rest_height_map()
     assert rest.shape == (320, 240)

@@ -38,8 +38,3 @@ def test_the_shipped_table_has_every_preset():
     # The reference's own row is the noise of its paths.
     errors = [presets.measured()["presets"][name]["error"] for name in ("fast", "standard", "quality")]
     assert errors == sorted(errors, reverse=True)
-
-
-def test_an_unknown_preset_is_refused():
-    with pytest.raises(TactileError, match="fast, standard, quality, reference"):
-        presets.preset_named("draft")

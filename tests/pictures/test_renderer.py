@@ -13,7 +13,7 @@ from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR
 from tactile_core.pictures.perspective import Perspective
-from tactile_core.pictures.presets import NAMES, PRESETS, REFERENCE
+from tactile_core.pictures.presets import PRESETS, REFERENCE
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Coating
 
@@ -24,27 +24,6 @@ SHORT = dataclasses.replace(REFERENCE, name="short", passes=2)
 def short(monkeypatch):
     """The reference preset with two passes, so that tests of what holds for any number are quick."""
     monkeypatch.setitem(PRESETS, "reference", SHORT)
-
-
-@pytest.mark.parametrize("preset", NAMES)
-def test_an_undeformed_gel_is_the_background_exactly(preset, variant, small, short):
-    background = np.random.default_rng(0).integers(0, 256, (80, 60, 3), dtype=np.uint8)
-    renderer = Renderer(small, preset, variant, background=background)
-    rest = rest_height_map(small.camera)
-    np.testing.assert_array_equal(renderer.radiance(rest) - renderer.rest_radiance, 0)
-    np.testing.assert_array_equal(renderer(rest), background)
-
-
-def test_a_point_light_over_a_plane_is_lambert(variant, small):
-    unit = with_leds(small, radius=1e-5)
-    camera, flat = unit.camera, np.zeros(small.camera.shape, np.float32)
-    radiance = Renderer(unit, "standard", variant, rest=flat).radiance(flat)
-    right, down = np.meshgrid(camera.right, camera.down)
-    for led in unit.leds:
-        x, y, z = led.position
-        expected = (x**2 + y**2 + z**2) * z / ((x - right) ** 2 + (y - down) ** 2 + z**2) ** 1.5
-        # Rays pass 0.013 pixels, 3 um, off the pixels' middles: 3 um in 8 mm, thrice for the inverse cube.
-        np.testing.assert_allclose(radiance[..., led.channel], unit.facing[led.channel] * expected, rtol=2e-3)
 
 
 @pytest.mark.parametrize("preset", ["fast", "standard"])

@@ -171,7 +171,7 @@ def test_the_commit_hook_checks_with_the_pinned_ruff():
 def test_tools_run_after_one_another_and_the_first_failure_counts(command, dev, pip, venv, monkeypatch):
     ran = []
     monkeypatch.setattr(dev.subprocess, "call", lambda command, **more: ran.append(command[2]) or len(ran) + 4)
-    assert dev.run_tools(venv, command) == 5
+    assert dev.main([command, "--venv", str(venv)]) == 5
     assert ran == [tool[0] for tool in dev.TOOLS[command]]
     assert pip == [((command,), None)]
 

@@ -134,12 +134,6 @@ def test_readings_have_the_stated_errors_and_repeat():
     np.testing.assert_array_equal(read, as_read(change, 3))
 
 
-def test_rank_correlation():
-    values = np.random.default_rng(0).standard_normal(50)
-    assert test_set.rank_correlation(values, np.exp(values)) == pytest.approx(1)
-    assert test_set.rank_correlation(values, -values) == pytest.approx(-1)
-
-
 def test_the_patch_of_a_dent_is_where_it_bends_inward():
     """A Gaussian dent of width w bends inward within sqrt(2) w of its middle: its Laplacian changes sign there."""
     gel = sensors.digit_surface()
