@@ -12,6 +12,7 @@ import pytest
 from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.tables.table import read_table
 
 
 def repaired(recording):
@@ -214,3 +215,20 @@ def test_nan_in_arrays_is_a_flagged_frame(press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=press.electrodes, time=press.time)
     recording = recordings.read(tmp_path / "a.npz")
     assert repaired(recording) == [17] and recording.warnings[0].startswith("frame 17, E4: ")
+
+
+@pytest.mark.parametrize(
+    "cell", ["7", " +2e-3 ", "-0", "1e400", "nan", "1_0", "", "\u0661", "1 2", "#", "7,7", "7,", "7,,"]
+)
+def test_rows_of_clean_numbers_are_read_as_those_beside_a_bad_one(cell, tmp_path):
+    rows = [f"1,2,{cell}"] * 3
+
+    def read(lines):
+        path = tmp_path / "rows.csv"
+        path.write_text("\n".join(["a,b,c", *lines, ""]))
+        with path.open("rb") as file:
+            return read_table(os.fspath(path), file)
+
+    alone, beside = read(rows), read([*rows, "1,x,2"])
+    np.testing.assert_array_equal(alone.values, beside.values[:3])
+    assert alone.problems == beside.problems[:-1]

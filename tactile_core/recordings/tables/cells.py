@@ -76,7 +76,10 @@ class Words:
 
 
 class Cells:
-    """What the columns of a table hold: words : of those of texts, by name; the others hold numbers or times."""
+    """What the columns of a table hold: numbers, times, or texts.
+
+    words : of the columns of texts, by name; plain : true where all columns hold numbers
+    """
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Decide it by the first rows."""
@@ -90,11 +93,11 @@ class Cells:
             elif held and not any(number(cell) is not None for cell in held):
                 self.words[name] = Words()
                 self._readers[place] = self.words[name].number
-        self._plain = all(reader is _plain_number for reader in self._readers)
+        self.plain = all(reader is _plain_number for reader in self._readers)
 
     def values(self, cells: Sequence[str]) -> list[float]:
         """Read a row. Raises ValueError where a number or time cannot be read."""
-        if self._plain:
+        if self.plain:
             return [float(cell) for cell in cells]
         return [reader(cell) for reader, cell in zip(self._readers, cells, strict=True)]
 

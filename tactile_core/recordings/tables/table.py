@@ -14,7 +14,7 @@ from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
 from .cells import LABEL, MISSING, Cells, Words, number, unquoted
-from .table_header import Header, split
+from .table_header import SPACE, Header, split
 from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
@@ -22,6 +22,7 @@ MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
 WHOLE = 8 * 2**20  # bytes of text up to which a file is parsed at once; of a longer one BLOCK at a time
 BLOCK = 2 * 2**20
 OVERLAP = 200  # rows of the block before by which the last cell of a file is judged
+LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
 MAX_BLANK = 8  # blank lines that a message names
 
 
@@ -253,17 +254,34 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
         )
     if len(kept) > MAX_FRAMES:
         raise TactileError(path, f"{len(kept):,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
-    values = np.empty((len(kept), len(header.names)))
     problems: list[Problem] = []
-    cells = header.cells([line for _, line in kept])
-    for frame, (line_number, line) in enumerate(kept):
-        values[frame] = _row(line, header, cells, frame, line_number, problems)
-        _check_problems(path, problems, line_number)
+    rows = [line for _, line in kept]
+    cells = header.cells(rows)
+    values = _clean(rows, header) if cells.plain else None
+    if values is None:
+        values = np.empty((len(kept), len(header.names)))
+        for frame, (line_number, line) in enumerate(kept):
+            values[frame] = _row(line, header, cells, frame, line_number, problems)
+            _check_problems(path, problems, line_number)
     if last and not ended and header.names[-1] not in cells.words:
         doubt_last_cell(kept, header.names, header.separator, values, problems)
-    rows = np.array([line_number for line_number, _ in kept])
-    blank = _tell_blank_lines(first, rows)
-    return Table(path, header.names, values, rows, tuple(problems), blank, start=first, words=cells.words)
+    numbers = np.array([line_number for line_number, _ in kept])
+    blank = _tell_blank_lines(first, numbers)
+    return Table(path, header.names, values, numbers, tuple(problems), blank, start=first, words=cells.words)
+
+
+def _clean(rows: list[str], header: Header) -> np.ndarray | None:
+    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None where a cell is none."""
+    trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
+    if not all(map(str.strip, trimmed)):
+        return None
+    try:
+        delimiter = None if header.separator == SPACE else header.separator
+        values = np.loadtxt(trimmed, delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    whole = values.shape == (len(rows), len(header.names))
+    return values if whole and bool((np.abs(values) < LARGEST).all()) else None  # false for NaN and infinity
 
 
 def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
@@ -317,7 +335,7 @@ def _row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, 
             values = kinds.values(cells)
         except ValueError:
             values = []
-        if values and all(-1e300 < value < 1e300 for value in values):  # false for NaN and infinity
+        if values and all(-LARGEST < value < LARGEST for value in values):  # false for NaN and infinity
             return values
     return _bad_row(cells, header.names, kinds, frame, line_number, problems)
 
@@ -335,7 +353,7 @@ def _bad_row(
     values = []
     for place, (name, cell) in enumerate(zip(names, cells, strict=False)):
         value = kinds.value(place, cell)
-        if value is None or not -1e300 < value < 1e300:
+        if value is None or not -LARGEST < value < LARGEST:
             plain = cell.strip()
             found = f"{shown(plain)} is {_no_number(plain)}" if plain else "an empty cell"
             problems.append(Problem(frame, line_number, name, found))
