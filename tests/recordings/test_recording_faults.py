@@ -221,7 +221,7 @@ def test_nan_in_arrays_is_a_flagged_frame(press, tmp_path):
     "cell", ["7", " +2e-3 ", "-0", "1e400", "nan", "1_0", "", "\u0661", "1 2", "#", "7,7", "7,", "7,,"]
 )
 def test_rows_of_clean_numbers_are_read_as_those_beside_a_bad_one(cell, tmp_path):
-    rows = [f"1,2,{cell}"] * 3
+    rows = ["1,2,3", f"1,2,{cell}", "4,5,6"]  # the first makes it a column of numbers
 
     def read(lines):
         path = tmp_path / "rows.csv"
