@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
+from ...tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
 from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
 from . import axes, digit_body, digit_materials, image_frame, surfaces

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.pictures.background import by_led, open_radiance, resting_picture
-from ...tactile_core.pictures.direct_light import lookup
+from ...tactile_core.pictures.perspective import lookup
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import COLOURS
 from ...tactile_core.sensors.unrolling import node_normals

@@ -8,7 +8,8 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.pictures import height_map, shading
+from ...tactile_core.pictures import height_map
+from ...tactile_core.pictures.renderer import Renderer
 from ...tactile_core.sensors.calibration import Calibration
 from ..objects import digit_objects, digit_unit, images
 from ..process import tracer_process
@@ -16,16 +17,16 @@ from ..settings import properties, render_settings, reports
 from . import stale_picture
 
 FAST = "fast"
-_shaders: dict[str, shading.Shader] = {}  # one at most: the frames of an animation share it
+_renderers: dict[str, Renderer] = {}  # one at most: the frames of an animation share it
 
 
-def shader_of(unit: Calibration) -> shading.Shader:
-    """Return the fast shader of a unit."""
+def renderer_of(unit: Calibration) -> Renderer:
+    """Return the fast renderer of a unit."""
     key = repr(unit)  # a calibration holds tables, which have no hash
-    if key not in _shaders:
-        _shaders.clear()
-        _shaders[key] = shading.Shader(unit)
-    return _shaders[key]
+    if key not in _renderers:
+        _renderers.clear()
+        _renderers[key] = Renderer(unit, FAST)
+    return _renderers[key]
 
 
 def draw(
@@ -46,10 +47,10 @@ def draw(
     shown = digit_unit.shown_unit(gel, depsgraph, unit)
     heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
     if preset == FAST:
-        return shader_of(shown.unit)(heights), heights
+        return renderer_of(shown.unit)(heights), heights
     reports.require("mitsuba")
     if not bpy.app.background:
-        better(shader_of(shown.unit)(heights))
+        better(renderer_of(shown.unit)(heights))
     return tracer_process.draw(preset, shown.unit, shown.around, heights, stopped, better), heights
 
 

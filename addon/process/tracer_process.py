@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.pictures.mitsuba.surroundings import Surroundings
+from ...tactile_core.pictures.mitsuba.gel_scene import Surroundings
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from .jobs import Job, JobFolder

@@ -213,7 +213,7 @@ def render(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def _renderer(folder: Path, preset: str) -> Any:
-    from tactile_core.pictures.mitsuba.surroundings import Lamp, Occluder, Surroundings
+    from tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
     from tactile_core.pictures.renderer import Renderer
     from tactile_core.sensors.calibration_file import load_calibration
 

@@ -88,10 +88,10 @@ def load_drawer(
     """Load camera and lights of a gel: the unit's that ships, or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones; solves : whether contacts are solved
-    The fast shader is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
+    The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
     Raises TactileError for a bad calibration, and what ``renderer.Renderer`` raises.
     """
-    from ..pictures import background, height_map, shading
+    from ..pictures import background, height_map, renderer
     from ..sensors.calibration_file import load_calibration
 
     unit = load_calibration(calibration, target)
@@ -99,11 +99,9 @@ def load_drawer(
     if preset == "fast" and unit.markers is None:
         if unit.photograph:
             background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
-        shade = _made_at_first_call(functools.partial(shading.Shader, unit))
+        shade = _made_at_first_call(functools.partial(renderer.Renderer, unit, preset))
     else:
-        from ..pictures.renderer import Renderer
-
-        shade = Renderer(unit, preset, variant)
+        shade = renderer.Renderer(unit, preset, variant)
         dots = shade.dots
     solve: Solver | None = None
     if solves:

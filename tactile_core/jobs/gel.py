@@ -66,7 +66,7 @@ class Gel:
     """
 
     def __init__(
-        self, sensor: str = "digit", indenter: Any = None, *,
+        self, sensor: str = sensors.TARGET, indenter: Any = None, *,
         friction: float = FRICTION, calibration: Calibration | None = None, preset: str = FAST,
     ) -> None:  # fmt: skip
         if preset not in NAMES:

@@ -11,6 +11,7 @@ from ..errors import TactileError
 from ..geometry.indenters import Box, Cylinder, Indenter, LyingCylinder, MeshIndenter, Sphere
 from ..mechanics.placement import FRICTION
 from ..pictures.presets import FAST
+from ..sensors import TARGET
 from .gel import Gel
 from .gel_contact import GelContact
 
@@ -40,7 +41,7 @@ class MujocoGel:
         model: mujoco.MjModel,
         geom: str,
         site: str,
-        sensor: str = "digit",
+        sensor: str = TARGET,
         *,
         friction: float = FRICTION,
         preset: str = FAST,

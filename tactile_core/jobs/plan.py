@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..files.shipped import shipped
-from ..sensors import PAIR, TARGET, title
+from ..sensors import PAIR, SOURCE, TARGET, title
 
 if TYPE_CHECKING:
     from ..simulation.tier_choice import TierChoice
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 COSTS, TIERS = shipped("costs.json"), shipped("mechanics_tiers.json")
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
 # ``compliance.build`` asks for, and the size of the files.
-BUILD_S, BUILD_MB, MATRICES_MB = {"biotac": 42.0, "digit": 18.0}, 2200.0, {"biotac": 342.0, "digit": 151.0}
+BUILD_S, BUILD_MB, MATRICES_MB = {SOURCE: 42.0, TARGET: 18.0}, 2200.0, {SOURCE: 342.0, TARGET: 151.0}
 TRACTION_MS, TRACTION_KB = 1.5, 0.7  # a frame of the shipped recording, measured on one core
 # Of memory more than the fast tier's, peak of the process (measured: scenes/press on the DIGIT, 147 contacts).
 TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}

@@ -28,7 +28,7 @@ from ..pictures.mitsuba.variant import fitting
 from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
-from ..sensors.calibration_file import SHIPPED, load_calibration
+from ..sensors.calibration_file import calibration_path, load_calibration
 from . import results, sampling_error
 from .gel_frames import is_scene, read_frames
 from .results import frames_text, select
@@ -262,7 +262,7 @@ def note_of(
 ) -> dict[str, Any]:
     """Return the origin of a result, fit for JSON: only what the same input reproduces."""
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
-    unit, calibration = renderer.calibration.unit, Path(options.calibration or SHIPPED)
+    unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))
     about = PRESETS[preset] if preset != FAST else None
     return {
         "format": results.FORMAT,

@@ -16,8 +16,8 @@ from ..errors import TactileError
 from ..files import outside
 from ..sensors.calibration import AMBIENT_DEGREE, AMBIENT_TERMS, AMBIENT_UNIT, PHOTOGRAPHED_DEGREE, Calibration
 from ..sensors.camera import Camera
-from .direct_light import Hits, direct_light
 from .height_map import of_unit, rest_height_map
+from .light import Surface, open_light
 from .perspective import slopes
 
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)
@@ -56,10 +56,9 @@ def _open_light(unit: Calibration) -> np.ndarray:
 def open_radiance(unit: Calibration) -> np.ndarray:
     """Radiance (H, W, 3) of the untouched gel where nothing is in the LEDs' way, as nothing is on a smooth dome."""
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
-    right, down = np.meshgrid(unit.camera.right, unit.camera.down)
-    hits = Hits.from_slopes(np.stack([right, down, height], -1).astype(np.float32), *slopes(height, unit.camera))
-    direct = direct_light(hits, None, [np.array([led.position]) for led in unit.leds], unit)
-    return direct + np.moveaxis(raised_light(unit, height), 0, -1)
+    right, down = unit.camera.right.astype(np.float32)[None, :], unit.camera.down.astype(np.float32)[:, None]
+    surface = Surface(right, down, height, *slopes(height, unit.camera))
+    return np.moveaxis(open_light(surface, unit) + raised_light(unit, height), 0, -1)
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from ..geometry.lattice import Lattice
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import Camera
-from .height_loops import heights_above, look_up
+from .height_loops import heights_above
 
 _log = logging.getLogger(__name__)
 _folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("folded", default=None)
@@ -180,8 +180,6 @@ class HeightMapper:
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
-        if available():
-            return look_up(coefficients, row, t, column, s)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
         patches = np.ascontiguousarray(windows, np.float32).reshape(-1, len(coefficients), 16)

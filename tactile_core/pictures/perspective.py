@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import TactileError
@@ -71,13 +73,9 @@ class Perspective:
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
         """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W), and its least."""
         slope_right, slope_down = slopes(height, self.camera)
-        right, down = self.right * self.inverse, self.down * self.inverse
-        if available():
-            weigh_slopes(slope_right, slope_down, right[0], down[:, 0])
-        else:
-            slope_right *= right
-            slope_down *= down
-            slope_right += slope_down
+        slope_right *= self.right * self.inverse
+        slope_down *= self.down * self.inverse
+        slope_right += slope_down
         return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -157,6 +155,19 @@ def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
     return upper
 
 
+def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function that looks up maps (H, W) of the gel at places on it, m, image frame."""
+    step_right, step_down = camera.pixel_size
+    row = down * np.float32(1 / step_down) + np.float32(camera.height / 2 - 0.5)
+    return lookup(row, right * np.float32(1 / step_right) + np.float32(camera.width / 2 - 0.5), camera.shape)
+
+
+def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function that looks up maps of a shape at fractional places, bilinear; beyond an edge, the edge."""
+    row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
+    return lambda values: bilinear(values, row, column)
+
+
 def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Values at indices start, and a share of the way to the next one."""
     left = flat.take(start)
@@ -187,14 +198,6 @@ def slope_maps(height, over_right, over_down):  # noqa: ANN001, ANN201
         down[0, b] = (four * height[1, b] - three * height[0, b] - height[2, b]) * over_down
         down[last, b] = (three * height[last, b] - four * height[last - 1, b] + height[last - 2, b]) * over_down
     return right, down
-
-
-@Loop
-def weigh_slopes(slope_right, slope_down, right, down):  # noqa: ANN001, ANN201
-    """See ``Perspective._steepness``, into ``slope_right``; right (W,), down (H,) over the camera's height."""
-    for a in range(slope_right.shape[0]):
-        for b in range(slope_right.shape[1]):
-            slope_right[a, b] = slope_right[a, b] * right[b] + slope_down[a, b] * down[a]
 
 
 @Loop

@@ -56,7 +56,7 @@ class Preset:
     window: bool = False
 
 
-FAST = "fast"  # shading.Shader: numpy alone
+FAST = "fast"  # light.Lamps: numpy alone
 STANDARD = Preset(
     "standard",
     "4 points an LED, one coarse bounce",

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
 
 import numpy as np
 
 from ..errors import TactileError
-from ..files.compiled import available
+from ..files.compiled import Loop, available
 from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
@@ -16,25 +15,18 @@ from ..sensors.camera import COLOURS
 from .background import correction, raised_light, resting_picture
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
+from .light import Lamps
 from .marker_field import MarkerField
 from .mitsuba.gel_light import GelLight
+from .mitsuba.gel_scene import NOTHING, Surroundings
 from .mitsuba.matte_light import MatteLight
-from .mitsuba.surroundings import NOTHING, Surroundings
 from .mitsuba.variant import LLVM, choose_variant
 from .perspective import Perspective
 from .presets import DEFAULT, FAST, preset_named
-from .shading import Shader, camera_array, check_reach, in_picture
 
 # px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means
 # over squares of 4 px by 0.75, 0.5, 0.25, 0.
 GRAIN = 4
-
-
-class Light(Protocol):
-    """Gives radiance (H, W, 3) of height maps (H, W) m."""
-
-    def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) of heights (H, W) m."""
 
 
 class Renderer:
@@ -70,16 +62,15 @@ class Renderer:
         self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
-        own = rest_height_map(self.camera) if rest is None else rest
-        resting = self._heights(own, "rest height map")
-        # The fast one spreads its own.
-        self._spread = CoatingSpread(self.camera, 0.0 if preset == FAST else calibration.coating.spread)
+        self._resting = rest_height_map(self.camera) if rest is None else np.asarray(rest)
+        resting = self._heights(self._resting, "rest height map")
+        self._view = Perspective(self.camera, resting)
+        self._spread = CoatingSpread(self.camera, calibration.coating.spread)
+        self.variant: str | None = None
+        self._light: GelLight | MatteLight | None = None
         if preset == FAST:
-            self.variant = None
-            self._light: Light = Shader(calibration, rest=resting)  # has the light that grows with height itself
-            self._view = None
+            self._lamps = Lamps(self.camera, calibration.leds)
         else:
-            self._view = Perspective(self.camera, resting) if any(calibration.ambient_rise) else None
             chosen = preset_named(preset)
             with needing("render"):
                 self.variant = choose_variant(variant).name
@@ -95,6 +86,7 @@ class Renderer:
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
+        self._rest_picture = None if self.dots else self.picture(self.rest_radiance)
 
     def __repr__(self) -> str:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
@@ -104,6 +96,8 @@ class Renderer:
 
         marks : (H, W) share of light that dots leave, of ``dots.marks``; of a unit with dots they must be given
         """
+        if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
+            return self._rest_picture.copy()
         return self.picture(self.radiance(height_map), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
@@ -112,9 +106,12 @@ class Renderer:
         The preset ``reference`` by LLVM has some, the others the last alone.
         """
         heights = self._heights(height_map, "height map")
-        light = self._light
-        for found in light.refined(heights) if isinstance(light, GelLight) else [light.radiance(heights)]:
-            yield self.picture(self._completed(found, heights))
+        if not isinstance(self._light, GelLight):
+            yield self.picture(self._spread_radiance(heights))
+            return
+        seen = self._view(heights)
+        for found in self._light.refined(heights):
+            yield self.picture(self._completed(np.moveaxis(found, -1, 0), seen))
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
@@ -138,14 +135,16 @@ class Renderer:
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
-        return self._completed(self._light.radiance(heights), heights)
+        seen = self._view(heights)
+        if self._light is not None:
+            return self._completed(np.moveaxis(self._light.radiance(heights), -1, 0), seen)
+        light = self._lamps.light(self._view, seen)
+        light *= self.calibration.facing.astype(np.float32)[:, None, None]
+        return self._completed(light, seen)
 
-    def _completed(self, radiance: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """The lights' radiance (H, W, 3) with the ambient light of raised gel, spread by the coating."""
-        found = np.moveaxis(radiance, -1, 0)
-        if self._view is not None:
-            found = found + raised_light(self.calibration, self._view(heights))
-        return np.moveaxis(self._spread(found), 0, -1)
+    def _completed(self, light: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3)."""
+        return np.moveaxis(self._spread(light + raised_light(self.calibration, seen)), 0, -1)
 
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
@@ -162,7 +161,10 @@ class Renderer:
             )
         if noise is None and marks is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
             now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
-            return in_picture(now, at_rest, self._response, self.background, np.float32(LARGEST_LEVEL))
+            picture, rows = np.empty(self.background.shape, np.uint8), (len(self.background), -1)
+            background, drawn = self.background.reshape(rows), picture.reshape(rows)
+            _fill_levels(now, at_rest, self._response, background, np.float32(LARGEST_LEVEL), drawn)
+            return picture
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
         if marks is not None:
@@ -200,3 +202,48 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
     across = total[:, width:] - total[:, :-width]
     grain = (across[width:] - across[:-width]) / width
     return (grain * np.asarray(unit.noise)).astype(np.float32)
+
+
+def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
+    """Convert values to float32; raises TactileError, by their name, for another shape or what is not finite."""
+    values = np.asarray(values)
+    if values.shape != shape:
+        raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
+    if not np.isfinite(values).all():
+        raise TactileError(name, "values that are not finite", "finite numbers", "Repair the frame first")
+    return values.astype(np.float32)
+
+
+def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
+    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera, or as far the other way."""
+    lowest = min(unit.leds, key=lambda led: led.position[2])
+    limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
+    for what, limit in limits.items():
+        if float(height.max()) >= limit:
+            found = f"{height.max() * 1e3:.2f} mm high, {what} {limit * 1e3:.2f} mm"
+            raise TactileError(name, found, "a gel below LEDs and camera", "Check that heights are in metres")
+    if float(height.min()) <= -unit.camera.apparent_height:
+        found, expected = f"{height.min() * 1e3:.2f} mm high", f"above {-1e3 * unit.camera.apparent_height:.2f} mm"
+        raise TactileError(name, found, expected, "Check that heights are in metres")
+
+
+@Loop
+def _fill_levels(radiance, rest, response, background, largest, picture):  # noqa: ANN001, ANN202
+    """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W)."""
+    leds, height, width = radiance.shape
+    lowest, line = np.float32(0), np.empty(3 * width, np.float32)
+    change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)
+    for row in range(height):  # a row stays in the processor's cache
+        for led in range(leds):
+            for column in range(width):
+                change[led, column] = radiance[led, row, column] - rest[led, row, column]
+        for channel in range(3):
+            level[:] = lowest
+            for led in range(leds):
+                for column in range(width):
+                    level[column] += response[channel, led, row, column] * change[led, column]
+            for column in range(width):
+                line[3 * column + channel] = level[column]
+        for k in range(3 * width):
+            value = np.rint(line[k] + background[row, k])
+            picture[row, k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..files.short_text import Summary
-from ..sensors import SAMPLE_RATE, SOURCE
+from ..sensors import SAMPLE_RATE, SOURCE, TARGET
 
 BLOCK = 2**12  # frames that are worked on at a time, which bounds the memory of a long recording
 LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its inverse no number
@@ -49,13 +49,13 @@ class Truth(Summary):
     @property
     def displacements(self) -> dict[str, np.ndarray]:
         """Displacements that the file was made with, by sensor."""
-        held = {"biotac": self.displacement_biotac, "digit": self.displacement_digit, **self.displacement}
+        held = {SOURCE: self.displacement_biotac, TARGET: self.displacement_digit, **self.displacement}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
     @property
     def tractions(self) -> dict[str, np.ndarray]:
         """Tractions that the file was made with, by sensor."""
-        held = {"biotac": self.traction_biotac, "digit": self.traction_digit, **self.traction}
+        held = {SOURCE: self.traction_biotac, TARGET: self.traction_digit, **self.traction}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
 

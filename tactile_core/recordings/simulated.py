@@ -23,7 +23,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic
-from ..sensors import COUNT_MAX, ELECTRODES
+from ..sensors import COUNT_MAX, ELECTRODES, SOURCE, TARGET
 from ..sensors.fluid_sensor import FALLS, RISES
 from .array_store import Store, open_hdf5
 from .assemble import assemble
@@ -164,12 +164,12 @@ def _truth(store: Store, frames: int) -> Truth:
         for kind, read in ((_MOVED, _displacement), (_PRESSED, _traction))
     )  # fmt: skip
     return Truth(
-        moved.pop("biotac", None),
-        moved.pop("digit", None),
+        moved.pop(SOURCE, None),
+        moved.pop(TARGET, None),
         store.array("truth/force", (frames, 3)),
         store.optional("truth/contact_center", (frames, 2)),
-        pressed.pop("biotac", None),
-        pressed.pop("digit", None),
+        pressed.pop(SOURCE, None),
+        pressed.pop(TARGET, None),
         moved,
         pressed,
     )

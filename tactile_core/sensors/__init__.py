@@ -12,35 +12,34 @@ import functools
 import numpy as np
 
 from ..geometry.lattice import Lattice
-from . import biotac, digit
 from .descriptor import describe, of_kind
-from .descriptor_fields import Material
-from .electrodes import Places, contact_pressures_of, contacts_of, places_of, typical_rest
+from .electrodes import contact_pressures_of, contacts_of, places_of, typical_rest
 from .fluid_sensor import FALLS, Fluid
 from .gel_sensor import Gel
 from .gel_shape import shape_of
 from .skin_shape import skin_of
+from .toml_fields import Material
 from .unrolling import node_normals, roll_up
 
 __all__ = [
-    "BIOTAC_SKIN", "COUNT_MAX", "COUNT_SIGN", "DIGIT_GEL", "ELECTRODES", "PAIR", "PRESSURE_PER_COUNT", "REST_COUNTS",
-    "SAMPLE_RATE", "SOURCE", "TARGET", "Lattice", "Material", "biotac_surface", "contact_pressures_of", "contacts_of",
-    "describe", "digit_surface", "electrode_count", "electrodes", "excitation_electrodes", "from_maker",
-    "from_syntouch", "is_gel", "places_of", "rest_normals", "sensor_surface", "shape_of", "skin_of", "surface_point",
-    "thickness", "thickness_at", "title", "typical_rest",
+    "COUNT_MAX", "COUNT_SIGN", "ELECTRODES", "PAIR", "PRESSURE_PER_COUNT", "REST_COUNTS", "SAMPLE_RATE", "SOURCE",
+    "SP", "TARGET", "Lattice", "Material", "biotac_surface", "contact_pressures_of", "contacts_of", "describe",
+    "digit_surface", "electrode_count", "electrodes", "excitation_electrodes", "from_maker", "is_gel", "places_of",
+    "rest_normals", "sensor_surface", "shape_of", "skin_of", "surface_point", "thickness", "thickness_at", "title",
+    "typical_rest",
 ]  # fmt: skip
 
+SP = "biotac_sp"  # which some formats of recordings are of
 PAIR = SOURCE, TARGET = "biotac", "digit"  # of the weights that ship, and where no other sensors are named
-BIOTAC_SKIN, DIGIT_GEL = biotac.DESCRIPTOR.material, digit.DESCRIPTOR.material
 
-_PLACES: Places = places_of("biotac")
-_READOUT = biotac.DESCRIPTOR.readout
-ELECTRODES = biotac.DESCRIPTOR.electrodes.count
+_BIOTAC = of_kind(SOURCE, Fluid)
+_READOUT = _BIOTAC.readout
+ELECTRODES = _BIOTAC.electrodes.count
 SAMPLE_RATE = _READOUT.rate  # Hz, one frame of all electrodes
 COUNT_MAX = 2**_READOUT.bits - 1
 # Counts of a typical unit without contact: mean impedance of two real units, made even across the finger
 # (docs/sources.md, BioTac read-out). E1 and E11, whose film is thinnest, respond 1.8 times as strongly as E2 to E5.
-REST_COUNTS = _PLACES.rest_counts
+REST_COUNTS = places_of(SOURCE).rest_counts
 COUNT_SIGN = -1.0 if _READOUT.polarity == FALLS else 1.0  # of a change where the film over an electrode thins
 PRESSURE_PER_COUNT = _READOUT.pressure  # Pa a count of PDC
 
@@ -62,31 +61,24 @@ def electrodes(sensor: str = "biotac") -> np.ndarray:
 
 def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
     """Positions (4, 3) m of the excitation electrodes X1..X4; the BioTac's are from a drawing (docs/sources.md)."""
-    frame = skin_of(sensor).descriptor.frame
-    x, y, z = places_of(sensor).excitation.T
-    return 1e-3 * np.column_stack([-x - 1e3 * frame.shift_x, z + 1e3 * frame.shift_y, frame.lateral_sign * y])
-
-
-def from_syntouch(points: np.ndarray) -> np.ndarray:
-    """Transform points (n, 3) m of SynTouch's frame of the BioTac to the shared one (docs/sources.md, Frame)."""
-    return from_maker(points, "biotac")
+    return from_maker(1e-3 * places_of(sensor).excitation, sensor)
 
 
 def from_maker(points: np.ndarray, sensor: str) -> np.ndarray:
-    """Transform points (n, 3) m of the frame of a fluid sensor's maker to the shared one."""
+    """Transform points (n, 3) m of the frame of a fluid sensor's maker to the shared one (docs/sources.md, Frame)."""
     frame = skin_of(sensor).descriptor.frame
     x, y, z = np.asarray(points).T
     return np.column_stack([-x - frame.shift_x, z + frame.shift_y, frame.lateral_sign * y])
 
 
 def biotac_surface() -> Lattice:
-    """The BioTac's outer skin at rest, 3,650 nodes; see ``biotac.skin_surface``."""
-    return biotac.skin_surface("outer")
+    """The BioTac's outer skin at rest, 3,650 nodes; see ``SkinShape.skin_surface``."""
+    return skin_of(SOURCE).skin_surface("outer")
 
 
 def digit_surface() -> Lattice:
-    """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``digit.gel_surface``."""
-    return digit.gel_surface()
+    """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``GelShape.surface``."""
+    return shape_of(TARGET).surface()
 
 
 def sensor_surface(sensor: str) -> Lattice:

@@ -2,7 +2,7 @@
 
 A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance of each
 LED's light that the coating reflects. Each LED's light is a spectral band of its own; radiance in it is measured in
-grey levels of that colour's channel in the picture's middle. The fast renderer (``shading``) and Mitsuba use the same
+grey levels of that colour's channel in the picture's middle. The fast picture and Mitsuba use the same
 parameters.
 """
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import TactileError
 from .camera import COLOURS, Camera, Led
+from .toml_fields import number
 
 MOST_DOTS = 10_000  # of a grid (assumed enough: 7 x 9 to 20 x 25 are printed)
 MOST_LENGTH = 20e-3  # m of pitch or diameter: the gel itself is 18 x 25 mm
@@ -30,11 +31,11 @@ class Markers:
     albedo : share of the coating's light that a dot throws back, 0 black to 1 unseen
     """
 
-    rows: int
-    columns: int
-    pitch: float
-    diameter: float
-    albedo: float
+    rows: int = number()
+    columns: int = number()
+    pitch: float = number("mm")
+    diameter: float = number("mm")
+    albedo: float = number()
 
     def __post_init__(self) -> None:
         for name in ("rows", "columns"):
@@ -73,11 +74,11 @@ class Coating:
     """
 
     bsdf: str = DIFFUSE
-    albedo: tuple[float, float, float] = (0.5, 0.5, 0.5)
-    roughness: float = 0.3
-    gloss: float = 0.5
-    metallic: float = 0.0
-    spread: float = 0.0
+    albedo: tuple[float, float, float] = number(default=(0.5, 0.5, 0.5))
+    roughness: float = number(default=0.3)
+    gloss: float = number(default=0.5)
+    metallic: float = number(default=0.0)
+    spread: float = number("mm", default=0.0, may_miss=True)  # earlier versions' files have none
 
     def __post_init__(self) -> None:
         if self.bsdf not in MATERIALS:
@@ -117,9 +118,9 @@ class Response:
     along_right, along_down : (3, 3) levels a level and metre of the plane of height zero
     """
 
-    centre: tuple[tuple[float, ...], ...]
-    along_right: tuple[tuple[float, ...], ...]
-    along_down: tuple[tuple[float, ...], ...]
+    centre: tuple[tuple[float, ...], ...] = number(length=3)
+    along_right: tuple[tuple[float, ...], ...] = number("per_mm", length=3)
+    along_down: tuple[tuple[float, ...], ...] = number("per_mm", length=3)
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -156,10 +157,10 @@ class Fit:
 
     note: str
     photographs: tuple[str, ...]
-    ball_diameter: float
-    errors: Mapping[str, float]
-    standard_errors: Mapping[str, float]
     not_identified: tuple[str, ...]
+    ball_diameter: float = number("mm")
+    errors: Mapping[str, float] = number(above=-math.inf, below=math.inf)
+    standard_errors: Mapping[str, float] = number(above=-math.inf, below=math.inf)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -206,10 +207,11 @@ class Calibration:
                 raise TactileError(f"leds, {led.colour}", found, "a sphere above the gel, whose height is 0")
         _check_range("gel, dome_scale", self.dome_scale, 0.0, 5.0)
         _check_range("gel, index", self.gel_index, 1.0, MOST_INDEX)
-        table = np.asarray(self.ambient, float)
-        if table.shape not in ((3, AMBIENT_TERMS), (3, PHOTOGRAPHED_TERMS)) or not np.isfinite(table).all():
+        lengths = [len(row) for row in self.ambient]
+        even = lengths in ([AMBIENT_TERMS] * 3, [PHOTOGRAPHED_TERMS] * 3)
+        if not even or not np.isfinite(self.ambient).all():
             expected = f"3 rows of {AMBIENT_TERMS} or {PHOTOGRAPHED_TERMS} finite numbers"
-            raise TactileError("ambient", f"shape {table.shape}", expected)
+            raise TactileError("ambient", f"rows of {lengths} numbers", expected)
         for share in self.ambient_rise:
             _check_range("ambient, rise_per_mm", 1e-3 * share, -MOST_RISE, MOST_RISE)
         if self.markers is not None and self.photograph:

@@ -17,6 +17,7 @@ from ..geometry.lattice import Lattice
 from .descriptor import of_kind
 from .gel_sensor import Gel
 from .gel_shape import shape_of
+from .toml_fields import IN_PYTHON, number
 
 HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y  # of a DIGIT's cameras
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
@@ -39,16 +40,16 @@ class Camera:
     sensor : whose gel it looks at
     """
 
-    width: int
-    height: int
-    px_per_mm_x: float
-    px_per_mm_y: float
-    centre_x: float
-    centre_z: float
-    apparent_height: float
-    right_z: int
-    down_x: int
-    sensor: str = "digit"
+    width: int = number("px")
+    height: int = number("px")
+    px_per_mm_x: float = number()
+    px_per_mm_y: float = number()
+    centre_x: float = number("mm")
+    centre_z: float = number("mm")
+    apparent_height: float = number("mm")
+    right_z: int = number()
+    down_x: int = number()
+    sensor: str = dataclasses.field(default="digit", metadata=IN_PYTHON)
 
     def __post_init__(self) -> None:
         for name in ("width", "height"):
@@ -155,10 +156,10 @@ class Led:
     radiance : radiance of its surface, grey levels of its own channel in the picture's middle; 0 is off
     """
 
-    colour: str
-    position: tuple[float, float, float]
-    radius: float
-    radiance: float
+    colour: str = dataclasses.field(metadata=IN_PYTHON)
+    position: tuple[float, float, float] = number("mm")
+    radius: float = number("mm")
+    radiance: float = number()
 
     def __post_init__(self) -> None:
         if self.colour not in COLOURS:

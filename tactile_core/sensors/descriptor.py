@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
-import tomllib
-import typing
-from decimal import Decimal
 from pathlib import Path
 from typing import Any, TypeVar
 
 from ..errors import TactileError
-from ..files.outside import read_toml_text
-from .descriptor_fields import check_names, read_table, read_value, required
 from .fluid_sensor import Fluid
 from .gel_sensor import Gel
+from .toml_fields import read_table, read_toml
 
 FOLDER = Path(__file__).parent
 OWN = "TACTILE_SENSORS"  # environment variable: a folder with the user's own sensors
@@ -77,17 +72,7 @@ def read(folder: Path) -> Fluid | Gel:
 
     Raises TactileError naming file and field for one that is missing, unknown, in another unit or out of its range.
     """
-    file = folder / FILE
-    try:
-        content = tomllib.loads(read_toml_text(file), parse_float=Decimal)
-    except OSError as error:
-        raise TactileError(file, f"cannot be read ({error.strerror})", "a sensor's descriptor") from error
-    except (ValueError, RecursionError) as error:
-        raise TactileError(file, str(error), "a sensor's descriptor") from error
-    try:
-        return _sensor(content, folder)
-    except TactileError as error:
-        raise TactileError(f"{file}, {error.where}", error.found, error.expected, error.advice) from error
+    return read_toml(folder / FILE, lambda content: _sensor(content, folder), "a sensor's descriptor")
 
 
 def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
@@ -96,14 +81,5 @@ def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
     kind = content.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise TactileError("kind", repr(kind), " or ".join(KINDS))
-    form = KINDS[kind]
-    types = {name: required(hint) for name, hint in typing.get_type_hints(form).items()}
-    fields = [field for field in dataclasses.fields(form) if field.name != "folder"]
-    parts = [field.name for field in fields if field.name in content or field.default is dataclasses.MISSING]
-    check_names("top level", content, ("format", "kind", *parts))
-    found = {
-        name: read_table(types[name], content[name], name) if dataclasses.is_dataclass(types[name])
-        else read_value(types[name], content[name], name, {})
-        for name in parts
-    }  # fmt: skip
-    return form(folder=folder, **found)
+    tables = {key: table for key, table in content.items() if key not in ("format", "kind")}
+    return read_table(KINDS[kind], tables, folder=folder)

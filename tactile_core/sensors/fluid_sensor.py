@@ -7,7 +7,7 @@ import itertools
 from pathlib import Path
 
 from ..errors import TactileError
-from .descriptor_fields import LARGEST_MM, LEAST_MM, MOST_NODES, Material, file_beside, number, one_of
+from .toml_fields import IN_PYTHON, LARGEST_MM, LEAST_MM, MOST_NODES, Material, file_beside, number, one_of
 
 MOST_ELECTRODES = 1000  # of a finger (assumed)
 FALLS, RISES = POLARITIES = ("falls", "rises")
@@ -143,7 +143,6 @@ class Unrolling:
 class Fluid:
     """A finger of skin, fluid and core with electrodes, as the BioTac. title : its name in words"""
 
-    folder: Path
     title: str
     sources: tuple[str, ...]
     frame: Frame
@@ -155,3 +154,4 @@ class Fluid:
     electrodes: Electrodes
     readout: Readout
     unrolling: Unrolling
+    folder: Path = dataclasses.field(metadata=IN_PYTHON)

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from ..errors import TactileError
-from .descriptor_fields import LARGEST_MM, LEAST_MM, MOST_NODES, Material, file_beside, number, one_of
+from .toml_fields import IN_PYTHON, LARGEST_MM, LEAST_MM, MAY_MISS, MOST_NODES, Material, file_beside, number, one_of
 
 ROUND, SQUARE = TIPS = ("round", "square")
 ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex than the body says (assumed)
@@ -75,8 +75,8 @@ class GelLattice:
 
 
 @dataclasses.dataclass(frozen=True)
-class Camera:
-    """View of the camera. height_zero_y : m, of the plane whose height is zero in pictures
+class CameraMount:
+    """Place of the camera. height_zero_y : m, of the plane whose height is zero in pictures
 
     calibration : of a unit's camera and lights, see ``calibration_file``; empty where there is none
     """
@@ -89,15 +89,15 @@ class Camera:
 class Gel:
     """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat"""
 
-    folder: Path
     title: str
     sources: tuple[str, ...]
     outline: Outline
     body: Body
     lattice: GelLattice
     material: Material
-    camera: Camera
-    dome: Dome | None = None
+    camera: CameraMount
+    folder: Path = dataclasses.field(metadata=IN_PYTHON)
+    dome: Dome | None = dataclasses.field(default=None, metadata=MAY_MISS)
 
     def __post_init__(self) -> None:
         """Raise TactileError for a window that does not lie inside the outline, whose mesh would fold."""

@@ -21,6 +21,7 @@ from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at
 from ..mechanics.solution import Solution, Step
 from ..mechanics.solve import solve, solve_path
+from ..sensors import SOURCE, TARGET
 from .pair_sampling import draw_place, pair_row, paired
 from .scene import Scene
 
@@ -66,7 +67,7 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
     drawn = random.uniform(_SHALLOWEST, _DEEPEST)
     heading, length = random.uniform(0, 2 * np.pi), random.uniform(0, _SLIDE_MOST)
     slide = length * np.array([np.cos(heading), np.sin(heading)]) if number % 12 in _SLIDING else None
-    thick = depth_at(DEPTH_LIMIT, "biotac", indenter, pose_at("biotac", indenter, place))
+    thick = depth_at(DEPTH_LIMIT, SOURCE, indenter, pose_at(SOURCE, indenter, place))
     depth = _borne(indenter, place, min(drawn, thick), paired(scene).friction)
     return TestPress(number, which, indenter, place, depth, slide)
 
@@ -75,9 +76,9 @@ def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) 
     """The depth, m, on the BioTac, or less, in steps of a fifth, until the DIGIT bears its force by the fast tier."""
     for _ in range(_TRIES):
         try:
-            force = solve("biotac", indenter, place, depth=depth, friction=friction).axial_force
+            force = solve(SOURCE, indenter, place, depth=depth, friction=friction).axial_force
             if force > 0:
-                solve("digit", indenter, place, force=force, friction=friction)
+                solve(TARGET, indenter, place, force=force, friction=friction)
             break
         except (UnreachableError, PenetrationError):
             depth *= 0.8  # where an edge sinks in between nodes the full tier does not follow either
@@ -128,10 +129,10 @@ def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: fl
     on_biotac, trouble = _on_biotac(press, steps, friction)
     if on_biotac:
         slides = [slide for _, slide in steps[: len(on_biotac)]]
-        pose = pose_at("digit", press.indenter, press.place)
-        limit = depth_at(DEPTH_LIMIT, "digit", press.indenter, pose)
+        pose = pose_at(TARGET, press.indenter, press.place)
+        limit = depth_at(DEPTH_LIMIT, TARGET, press.indenter, pose)
         asked = [Step(force=found.axial_force, slide=tuple(to)) for to, found in zip(slides, on_biotac, strict=True)]
-        on_digit = solve_path("digit", press.indenter, pose, asked, "full", friction, limit)
+        on_digit = solve_path(TARGET, press.indenter, pose, asked, "full", friction, limit)
         yield from zip(slides, on_biotac, on_digit, strict=True)
     if trouble:
         raise trouble
@@ -141,11 +142,11 @@ def _on_biotac(
     press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
 ) -> tuple[list[Solution], TactileError | None]:
     """The contacts that were found, and the error that ended them. A slide keeps its depth under the surface."""
-    pose, surface, found = pose_at("biotac", press.indenter, press.place), sensors.biotac_surface(), []
+    pose, surface, found = pose_at(SOURCE, press.indenter, press.place), sensors.biotac_surface(), []
     drops = [surface_drop(surface, press.indenter, pose, pose.slid(*slide)) for _, slide in steps]
     asked = [Step(max(depth + drop, 0.0), slide=tuple(to)) for (depth, to), drop in zip(steps, drops, strict=True)]
     try:
-        for contact in solve_path("biotac", press.indenter, pose, asked, "full", friction):
+        for contact in solve_path(SOURCE, press.indenter, pose, asked, "full", friction):
             if contact.axial_force <= 0:
                 raise TactileError("full tier, biotac", "no force", "a contact")
             found.append(contact)

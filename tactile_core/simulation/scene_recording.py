@@ -187,7 +187,7 @@ def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))
     first = next(iter(solved.values()))
-    change = signal_of(solved["biotac"], law) if "electrodes" in keep else np.zeros(sensors.ELECTRODES)
+    change = signal_of(solved[SOURCE], law) if "electrodes" in keep else np.zeros(sensors.ELECTRODES)
     centre = next((each.centre for sensor, each in solved.items() if sensors.is_gel(sensor)), np.full(2, np.nan))
     return _Frame(moved, pressed, first.force, first.pressure, change, centre)
 
@@ -232,6 +232,6 @@ def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
     moved, pressed = (stacked([getattr(frame, name) for frame in frames]) for name in ("moved", "pressed"))
     centre = np.stack([frame.centre for frame in frames]) if any(map(sensors.is_gel, sensors_of(keep))) else None
     return Truth(
-        moved.pop("biotac", None), moved.pop("digit", None), np.stack([frame.force for frame in frames]), centre,
-        pressed.pop("biotac", None), pressed.pop("digit", None), moved, pressed,
+        moved.pop(SOURCE, None), moved.pop(TARGET, None), np.stack([frame.force for frame in frames]), centre,
+        pressed.pop(SOURCE, None), pressed.pop(TARGET, None), moved, pressed,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from ..mechanics.electrodes.law import rest_counts
-from ..sensors import COUNT_SIGN, REST_COUNTS
+from ..sensors import COUNT_SIGN, PAIR, REST_COUNTS
 from ..sensors.readout import converted
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
@@ -60,7 +60,7 @@ class Contacts:
                 getattr(options, f"wide_{name}"), getattr(options, f"near_{name}"), generator,
                 mirrored=options.mirrored > 0,
             )
-            for name in ("biotac", "digit")
+            for name in PAIR
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ import torch
 
 from .. import accuracy
 from ..accuracy import Row
+from ..sensors import TARGET
 from ..translation import error_bounds
 from ..translation.error_bounds import KINDS
 from ..translation.layers import DISTANCES
@@ -75,7 +76,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
         with torch.no_grad():
             latent = model.directly(torch.cat([change, torch.zeros(len(change), 1)], -1))
             found = model.MVD.surface.frame.to_shared(model.direct_decoder.field(latent).numpy())
-        return mesh_columns("direct", found, true_displacement(pairs, "digit", measure.rows[part]))
+        return mesh_columns("direct", found, true_displacement(pairs, TARGET, measure.rows[part]))
 
     return joined(answer(part) for part in parts(len(measure.rows)))
 

@@ -85,7 +85,7 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
     rest, unrolled = sensors.biotac_surface().rest, unrolling.unrolled_nodes()
-    points = sensors.from_syntouch(metres)
+    points = sensors.from_maker(metres, sensors.SOURCE)
     nearest, gap = np.empty(len(points), int), np.empty(len(points))
     for start in range(0, len(points), FEWEST):  # bounds the table of distances
         part = slice(start, start + FEWEST)

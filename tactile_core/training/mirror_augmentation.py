@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from ..sensors import electrodes
+from ..sensors import SOURCE, electrodes
 from ..translation.contact_frame import ContactFrame
 
 Z = 2  # the axis that turns round, of forces and, in nodes' own frames, of displacements
@@ -31,7 +31,7 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 
 @functools.cache
-def image_of_electrodes(sensor: str = "biotac") -> np.ndarray:
+def image_of_electrodes(sensor: str = SOURCE) -> np.ndarray:
     """Mirror image (19,) of each electrode."""
     at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .. import accuracy, sensors
 from ..geometry.lattice import Lattice
-from ..sensors import SOURCE, TARGET, unrolling
+from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from ..simulation.pairs_file import Pairs
 from ..translation.gel_place import contact_patch
 from ..translation.network_sizes import SURFACES
@@ -67,7 +67,7 @@ def joined(columns: Iterator[Columns]) -> Columns:
 
 
 def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
+    skin, gel = (true_displacement(pairs, sensor, rows) for sensor in PAIR)
     patch = pairs.contact_patch_digit[rows]
     mesh, read = nets.encode_biotac(skin), nets.encode_signal(change)
     state = nets.contact(read)
@@ -114,12 +114,12 @@ def error_columns(
     ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
     """
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
-    answers = {"biotac": nets.decode_biotac(biotac), "digit": nets.decode_digit(digit)}
+    answers = {SOURCE: nets.decode_biotac(biotac), TARGET: nets.decode_digit(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
     found = {f"{name}_max_m": accuracy.max_error(answer, truth[name]) for name, answer in answers.items()}
     expected = nets.expected_error(change, rectified)
     found |= {f"{name}_expected_m": expected[:, index] for index, name in enumerate(SURFACES)}
-    return found | {"x_m": contact_center(answers["digit"], bodies.digit.rest, silent)[:, 0]}
+    return found | {"x_m": contact_center(answers[TARGET], bodies.digit.rest, silent)[:, 0]}
 
 
 FORCE_FROM = 0.2  # N: below, the share of an error says nothing (assumed)

@@ -6,14 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import TactileError
-from ..sensors import ELECTRODES
+from ..sensors import ELECTRODES, PAIR
 from .layers import plain_shapes, residual_shapes
 from .weights import ADVICE
 
 SIGNAL_HIDDEN = (256, 128, 64)  # the published SVB's (docs/sources.md, Networks)
 PLACE = 2  # numbers of a mesh's latent that are the place of its dent
 STATE = PLACE + 2  # numbers of a contact's state: the place of the gel's dent, on asinh scales its force and depth
-SURFACES = ("biotac", "digit")
+SURFACES = PAIR
 ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
 NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "pressure", "error")
 POSTERIORS = ("S2MPN", "R2MPN")

@@ -36,7 +36,7 @@ def _wanted(part, frame=80):
     found = part("addon.operators.recording_data")._KEPT
     displacement = next(iter(found.values())).translation.displacement_digit[frame - 70]
     heights = part("tactile_core.pictures.height_map").height_map(displacement)
-    return part("tactile_core.pictures.shading").Shader()(heights)
+    return part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
 
 
 def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path):
@@ -164,7 +164,7 @@ def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
 def traced(part):
     """A worker as Mitsuba's presets use it, with the one that needs no Mitsuba; and what draws a gel's heights."""
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
-    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
     tracer = part("addon.process.tracer_process").Tracer("fast")
 
     def draw(heights, stopped=lambda: False, unit=unit, better=lambda picture: None):
@@ -198,7 +198,7 @@ def test_an_idle_worker_ends_after_a_minute(part, monkeypatch):
     process = part("addon.process.tracer_process")
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
     heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
-    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
     process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)
     worker = process._kept["fast"]._job._process
     process.close_idle()
@@ -212,7 +212,7 @@ def test_a_worker_gets_ready_before_its_first_picture(part):
     process = part("addon.process.tracer_process")
     unit = part("tactile_core.sensors.calibration_file").load_calibration()
     heights = part("tactile_core.pictures.height_map").rest_height_map(unit.camera)
-    nothing = part("tactile_core.pictures.mitsuba.surroundings").NOTHING
+    nothing = part("tactile_core.pictures.mitsuba.gel_scene").NOTHING
     process.prepare("fast", unit, nothing)
     ready = process._kept["fast"]
     picture = process.draw("fast", unit, nothing, heights, lambda: False, lambda picture: None)

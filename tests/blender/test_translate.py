@@ -97,7 +97,7 @@ def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
     shown.pixels.foreach_get(values)
     # 1 um: coordinates of 30 mm are held in float32, which rounds them to 2 nm; dents steepen that sideways.
     np.testing.assert_allclose(values.reshape(320, 240, 4)[::-1, :, 0], 1e3 * heights, atol=1e-3)
-    picture = part("tactile_core.pictures.shading").Shader()(heights)
+    picture = part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
     bpy.data.images["DIGIT picture"].pixels.foreach_get(values)
     drawn = np.rint(255 * values.reshape(320, 240, 4)[::-1, :, :3])
     assert np.abs(drawn - picture.astype(float)).max() <= 1  # a level: the same rounding of coordinates

@@ -7,13 +7,13 @@ import pytest
 
 from tactile_core.files import png_writer
 from tactile_core.files.png_writer import write_png
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration
 
 
 def picture() -> np.ndarray:
     """A unit's picture at rest, with its camera's grain, cut to odd sizes."""
-    return np.ascontiguousarray(Shader(load_calibration()).background.astype(np.uint8)[:317, :239])
+    return np.ascontiguousarray(Renderer(load_calibration(), "fast").background.astype(np.uint8)[:317, :239])
 
 
 def test_files_hold_the_pixels_in_no_more_space_than_pillows(tmp_path, monkeypatch):

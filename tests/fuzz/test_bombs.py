@@ -17,7 +17,7 @@ from tactile_core.geometry.indenters import mesh_file
 from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.gel_frames import read_frames
 from tactile_core.pictures.background import read_photograph
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import electrode_gains
 from tactile_core.sensors.calibration_file import SHIPPED, load_calibration
 from tactile_core.simulation import scene
@@ -199,7 +199,7 @@ def test_a_calibrations_photograph_is_bounded(tmp_path):
         for name in ("../bomb.png", "bomb.png"):
             text = SHIPPED.read_text().replace('photograph = ""', f'photograph = "{name}"')
             (tmp_path / "a.toml").write_text(text)
-            refused(lambda path: Shader(load_calibration(path)), tmp_path / "a.toml", "bomb.png")
+            refused(lambda path: Renderer(load_calibration(path), "fast"), tmp_path / "a.toml", "bomb.png")
 
 
 def plain_png(width: int, height: int) -> bytes:

@@ -24,7 +24,7 @@ from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
 from tactile_core.mechanics.solids.neo_hookean import NeoHookean, SplitBulkModulus
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.pictures.height_map import gel_mapper
-from tactile_core.sensors import Material, digit
+from tactile_core.sensors import Material
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y
 from tactile_core.translation import networks
 
@@ -54,7 +54,9 @@ def test_gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.6e-3)
-    law = SplitBulkModulus.from_law(NeoHookean.from_material(Material(sensors.DIGIT_GEL.youngs, poisson)))
+    law = SplitBulkModulus.from_law(
+        NeoHookean.from_material(Material(sensors.describe("digit").material.youngs, poisson))
+    )
     body = dataclasses.replace(body, solid=FiniteStrainSolid(body.solid.mesh, law, body.graded.pattern))
     problem = body.contact(BALL, pose, 0.6e-3, 0.0)
     touch = problem.move(pose.moved(0.6e-3), problem.start(), 5e-3)
@@ -174,7 +176,7 @@ def test_inverted() -> Found:
     body = graded_body("digit", BALL, pose, 0.3e-3)
     problem = body.contact(BALL, pose, 0.3e-3, 0.0)
     turned = np.zeros_like(body.solid.mesh.nodes)
-    turned[body.solid.mesh.surface, 1] = 3 * digit.THICKNESS
+    turned[body.solid.mesh.surface, 1] = 3 * sensors.thickness("digit")
     start = dataclasses.replace(problem.start(), state=State(turned, problem.start().state.pressure))
     return refusal(lambda: problem.move(pose.moved(0.3e-3), start, 5e-3), "no equilibrium")
 

@@ -23,7 +23,6 @@ from tactile_core.geometry.cubic_spline import EvenSpline
 from tactile_core.pictures.height_map import HeightMapper, gel_mapper, rest_height_map
 from tactile_core.pictures.perspective import bilinear
 from tactile_core.pictures.renderer import Renderer
-from tactile_core.pictures.shading import Shader
 from tactile_core.sensors.camera import HEIGHT_ZERO_Y, Led
 
 UNIT = plain_unit()
@@ -83,7 +82,7 @@ def test_far_off(name: str) -> Found:
     """How much the picture changes away from the contact."""
     heights = gel_mapper()(moved(name))
     unit = plain_unit(camera=gel_mapper().camera)
-    drawn = Shader(unit, background=GREY)
+    drawn = Renderer(unit, "fast", background=GREY)
     change = np.abs(drawn(heights).astype(int) - drawn(rest_height_map(unit.camera)))
     dent = heights - rest_height_map(unit.camera) > 20e-6
     far = distance_transform_edt(~dent) > FAR / unit.camera.pixel_size[0]
@@ -186,8 +185,7 @@ def test_below(preset: str) -> Found:
         low, leds=tuple(dataclasses.replace(led, position=(*led.position[:2], 1e-3)) for led in low.leds)
     )
     rest = rest_height_map(HALF.camera)
-    draw = (lambda: Shader(low)(rest)) if preset == "fast" else (lambda: Renderer(low, preset)(rest))
-    return refusal(draw, "below LEDs")
+    return refusal(lambda: Renderer(low, preset)(rest), "below LEDs")
 
 
 @case("cliff_{}", "depth discontinuities", PRESETS,
@@ -250,6 +248,6 @@ def test_single_levels() -> Found:
     rest = rest_height_map(HALF.camera)
     right, down = np.meshgrid(HALF.camera.right, HALF.camera.down)
     height = (rest + 0.6e-3 * np.exp(-(right**2 + down**2) / (2 * (0.8e-3) ** 2))).astype(np.float32)
-    drawn = Shader(HALF, background=np.full((*HALF.camera.shape, 3), 128))
+    drawn = Renderer(HALF, "fast", background=np.full((*HALF.camera.shape, 3), 128))
     one, other = drawn.radiance(height), drawn.radiance(np.nextafter(height, np.float32(1)))
     return Found(float(np.abs(one - other).max()), "levels", 0.05)

@@ -17,7 +17,7 @@ from hard_cases.case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 from tactile_core import accuracy, recordings
 from tactile_core.jobs.convert import Options, convert, load_tools
 from tactile_core.pictures.height_map import gel_mapper
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import Recording, Signals
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import networks
@@ -212,7 +212,7 @@ def test_wild_heights() -> Found:
 def test_wild_pictures() -> Found:
     """Pictures of the same."""
     heights = gel_mapper()(_wild())
-    shader, words, drawn = Shader(), set(), 0
+    shader, words, drawn = Renderer(preset="fast"), set(), 0
     for height in heights:
         try:
             drawn += shader(height).shape == (320, 240, 3)

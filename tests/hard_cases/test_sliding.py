@@ -9,9 +9,10 @@ from hard_cases.contacts import MIDDLE, broken_fast, broken_full, press
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve_path
-from tactile_core.sensors import digit
+from tactile_core.sensors import shape_of
 
 BALL = Sphere(3.5e-3)
+HALF_WIDTH = shape_of("digit").half_width
 FRICTION = 0.5
 ENDS_AT_MU = "the force along the slide ends at 0.5 of the normal one, to the dome's slope of 0.05; Coulomb's law holds"
 
@@ -58,7 +59,7 @@ def test_rolled() -> Found:
       (0.0,), (0.5,))  # fmt: skip
 def test_off_the_rim(friction: float) -> Found:
     """From 2 mm inside the gel's side outward, past its outline, until nothing touches."""
-    place = Placement(-8e-3, digit.HALF_WIDTH - 2e-3)
+    place = Placement(-8e-3, HALF_WIDTH - 2e-3)
     one = press("digit", BALL, place, friction)
     out = float(np.sign(one.pose.axes[:, 1] @ [0, 0, 1]))
     found, forces, broken = one.at_depth(0.4e-3), [], []
@@ -77,7 +78,7 @@ def test_off_the_rim(friction: float) -> Found:
       "a path that ends above the gel ends without force, the gel at rest to 0.01 um")  # fmt: skip
 def test_lifted() -> Found:
     """0.3 mm deep at the rim, then back to first touch."""
-    place = Placement(-8e-3, digit.HALF_WIDTH - 0.6e-3)
+    place = Placement(-8e-3, HALF_WIDTH - 0.6e-3)
     found = list(solve_path("digit", BALL, place, [Step(depth=0.3e-3), Step(depth=0.0)], "full", 0.0))[-1]
     broken = () if not found.force.any() else (f"{np.linalg.norm(found.force):.2g} N are left",)
     return Found(float(np.abs(found.displacement).max()) * 1e6, "um", 0.01, broken=broken)
@@ -87,5 +88,5 @@ def test_lifted() -> Found:
       "a press beside the gel is refused, in words")  # fmt: skip
 def test_beside() -> Found:
     """1 mm outside the outline."""
-    place = Placement(-8e-3, digit.HALF_WIDTH + 1e-3)
+    place = Placement(-8e-3, HALF_WIDTH + 1e-3)
     return refusal(lambda: next(solve_path("digit", BALL, place, [Step(depth=0.1e-3)])), "on the DIGIT's gel")

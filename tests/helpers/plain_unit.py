@@ -25,7 +25,7 @@ def plain_unit(**changes: object) -> Calibration:
         apparent_height=20e-3, right_z=-1, down_x=1,
     )  # fmt: skip
     gain = Response(tuple(tuple(LEVELS * (i == k) for k in range(3)) for i in range(3)), ZERO, ZERO)
-    fit = Fit("round numbers, not fitted", (), 6e-3, {}, {}, ())
+    fit = Fit("round numbers, not fitted", (), (), 6e-3, {}, {})
     dark = ((0.0,) * AMBIENT_TERMS,) * 3
     unit = Calibration("plain", camera, LEDS, gain, dark, Coating(), 1.41, 1.0, "", (1.0, 1.0, 1.0), fit)
     unit = dataclasses.replace(unit, **changes).with_gain(gain)

@@ -16,10 +16,10 @@ from tactile_core.mechanics.fast.active_set import UnsolvedError
 from tactile_core.mechanics.fast.press import CorrectedPress
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
-from tactile_core.sensors import digit
 
 BALL = Sphere(3e-3)
-TOP = float(digit.gel_surface().rest[np.argmin(digit.gel_surface().rest[:, 1]), 0])  # m, where the dome is level
+REST = sensors.digit_surface().rest
+TOP = float(REST[np.argmin(REST[:, 1]), 0])  # m, where the dome is level
 
 
 def shifted(pose: np.ndarray, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> np.ndarray:

@@ -137,7 +137,7 @@ def test_a_press_may_be_paired_by_depth(scene):
     np.testing.assert_allclose(np.diff(biotac), 0.2e-3, rtol=1e-5)  # float32
     np.testing.assert_allclose(digit, biotac, rtol=1e-5)
     along = [np.linalg.norm(row["force"]) / np.linalg.norm(row["force_digit"]) for row in rows]
-    stiffer = sensors.BIOTAC_SKIN.youngs / sensors.DIGIT_GEL.youngs
+    stiffer = sensors.describe("biotac").material.youngs / sensors.describe("digit").material.youngs
     assert max(along) < 0.4 * stiffer  # the same depth takes less force on the thicker, filled BioTac than skin alone
 
 

@@ -8,8 +8,9 @@ from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
 from tactile_core.mechanics.first_touch import first_touch
 from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.sensors import digit
+from tactile_core.sensors import shape_of
 
+DIGIT = shape_of("digit")
 PLACES = [Placement(-8e-3, 0.0), Placement(-14e-3, 4e-3, 0.3, 1.0), Placement(-3e-3, -6e-3, 0.5, 4.0)]
 INDENTERS = [Sphere(3.5e-3), Cylinder(3.5e-3, 0.5e-3), Box((14e-3,) * 3, 0.5e-3), Ring(2.5e-3, 1e-3)]
 
@@ -19,7 +20,7 @@ def dome(pose: Pose, reach: float) -> np.ndarray:
     x = pose[0] + np.arange(-reach, reach, 5e-6)
     z = pose[2] + np.arange(-reach, reach, 5e-6)
     x, z = np.meshgrid(x, z)
-    return np.stack([x, digit.BACK_Y - digit.dome_height(x, z), z], -1).reshape(-1, 3)
+    return np.stack([x, DIGIT.back_y - DIGIT.dome_height(x, z), z], -1).reshape(-1, 3)
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -68,7 +69,7 @@ def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
 
 def test_ball_set_on_a_smooth_place_stays_there():
     ball = Sphere(3.5e-3)
-    point, outward = digit.dome_point(-8e-3, 1e-3)
+    point, outward = DIGIT.dome_point(-8e-3, 1e-3)
     there = pose_on(ball, point, outward)
     moved = (first_touch(sensors.digit_surface(), ball, there).apex - there.apex) @ there.direction
     assert abs(moved) < 0.2e-6
@@ -83,7 +84,7 @@ def test_thickness_of_the_gel_and_of_skin_and_fluid():
 
     on_dome, thick = at("digit")
     # at the top of the dome the normal is nearly upright
-    assert thick == pytest.approx(digit.BACK_Y - on_dome[1], rel=1e-3)
+    assert thick == pytest.approx(DIGIT.back_y - on_dome[1], rel=1e-3)
     # docs/sources.md, BioTac skin and fluid: skin 1.58 mm and a fluid film of up to 2.45 mm
     assert 1.58e-3 + 0.5e-3 < at("biotac")[1] < 1.63e-3 + 2.45e-3
     with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):

@@ -49,7 +49,7 @@ def test_the_touchable_side_is_the_sensors_surface(make, surface):
 @pytest.fixture(scope="module")
 def solution():
     """A pressed gel in disguise: a smooth dent under the surface, with the pressure of its volumes."""
-    solid = FiniteStrainSolid(gel_mesh(), sensors.DIGIT_GEL)
+    solid = FiniteStrainSolid(gel_mesh(), sensors.describe("digit").material)
     state = solid.rest()
     x, y, z = (solid.mesh.nodes * 1e3).T
     height = np.clip((-4.236 - y) / 4, 0, 1)

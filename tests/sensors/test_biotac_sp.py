@@ -9,7 +9,7 @@ from tactile_core.errors import TactileError
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.mechanics.solids.biotac_core import Core
 from tactile_core.mechanics.solids.hex_mesh import skin_mesh
-from tactile_core.sensors import biotac_sp, descriptor, unrolling
+from tactile_core.sensors import descriptor, unrolling
 from tactile_core.sensors.electrodes import SP_COLUMNS, places_of
 
 NAME = "biotac_sp"
@@ -26,8 +26,11 @@ def in_their_frame(points):
 
 def test_the_skin_lies_on_the_stated_ellipsoid():
     skin = sensors.skin_of(NAME)
-    for layer, axes in (("outer", biotac_sp.RESTING), ("inner", biotac_sp.RESTING - skin.thickness)):
-        points = in_their_frame(skin.skin_surface(layer).rest) - [0, 0, biotac_sp.RESTING_CENTRE]
+    for layer, axes in (
+        ("outer", make_biotac_sp_profile.RESTING),
+        ("inner", make_biotac_sp_profile.RESTING - skin.thickness),
+    ):
+        points = in_their_frame(skin.skin_surface(layer).rest) - [0, 0, make_biotac_sp_profile.RESTING_CENTRE]
         radius = np.linalg.norm(points / axes, axis=1)[points[:, 2] < 1e-9]
         assert len(radius) > 2000
         np.testing.assert_allclose(radius, 1, atol=3e-3)  # polylines 1 mm long at the ends: 20 um inside
@@ -44,7 +47,7 @@ def test_the_core_is_the_stated_one_and_the_back_is_held():
     assert not mesh.clamped[mesh.inner][~back & ~ends].any()
     pad = inner[~back & (np.abs(inner[:, 0] + 8e-3) < 9e-3) & (np.abs(inner[:, 2]) < 5e-3)]
     foot = pad - Core(NAME).distance(pad)[0][:, None] * Core(NAME).distance(pad)[1]
-    away = np.linalg.norm(in_their_frame(foot) / biotac_sp.CORE, axis=1) - 1
+    away = np.linalg.norm(in_their_frame(foot) / make_biotac_sp_profile.CORE, axis=1) - 1
     assert np.abs(away).max() * 8e-3 < 0.12e-3  # the gap is exact to first order in itself, up to 1 mm
 
 
@@ -107,6 +110,6 @@ def test_a_table_that_is_missing_or_bad_is_said_in_words(own):
 
 def test_the_public_places_lie_in_the_fluid(outside_data, own):
     own.write_bytes((outside_data("biotac_sp") / "locations.csv").read_bytes())
-    assert len(sensors.electrodes(NAME)) == biotac_sp.ELECTRODES and len(sensors.excitation_electrodes(NAME)) == 4
+    assert len(sensors.electrodes(NAME)) == 24 and len(sensors.excitation_electrodes(NAME)) == 4
     gaps = electrode_feet.__wrapped__(NAME).gap  # what another table left in its cache is none of ours
     assert gaps.min() > 0.4e-3 and gaps.max() < 1.5e-3  # as a BioTac's, 0.51 to 1.76

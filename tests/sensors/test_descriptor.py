@@ -8,7 +8,7 @@ import pytest
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.sensors import biotac, descriptor
+from tactile_core.sensors import descriptor
 from tactile_core.sensors.about import about
 from tactile_core.sensors.electrodes import read_places
 from tactile_core.sensors.gel_shape import GelShape
@@ -35,7 +35,7 @@ def test_what_ships_is_read_and_names_its_sources(name):
 
 def test_decimals_are_shifted_before_they_are_rounded():
     assert 1e-3 * -20.06 != -20.06e-3
-    assert sensors.digit.X_TIP == -20.06e-3
+    assert sensors.shape_of("digit").tip_x == -20.06e-3
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_decimals_are_shifted_before_they_are_rounded():
         ('polarity = "falls"', 'polarity = "down"', "falls or rises"),
         ('kind = "fluid"', 'kind = "solid"', "fluid or gel"),
         ('kind = "fluid"', "kind = []", "fluid or gel"),
-        ('profile = "profile.csv"', 'profile = "../profile.csv"', "a file beside the descriptor"),
+        ('profile = "profile.csv"', 'profile = "../profile.csv"', "a file beside this one"),
         ("rate_hz = 100", f"rate_hz = {10**400}", "readout, rate_hz"),
         ("tip_rows = 18", "tip_rows = 100000", "lattice, tip_rows: 100000; expected above 1 and below 300"),
         ("tactile-sensor-1", "tactile-sensor-9", "format"),
@@ -98,7 +98,7 @@ def test_a_second_fluid_sensor_has_a_skin_of_its_own(tmp_path, monkeypatch):
 
 
 def test_an_open_profile_is_refused(tmp_path):
-    lines = (biotac.DESCRIPTOR.folder / "profile.csv").read_text().splitlines()
+    lines = (descriptor.FOLDER / "biotac" / "profile.csv").read_text().splitlines()
     at = next(k for k, line in enumerate(lines) if k > 72 * 30 and ",0," in line)
     x, theta, _, inner, core = lines[at].split(",")
     path = tmp_path / "profile.csv"
@@ -178,12 +178,12 @@ def test_a_descriptor_whose_calibration_is_another_gel_s_is_refused(tmp_path, mo
 
 def test_electrodes_outside_the_body_are_refused(tmp_path):
     every = np.concatenate([sensors.electrodes(), sensors.excitation_electrodes()])
-    biotac.check_inside(every)
+    sensors.skin_of("biotac").check_inside(every)
     for axis, by in ((1, -4e-3), (2, -8e-3), (0, 30e-3)):
         moved = every.copy()
         moved[3, axis] += by
         with pytest.raises(TactileError, match="outside the body"):
-            biotac.check_inside(moved)
+            sensors.skin_of("biotac").check_inside(moved)
 
 
 @pytest.mark.parametrize("row", ["E1,1,2,3", "E1,1,2,up,3000"])

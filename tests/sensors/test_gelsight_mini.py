@@ -17,7 +17,7 @@ from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.calibrate.evaluate import evaluate_unit
 from tactile_core.pictures.calibrate.photographs import read_photographs
 from tactile_core.pictures.height_map import of_unit, rest_height_map
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.about import about
 from tactile_core.sensors.calibration_file import calibration_path, load_calibration
 from tactile_core.simulation import tier_choice
@@ -100,7 +100,7 @@ def test_its_channels_are_those_of_real_photographs(outside_data):
     """A resting picture is teal, red lights the top; red and blue exchanged, it is 22.3 levels off the real unit's."""
     photograph = read_photograph(outside_data(NAME) / "background.png").astype(float)
     unit = load_calibration(None, NAME)
-    rest = Shader(unit)(rest_height_map(unit.camera)).astype(float)
+    rest = Renderer(unit, "fast")(rest_height_map(unit.camera)).astype(float)
     even = np.abs(photograph - photograph.mean((0, 1))).mean()  # 18.4
     assert np.abs(rest - photograph).mean() < even / 3  # another unit than the calibration's; measured: 4.7
     whole = read_photographs(outside_data(NAME), outside_data(NAME) / "background.png")
@@ -110,7 +110,7 @@ def test_its_channels_are_those_of_real_photographs(outside_data):
 
 def test_red_lights_the_top_of_a_print_and_the_gel_rests_teal():
     unit = load_calibration(None, NAME).at_size(80, 60)
-    red, green, blue = Shader(unit)(rest_height_map(unit.camera)).mean((0, 1))
+    red, green, blue = Renderer(unit, "fast")(rest_height_map(unit.camera)).mean((0, 1))
     assert red < green and red < blue
     change = FastPictures(unit).change((0.0, 0.0, 0.5e-3, 3e-3))
     top, bottom = change[20:30].mean((0, 1)), change[30:40].mean((0, 1))

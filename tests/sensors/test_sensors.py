@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.sensors import digit, unrolling
-from tactile_core.sensors.biotac import skin_surface
+from tactile_core.sensors import unrolling
 
 RMS_LIMIT = 0.05e-3  # m, a target
 
@@ -46,7 +45,7 @@ def rms_distance(points, lattice):
 def test_skin_lies_on_the_public_mesh(outside_data):
     vertices, cells = read_tet(outside_data("biotac_mesh") / "skin.tet")
     nodes = np.unique(boundary_nodes(cells))[::3]  # a third of 3,272 is enough for an rms, and three times faster
-    outer, inner = skin_surface("outer"), skin_surface("inner")
+    outer, inner = map(sensors.skin_of("biotac").skin_surface, ("outer", "inner"))
     to_outer, to_inner = (
         np.linalg.norm(unrolling.closest_on_triangles(s, vertices[nodes])[2] - vertices[nodes], axis=1)
         for s in (outer, inner)
@@ -62,7 +61,7 @@ def test_gel_lies_on_the_public_mesh(outside_data):
     vertices, cells = read_medit(outside_data("digit_mesh") / "digit_gel.mesh")
     nodes = np.unique(boundary_nodes(cells))
     x, y, z = vertices[nodes].T
-    inside = digit.outline_distance(x, z)
+    inside = sensors.shape_of("digit").outline_distance(x, z)
     top = nodes[(inside > 0.3e-3) & (y < -4.3e-3)]  # the side wall and its rounded edge are no part of the surface
     assert len(top) > 200
     assert rms_distance(vertices[top], sensors.digit_surface()) < RMS_LIMIT
@@ -81,7 +80,7 @@ def test_surfaces_are_mirror_symmetric_and_face_outward(make):
 
 
 def test_skin_is_closed_and_as_thick_as_published():
-    outer, inner = skin_surface("outer"), skin_surface("inner")
+    outer, inner = map(sensors.skin_of("biotac").skin_surface, ("outer", "inner"))
     for lattice in (outer, inner):
         edges = np.sort(
             np.concatenate([lattice.faces[:, [0, 1]], lattice.faces[:, [1, 2]], lattice.faces[:, [2, 0]]]), axis=1

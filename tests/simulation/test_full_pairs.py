@@ -21,7 +21,6 @@ from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.mechanics.force_search import FORCE_TOLERANCE
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve, solve_path
-from tactile_core.sensors import digit
 from tactile_core.simulation import full_pairs, pairs_file, pairs_writer
 from tactile_core.simulation.full_pairs import REGION_X, draw_press, full_rows
 from tactile_core.simulation.scene import load_scene
@@ -104,7 +103,7 @@ def test_the_surface_moves_as_deep_as_the_ball_comes_in(solved, sensor):
         patch = rest[row[f"contact_patch_{sensor}"]]
         if len(patch):  # a shallow one may lie between the nodes
             assert np.linalg.norm(patch - rest[moved.argmax()], axis=1).min() < 1e-3
-    on_dome, _ = digit.dome_point(PLACE.x, PLACE.z)
+    on_dome, _ = sensors.shape_of("digit").dome_point(PLACE.x, PLACE.z)
     assert np.linalg.norm(rows[0]["contact_center"] - on_dome[[0, 2]]) < 0.6e-3  # a tilted ball touches beside it
 
 

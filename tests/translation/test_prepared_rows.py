@@ -11,7 +11,7 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.jobs import convert
-from tactile_core.pictures import shading
+from tactile_core.pictures import renderer
 from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains
@@ -106,9 +106,9 @@ def test_a_part_of_a_long_recording_takes_little_beside_it(shipped):
     assert peak < 2.2 * recording.electrodes.nbytes + 20e6
 
 
-def test_the_shader_is_made_with_the_first_picture(monkeypatch):
+def test_the_renderer_is_made_with_the_first_picture(monkeypatch):
     made = []
-    monkeypatch.setattr(shading, "Shader", lambda unit: made.append(unit) or (lambda height: height))
+    monkeypatch.setattr(renderer, "Renderer", lambda unit, preset: made.append(unit) or (lambda height: height))
     tools = convert.load_tools()
     assert not made
     tools.drawer.warm_up()

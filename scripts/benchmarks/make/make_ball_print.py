@@ -19,11 +19,11 @@ from benchmarks.mechanics.axisymmetric import disc_mesh, pressed
 from tactile_core.files import atomic
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.pictures.calibrate.ball_print import TABLE
-from tactile_core.sensors import DIGIT_GEL
-from tactile_core.sensors.digit import HALF_WIDTH, THICKNESS
+from tactile_core.sensors import shape_of
 
 # Radius, m: the smaller a ball is, the deeper it is pressed. Depths and the distance of nodes under it are counted in
 # radii. Half the distance changes rises of the large ball by 1 um, forces of the small one by 0.4 %.
+DIGIT = shape_of("digit")
 LARGE = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2]) / 3
 DEPTHS = {0.5e-3: np.r_[LARGE[1:], 0.85, 1.0, 1.15, 1.3], 1.2e-3: np.r_[LARGE[1:], 0.85, 1.0], 3e-3: LARGE}
 SPACING = {0.5e-3: 1 / 30, 1.2e-3: 1 / 30, 3e-3: 1 / 60}
@@ -45,8 +45,8 @@ def main() -> int:
 
 def prints(radius: float, depths: np.ndarray, nodes: int) -> np.ndarray:
     """Rise over depth (depths, nodes) float32 of the flat layer under a ball of a radius, m, at depths (n,) m."""
-    mesh = disc_mesh(HALF_WIDTH, THICKNESS, radius, SPACING[radius] * radius, FINE_DEPTH * radius, GROWTH)
-    contact = pressed(mesh, DIGIT_GEL, Sphere(radius), radius)
+    mesh = disc_mesh(DIGIT.half_width, DIGIT.thickness, radius, SPACING[radius] * radius, FINE_DEPTH * radius, GROWTH)
+    contact = pressed(mesh, DIGIT.descriptor.material, Sphere(radius), radius)
     place = STEP * np.arange(nodes)
     fade = np.clip((place[-1] - place) / FADE, 0, 1)
     table = []

@@ -14,8 +14,13 @@ import sys
 import numpy as np
 
 from tactile_core.files import atomic
-from tactile_core.sensors import biotac_sp, skin_of
+from tactile_core.sensors import skin_of
 
+# Dimensions in an independent COMSOL model: metres, x along the finger, y across, z away from the pad, which faces -z.
+# Source: github.com/bsadr/biotac, July 2020; its presses were held against the finite-strain tier (docs/sources.md).
+CORE = np.array([12.42e-3, 8.14e-3, 8.057e-3])  # m, semi-axes of the core (``comsol/matlab/Ray.m`` there)
+RESTING = np.array([13.84e-3, 9.74e-3, 10.11e-3])  # m, semi-axes of the presses' skin under 1750 Pa (fitted)
+RESTING_CENTRE = -0.242e-3  # m, z of its centre, likewise
 BACK = 5.0  # mm, height of the back over the skin's centre (assumed)
 STATIONS, ENDS = 29, 1e-3  # of each layer; mm, of the outermost ones from the poles
 HEADER = "x_mm,theta_deg,r_outer_mm,r_inner_mm,r_core_mm"
@@ -32,14 +37,14 @@ def table(name: str = "biotac_sp") -> str:
     """The table as text, of the thickness in the descriptor of a sensor that is there."""
     skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
-    outer, core = 1e3 * biotac_sp.RESTING, 1e3 * biotac_sp.CORE
+    outer, core = 1e3 * RESTING, 1e3 * CORE
     inner = outer - thick
     turns = np.cos(np.pi * (np.arange(STATIONS) + 0.5) / STATIONS)
     x = np.unique(np.round(np.concatenate([(axes[0] - ENDS) * turns for axes in (outer, inner)]), 4))
     theta = np.radians(np.arange(-180, 180, 5))
     radii = [_radius(x, theta, axes, np.array([*axes[:2], BACK - (outer - axes)[2]])) for axes in (outer, inner)]
     held = np.abs(theta) >= np.pi / 2 - 1e-9
-    below = _shifted(x, theta, core, 1e3 * biotac_sp.RESTING_CENTRE)
+    below = _shifted(x, theta, core, 1e3 * RESTING_CENTRE)
     tips = np.where(np.isfinite(below), below, 0 * radii[1])  # beyond the core's apex the axis stands for it
     radii.append(np.where(held, radii[1], tips))
     lines = [

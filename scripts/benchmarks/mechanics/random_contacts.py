@@ -9,7 +9,7 @@ import numpy as np
 
 from tactile_core.geometry.indenters import Box, BumpyCube, Cylinder, Indenter, LyingCylinder, Ring, Sphere
 from tactile_core.mechanics.placement import Placement, on_gel
-from tactile_core.sensors import digit
+from tactile_core.sensors import shape_of
 
 # Diameters and sizes of the published indenters (docs/sources.md, Networks), m; edges, wire and bumps are assumed.
 INDENTERS: dict[str, Indenter] = {
@@ -40,13 +40,13 @@ class RandomContact:
 
 def random_contacts(count: int, seed: int = 0) -> Iterator[RandomContact]:
     """Draw ``count`` contacts, each from its own numbers: places even over the gel, tilts and depths even."""
-    names = list(INDENTERS)
+    names, digit = list(INDENTERS), shape_of("digit")
     for number in range(count):
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
         name = names[number % len(names)]
         while True:
-            x = random.uniform(digit.X_TIP, digit.X_BASE)
-            z = random.uniform(-digit.HALF_WIDTH, digit.HALF_WIDTH)
+            x = random.uniform(digit.tip_x, digit.base_x)
+            z = random.uniform(-digit.half_width, digit.half_width)
             if on_gel(x, z, RIM):
                 break
         tilt = float(np.arccos(random.uniform(np.cos(LARGEST_TILT), 1)))

@@ -14,7 +14,7 @@ from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, Placement, pose_at, thickness_under
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solve import TIERS, Sensor, Solution, Step, Tier, solve, solve_path
-from tactile_core.sensors import digit
+from tactile_core.sensors import digit_surface
 
 from .incompressible import quality_rows
 
@@ -76,7 +76,7 @@ def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> 
 
 def gel_normals(displacement: np.ndarray) -> np.ndarray:
     """Unit normals (201, 153, 3) of the deformed gel where the camera looks, by the lattice's cubic splines."""
-    surface = digit.gel_surface()
+    surface = digit_surface()
     grid = surface.grid(surface.rest + displacement)[surface.window]
     splines = [EvenSpline(0.0, 1.0, size) for size in grid.shape[:2]]
     fine = [np.linspace(0, spline.count - 1, 4 * spline.count - 3) for spline in splines]
@@ -88,7 +88,7 @@ def gel_normals(displacement: np.ndarray) -> np.ndarray:
 
 def _normal_error(where: str, found: Solution, exact: Solution) -> Iterator[Row]:
     """Angle between normals inside the contact, mean and largest, degrees; baseline: a gel that is not pressed."""
-    surface = digit.gel_surface()
+    surface = digit_surface()
     patch = surface.grid(exact.contact_patch[:, None].astype(float))[surface.window][..., 0]
     fine = np.kron(patch > 0, np.ones((4, 4), bool))[: 4 * patch.shape[0] - 3, : 4 * patch.shape[1] - 3]
     theirs = gel_normals(exact.displacement)[fine]

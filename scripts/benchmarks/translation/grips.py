@@ -20,7 +20,7 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.signals import Signals
-from tactile_core.sensors import digit, digit_surface, electrodes
+from tactile_core.sensors import digit_surface, electrodes, shape_of
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.simulated_likeness import residual_shares, unlike
@@ -113,7 +113,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
 def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
     """Locate simulated contacts, read with the noise of real ones; baseline: always their middle place."""
     nets = network.nets
-    deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > digit.X_TIP)
+    deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > shape_of("digit").tip_x)
     gel = nets.decode_digit(nets.likely_latents(nets.encode_signal(as_read(pairs.signal[deep], SEED)))[1])
     found = contact_center(gel, digit_surface().rest, network.silent("digit_m"))
     scale = np.float32(pairs.scale_digit)

@@ -13,6 +13,7 @@ from . import engine
 from .common import (
     PRESETS,
     RESUMES,
+    TARGET,
     answer_arguments,
     prepare_arguments,
     prepare_words,
@@ -49,7 +50,7 @@ RECIPE = (  # option, its value where it is not given
     *((name, None) for name in ("kind", "counts_per_unit", "smooth", "columns")),
     *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
     *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
-    *(("gel", "translated"), ("target", "digit")),
+    *(("gel", "translated"), ("target", TARGET)),
 )
 
 

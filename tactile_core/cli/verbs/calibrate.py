@@ -12,12 +12,9 @@ from ..terminal import bar, next_step, say, tell
 from .common import NOTHING, progress_argument
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from ...pictures.calibrate.ball_pictures import BallPictures
     from ...pictures.calibrate.evaluate import Evaluation
+    from ...pictures.calibrate.fit import Calibrated
     from ...pictures.calibrate.photographs import Photographs
-    from ...sensors.calibration import Calibration
 
 BRIEF = "fit camera, lights and colours of a gel to photographs of a ball"
 TEXT = """\
@@ -68,47 +65,54 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Fit a calibration and write it, or evaluate one on photographs; returns the exit status."""
-    from ...pictures.calibrate.photographs import chosen, read_photographs
+    from ...files import atomic
+    from ...pictures.calibrate.ball_pictures import pictures_of
+    from ...pictures.calibrate.checked_fit import fit_unit
+    from ...pictures.calibrate.evaluate import evaluate_unit
+    from ...pictures.calibrate.fit import check_diameter
+    from ...pictures.calibrate.photographs import read_photographs
+    from ...sensors.calibration_file import load_calibration
 
     _check_options(options)
-    radii = None
-    if options.ball_diameter is not None and len(options.ball_diameter) > 1:
-        radii = [0.5e-3 * diameter for diameter in options.ball_diameter]
-    photographs = read_photographs(options.presses, options.background, radii)
-    if options.only is not None:
-        photographs = chosen(photographs, [name.strip() for name in options.only.split(",")])
-    return _test(options, photographs) if options.test else _fit(options, photographs)
+    written = [options.json, options.sheet] if options.test else [options.out, _sheet_beside(options.out)]
+    diameters = [1e-3 * mm for mm in options.ball_diameter or ()]
+    radii = [each / 2 for each in diameters] if len(diameters) > 1 else None
+    only = None if options.only is None else [name.strip() for name in options.only.split(",")]
+    with bar("test" if options.test else "calibrate", "%", options.progress) as progress:
+        for diameter in diameters:
+            check_diameter(diameter)
+        unit = load_calibration(options.test or options.start, options.gel)
+        for path in filter(None, written):
+            atomic.claim(path)
+        photographs = read_photographs(options.presses, options.background, radii, only)
+        if options.test:
+            radius = (diameters[0] if diameters else unit.fit.ball_diameter) / 2
+            pictures = pictures_of(options.preset or TRIED[0])
+            tried = evaluate_unit(unit, photographs, radius, pictures=pictures, progress=progress)
+        else:
+            name = options.unit or Path(options.out).stem
+            done, apart = fit_unit(photographs, diameters[0], unit, unit=name, quick=options.quick, progress=progress)
+    return _tell_test(options, tried, photographs) if options.test else _write_fit(options.out, done, apart)
 
 
 def _check_options(options: argparse.Namespace) -> None:
-    from ...files import atomic
-    from ...pictures.calibrate.fit import check_diameter
-
-    for diameter in options.ball_diameter or ():
-        check_diameter(1e-3 * diameter)
     if len(options.ball_diameter or (0,)) not in (1, len(options.presses)):
         found = f"{len(options.ball_diameter)} diameters, and {len(options.presses)} folders or videos"
         raise TactileError("--ball-diameter", found, "one, or one for each")
-    if options.test:
-        for name in ("out", "gel", "start", "unit"):
-            if getattr(options, name) is not None:
+    for name in ("out", "gel", "start", "unit") if options.test else ("json", "sheet", "preset"):
+        if getattr(options, name) is not None:
+            if options.test:
                 raise TactileError(f"--{name}", "given with --test", "one or the other")
-        for path in (options.json, options.sheet):
-            if path is not None:
-                atomic.claim(path)
+            raise TactileError(f"--{name}", "given without --test", "a trial", "Name a calibration: --test FILE")
+    if options.test:
         if options.json is not None and options.json == options.sheet:
             raise TactileError("--json and --sheet", options.json, "two files")
         return
-    for name in ("json", "sheet", "preset"):
-        if getattr(options, name) is not None:
-            raise TactileError(f"--{name}", "given without --test", "a trial", "Name a calibration: --test FILE")
     if options.out is None or options.ball_diameter is None:
         missing = "--out" if options.out is None else "--ball-diameter"
         raise TactileError(missing, "missing", "a file to write and the ball's diameter in mm", "Or try one: --test")
     if _sheet_beside(options.out) == Path(options.out):
         raise TactileError("--out", options.out, "a file to write that ends in .toml: the sheet is the .png beside it")
-    atomic.claim(options.out)
-    atomic.claim(_sheet_beside(options.out))
 
 
 def _millimetres(text: str) -> list[float]:
@@ -119,21 +123,14 @@ def _sheet_beside(out: str) -> Path:
     return Path(out).with_suffix(".png")
 
 
-def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
-    from ...pictures.calibrate.evaluate import rows_of, write_sheet
-    from ...pictures.calibrate.fit import calibrate
-    from ...pictures.calibrate.held_out import check_worth, cross_validated
-    from ...pictures.calibrate.orientation import check_orientation
-    from ...sensors.calibration_file import load_calibration, write_calibration
+def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
+    """Say what a fit found, and write it unless it explains nothing; apart : the held-out presses."""
+    from ...accuracy import HEADER, line
+    from ...files import atomic
+    from ...pictures.calibrate.checked_fit import check_worth
+    from ...pictures.calibrate.evaluate import rows_of, sheet
+    from ...sensors.calibration_file import write_calibration
 
-    start, diameter = load_calibration(options.start, options.gel), 1e-3 * options.ball_diameter[0]
-    with bar("the way the photographs lie", "way", options.progress) as progress:
-        check_orientation(photographs, diameter, start, progress)
-    with bar("trial on held-out presses", "step", options.progress) as progress:
-        apart = cross_validated(photographs, diameter, start, quick=options.quick, progress=progress)
-    with bar("calibrate", "step", options.progress) as progress:
-        name = options.unit or Path(options.out).stem
-        done = calibrate(photographs, diameter, start, unit=name, quick=options.quick, progress=progress)
     for warning in done.warnings:
         say(f"warning: {warning}")
     for each in done.tried:
@@ -143,35 +140,34 @@ def _fit(options: argparse.Namespace, photographs: Photographs) -> int:
     check_worth(apart or done.tried)
     unknown = ", ".join(done.calibration.fit.not_identified)
     say(f"these photographs tell too little of: {unknown}; they stay near the values of --start")
-    write_calibration(options.out, done.calibration)
-    write_sheet(_sheet_beside(options.out), done.tried)
-    _tell_rows(rows_of(done.tried, "presses it was fitted on") + rows_of(apart, "held-out presses, by thirds"))
+    drawn = sheet(done.tried)
+    rows = rows_of(done.tried, "presses it was fitted on")[0] + rows_of(apart, "held-out presses, by thirds")[0]
+    write_calibration(out, done.calibration)
+    atomic.write_bytes(_sheet_beside(out), drawn)
+    tell("\n".join([HEADER, *map(line, rows)]))
     say(f"{'held-out presses' if apart else 'the press'}: {_error(apart or done.tried)}")
-    tell(options.out)
-    following = f"tactile convert touch.csv --out results --calibration {quote(options.out)}"
-    next_step(f"look at {_sheet_beside(options.out)}: photograph, picture, difference; then {following}")
+    tell(out)
+    following = f"tactile convert touch.csv --out results --calibration {quote(out)}"
+    next_step(f"look at {_sheet_beside(out)}: photograph, picture, difference; then {following}")
     return 0
 
 
-def _test(options: argparse.Namespace, photographs: Photographs) -> int:
+def _tell_test(options: argparse.Namespace, tried: list[Evaluation], photographs: Photographs) -> int:
+    """Say what a trial found, and write what is asked for."""
+    from ...accuracy import HEADER, line
     from ...files import atomic
-    from ...pictures.calibrate.evaluate import evaluate_unit, rows_by_press, rows_of, write_sheet
-    from ...sensors.calibration_file import load_calibration
+    from ...pictures.calibrate.evaluate import rows_of, sheet
 
-    calibration = load_calibration(options.test)
-    diameter = calibration.fit.ball_diameter if options.ball_diameter is None else 1e-3 * options.ball_diameter[0]
-    with bar("test", "press", options.progress) as progress:
-        pictures = _pictures(options.preset or TRIED[0])
-        tried = evaluate_unit(calibration, photographs, diameter / 2, pictures=pictures, progress=progress)
     for each in tried:
         for flag in each.flags:
             say(f"warning: {each.press.name}: {flag}")
-    rows = rows_of(tried, photographs.folder.name)
+    drawn = sheet(tried) if options.sheet else b""
+    rows, by_press = rows_of(tried, photographs.folder.name)
     if options.json:
-        atomic.write_json(options.json, rows + rows_by_press(tried))
+        atomic.write_json(options.json, rows + by_press)
     if options.sheet:
-        write_sheet(options.sheet, tried)
-    _tell_rows(rows)
+        atomic.write_bytes(options.sheet, drawn)
+    tell("\n".join([HEADER, *map(line, rows)]))
     say(f"{photographs.folder}: {_error(tried)}")
     for file, held in ((options.json, "the errors of each press"), (options.sheet, "photograph, picture, difference")):
         if file is not None:
@@ -190,23 +186,3 @@ def _error(tried: list[Evaluation]) -> str:
 def _way(mm: float, less: str, more: str) -> str:
     """Say where a press lies along a direction: 1.2 mm left."""
     return f"{abs(mm):.1f} mm {less if mm < 0 else more}"
-
-
-def _pictures(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return the function that draws balls' pictures by a preset; raises TactileError where LLVM is missing."""
-    from ...pictures.calibrate.ball_pictures import FastPictures
-    from ...pictures.calibrate.fit import finishing_trouble
-    from ...pictures.calibrate.mitsuba_pictures import MitsubaPictures
-    from ...pictures.presets import PRESETS
-
-    if preset == TRIED[0]:
-        return FastPictures
-    if trouble := finishing_trouble():
-        raise TactileError("--preset", f"{preset!r}, but {trouble}", "LLVM 18 or newer", "See `tactile doctor`")
-    return MitsubaPictures(PRESETS[preset])
-
-
-def _tell_rows(rows: list[dict]) -> None:
-    from ...accuracy import HEADER, line
-
-    tell("\n".join([HEADER, *map(line, rows)]))

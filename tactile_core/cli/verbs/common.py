@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 NOTHING = "no half file is left"
 RESUMES = "the same command goes on where it stopped"
 
-PRESETS = ("fast", "standard", "quality", "reference")  # of optics.presets, without importing it
+# Of pictures.presets and sensors, without importing them: help is to be quick.
+PRESETS = ("fast", "standard", "quality", "reference")
+SOURCE, TARGET = "biotac", "digit"
 MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 
 
@@ -129,7 +131,7 @@ def target_argument(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--to",
         dest="target",
-        default="digit",
+        default=TARGET,
         metavar="SENSOR",
         help="gel to translate to: any sensor with a gel (docs/extend.md); where the networks do not lead to it, its"
         " displacement is solved by contact mechanics (default: %(default)s)",

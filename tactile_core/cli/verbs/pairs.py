@@ -8,7 +8,7 @@ from shlex import quote
 from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import RESUMES, check_seed, electrodes_argument, progress_argument, seed_argument
+from .common import RESUMES, SOURCE, TARGET, check_seed, electrodes_argument, progress_argument, seed_argument
 
 BRIEF = "simulate the same contacts on two sensors, to train on"
 TEXT = "Simulate random contacts of a scene's indenters on two sensors, at the same force, angle and place on both."
@@ -36,14 +36,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--from",
         dest="source",
-        default="biotac",
+        default=SOURCE,
         metavar="SENSOR",
         help="sensor translated from (default: %(default)s)",
     )
     verb.add_argument(
         "--to",
         dest="target",
-        default="digit",
+        default=TARGET,
         metavar="SENSOR",
         help="gel to translate to (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
     )

@@ -125,7 +125,7 @@ def _graded_skin(sensor: str, footprint: Footprint) -> GradedMesh:
 
 
 # Lines of the skin's grid that a mesh must keep: where the glued part begins and ends, and where the lines' spacing
-# changes (``biotac.angles``, ``tip_rows``, ``trunk_rows``).
+# changes (``SkinShape.angles``, ``tip_rows``, ``trunk_rows``).
 _SKIN_ROW_MARKS = (10, 18, 45, 52)
 _SKIN_COLUMN_MARKS = (9, 12, 52, 55)
 

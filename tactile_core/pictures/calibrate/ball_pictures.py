@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import abc
+import dataclasses
+import os
+from collections.abc import Callable
 
 import numpy as np
 
+from ...errors import TactileError
+from ...files import installed
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
 from ..background import raised_light
 from ..coating_spread import CoatingSpread
 from ..height_map import check_covered
-from ..lamp_light import Lamps
+from ..light import Lamps
+from ..mitsuba.gel_light import GelLight
+from ..mitsuba.variant import llvm_trouble
 from ..perspective import Perspective
+from ..presets import FAST, Preset, preset_named
 from .ball_print import deepest, print_on
 
 WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this short side
@@ -64,7 +72,7 @@ class BallPictures(abc.ABC):
 
 
 class FastPictures(BallPictures):
-    """Draw the pictures of balls by the fast preset of ``shading``."""
+    """Draw the pictures of balls by the fast preset."""
 
     def __init__(self, calibration: Calibration) -> None:
         super().__init__(calibration)
@@ -96,3 +104,62 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
     height, width = values.shape[0] // factor, values.shape[1] // factor
     blocks = values.reshape(height, factor, width, factor, *values.shape[2:])
     return blocks.mean((1, 3), dtype=np.float32)
+
+
+def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
+    """Return what draws units' balls by a preset; raises TactileError for one of Mitsuba's where LLVM is missing."""
+    if preset == FAST:
+        return FastPictures
+    if trouble := missing_mitsuba():
+        raise TactileError("--preset", f"{preset!r}, but {trouble}", "LLVM 18 or newer", "See `tactile doctor`")
+    return MitsubaPictures(preset_named(preset))
+
+
+def missing_mitsuba() -> str:
+    """Describe why pictures cannot be Mitsuba's own; "" where they can."""
+    try:
+        import mitsuba  # noqa: F401
+    except ModuleNotFoundError:
+        return f"Mitsuba is not installed; to install it: {installed.advice('render')}"
+    return llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", ""))
+
+
+class MitsubaPictures:
+    """Render units one after the other by one scene, which LLVM compiles once."""
+
+    def __init__(self, preset: Preset) -> None:
+        self.preset = preset
+        self._light: GelLight | None = None
+
+    def __call__(self, calibration: Calibration) -> BallPictures:
+        """The pictures of a unit; LEDs must shine and the coating scatter."""
+        return _OfUnit(calibration, self)
+
+    def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
+        """Return the radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
+        if self._light is None:
+            self._light = GelLight(unit, self.preset, heights, 0)
+        elif self._light.unit is not unit:
+            try:
+                self._light.change_unit(unit)
+            except TactileError:  # of another kind, as with a LED that has become a point
+                self._light = GelLight(unit, self.preset, heights, 0)
+        return self._light.radiance(heights)
+
+
+class _OfUnit(BallPictures):
+    def __init__(self, calibration: Calibration, maker: MitsubaPictures) -> None:
+        super().__init__(calibration)
+        self._maker, self._facing = maker, calibration.facing.astype(np.float32)
+        self._resting = self._maker.radiance(calibration, self.rest)
+
+    def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
+        """Change (3, H, W) by a press of each LED's light."""
+        heights = self.heights(ball)
+        change = (self._maker.radiance(self.calibration, heights) - self._resting) / self._facing
+        return self.spread(np.moveaxis(change, -1, 0) + self.raised(self._view(heights) - self._view(self.rest)))
+
+
+def working_preset(preset: Preset, factor: int) -> Preset:
+    """Return a preset for pictures smaller by a factor: the bounce on as many places of the gel, or half as many."""
+    return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

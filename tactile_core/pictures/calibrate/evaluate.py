@@ -8,14 +8,12 @@ from __future__ import annotations
 import dataclasses
 import io
 import math
-import os
 from collections.abc import Callable
 
 import numpy as np
 
 from ...accuracy import Row, row
 from ...errors import TactileError
-from ...files import atomic
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .photo_metrics import metrics
@@ -23,7 +21,6 @@ from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Ball, Sight, contact_disc, contact_radius, fit_ball, fitted_light
 
 RADIUS_STARTS = (2 / 3, 1.5)  # of the ball's radius, from which it is searched
-METRICS = ("roi_l1", "roi_psnr", "through_l1", "through_psnr", "roi_ssim", "frame_l1", "lobe_iou", "ball_radius_error")
 BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
@@ -38,7 +35,7 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
-    picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of METRICS; flags : in words
+    picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
     through : (3,) levels of light that comes through the coating where the ball touches it. Metrics of that name are of
         another picture, in which it is fitted as well; all others know nothing of it.
     """
@@ -140,7 +137,7 @@ def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, f
     means = []
     for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]
-        values = {name: np.array([row[name] for row in rows if name in row]) for name in METRICS}
+        values = {name: np.array([row[name] for row in rows if name in row]) for name in TARGETS}
         means.append({name: _mean(value) for name, value in values.items()})
     return means[0], means[1]
 
@@ -154,34 +151,30 @@ LARGEST_SHEET = 20  # presses; more would make a picture that nobody opens
 GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round grey 128
 
 
-def rows_of(tried: list[Evaluation], name: str) -> list[Row]:
-    """Make one row a metric, means over presses; name : of the set of photographs."""
+def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
+    """Make a row a metric, means over presses, and a row a metric and press, with where each ball was found.
+
+    name : of the set of photographs
+    """
     ours, baseline = mean_metrics(tried)
-    rows = []
+    means, by_press = [], []
     for metric, (unit, target, better) in TARGETS.items():
         value, beside = (None if math.isnan(values[metric]) else values[metric] for values in (ours, baseline))
-        if value is None:
-            target = None
-        rows.append(row(metric, value, unit, target, baseline=beside, of=name, at_least=better > 0))
-    return rows
-
-
-def rows_by_press(tried: list[Evaluation]) -> list[Row]:
-    """Make one row a metric and press, and rows of where the ball was found."""
-    rows = []
+        asked = None if value is None else target
+        means.append(row(metric, value, unit, asked, baseline=beside, of=name, at_least=better > 0))
     for each in tried:
-        name = each.press.name
         places = {"right": each.ball.right, "down": each.ball.down, "depth": each.ball.depth}
-        rows += [row(f"press_{what}", 1e3 * value, "mm", of=name) for what, value in places.items()]
+        by_press += [row(f"press_{what}", 1e3 * at, "mm", of=each.press.name) for what, at in places.items()]
         for metric, (unit, _, _) in TARGETS.items():
-            value, beside = each.metrics.get(metric, math.nan), each.baseline.get(metric, math.nan)
-            if math.isfinite(value):
-                rows.append(row(metric, value, unit, baseline=beside if math.isfinite(beside) else None, of=name))
-    return rows
+            value, beside = (values.get(metric) for values in (each.metrics, each.baseline))
+            if value is not None and math.isfinite(value):
+                known = beside if beside is not None and math.isfinite(beside) else None
+                by_press.append(row(metric, value, unit, baseline=known, of=each.press.name))
+    return means, by_press
 
 
-def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
-    """Write each press's photograph, render and difference (twice, on grey) as a PNG; equal input, equal bytes."""
+def sheet(tried: list[Evaluation]) -> bytes:
+    """Draw each press's photograph, render and difference (twice, on grey) as a PNG; equal input, equal bytes."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]
@@ -189,18 +182,18 @@ def write_sheet(path: str | os.PathLike, tried: list[Evaluation]) -> None:
     columns = 1 if len(shown) < 3 else 2
     lines = math.ceil(len(shown) / columns)
     cell = (height + 18, 3 * (width + GAP) + GAP)
-    sheet = Image.new("RGB", (columns * cell[1], lines * cell[0] + 16), "white")
-    draw = ImageDraw.Draw(sheet)
+    drawn = Image.new("RGB", (columns * cell[1], lines * cell[0] + 16), "white")
+    draw = ImageDraw.Draw(drawn)
     draw.text((GAP, 2), f"photograph, render, difference x {MAGNIFIED}", fill="black")
     for k, each in enumerate(shown):
         top, left = 16 + k // columns * cell[0], k % columns * cell[1] + GAP
         difference = 128 + MAGNIFIED * (each.picture.astype(float) - each.press.picture)
         for j, picture in enumerate((each.press.picture, each.picture, difference.clip(0, 255).astype(np.uint8))):
-            sheet.paste(Image.fromarray(picture), (left + j * (width + GAP), top + 14))
+            drawn.paste(Image.fromarray(picture), (left + j * (width + GAP), top + 14))
         metrics, baseline = each.metrics, each.baseline
         text = f"{each.press.name}  {metrics['roi_psnr']:.1f} dB (baseline {baseline['roi_psnr']:.1f})"
         text += f"  {metrics['roi_l1']:.1f} levels (baseline {baseline['roi_l1']:.1f})  {'; '.join(each.flags)}"
         draw.text((left, top), text.encode("ascii", "replace").decode(), fill="black")
     content = io.BytesIO()
-    sheet.save(content, "PNG")
-    atomic.write_bytes(path, content.getvalue())
+    drawn.save(content, "PNG")
+    return content.getvalue()

@@ -6,27 +6,22 @@ On the fast picture first, then on Mitsuba's own, which has the light of one bou
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Callable
 
 import numpy as np
 
 from ...errors import TactileError
-from ...files import installed
 from ...sensors.calibration import AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE, Calibration, Fit
 from ..background import fit_ambient
 from ..height_map import rest_height_map
-from ..mitsuba.variant import llvm_trouble
-from ..presets import QUALITY
-from ..shading import Shader
-from .ball_pictures import BallPictures, FastPictures, working_factor
+from ..presets import FAST, QUALITY
+from ..renderer import Renderer
+from .ball_pictures import BallPictures, FastPictures, MitsubaPictures, missing_mitsuba, working_factor, working_preset
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
 from .levenberg_marquardt import minimise
-from .mitsuba_pictures import MitsubaPictures, working_preset
-from .parameters import FIRST_LED, NAMES, SPREAD, parameters_of
 from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Sight, fit_ball
-from .residuals import GAIN_SPREAD, UnitResiduals
+from .residuals import FIRST_LED, GAIN_SPREAD, NAMES, SPREAD, UnitResiduals, parameters_of
 
 PLACING_STEPS, STEPS, FINISHING_STEPS = 6, 14, 8  # of the search
 TOLERANCE = 1e-3  # a step that gains less than 0.1 % of the cost is noise
@@ -76,7 +71,7 @@ def calibrate(
     whole = fitted_size(dataclasses.replace(start, coating=coating), photographs)
     factor = working_factor(whole.camera.width, whole.camera.height)
     working = whole.at_size(whole.camera.width // factor, whole.camera.height // factor)
-    trouble = "" if quick else finishing_trouble()
+    trouble = "" if quick else missing_mitsuba()
     finish = not quick and not trouble
     total = PLACING_STEPS + 3 * STEPS + finish * FINISHING_STEPS + 1
     search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
@@ -101,7 +96,7 @@ def calibrate(
     balls = {f"{2e3 * press.radius:g}" for press in search.presses if press.radius is not None}
     of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
     note = f"{light}; {len(names)} presses{of}; background {rest}"
-    rest_radiance = Shader(fitted).radiance(rest_height_map(fitted.camera))
+    rest_radiance = Renderer(fitted, FAST).radiance(rest_height_map(fitted.camera))
     degree = AMBIENT_DEGREE if photographs.estimated else PHOTOGRAPHED_DEGREE
     calibration = dataclasses.replace(
         fitted,
@@ -109,7 +104,7 @@ def calibrate(
         ambient=fit_ambient(photographs.background, fitted, rest_radiance, degree),
         photograph="",
         noise=photographs.noise,
-        fit=Fit(note, names, ball_diameter, metrics, errors, (*unknown, *NEVER_IDENTIFIED)),
+        fit=Fit(note, names, (*unknown, *NEVER_IDENTIFIED), ball_diameter, metrics, errors),
     )
     warnings = _warnings(photographs, tried, search.aside)
     if trouble:
@@ -220,15 +215,6 @@ class _Search:
             if error > IDENTIFIED * spread:
                 unknown.append(name)
         return named, tuple(unknown)
-
-
-def finishing_trouble() -> str:
-    """Describe why a fit cannot be finished on Mitsuba's pictures; "" where it can."""
-    try:
-        import mitsuba  # noqa: F401
-    except ModuleNotFoundError:
-        return f"Mitsuba is not installed; to install it: {installed.advice('render')}"
-    return llvm_trouble(os.environ.get("DRJIT_LIBLLVM_PATH", ""))
 
 
 def unexplained_share(sight: Sight, left: float) -> float:

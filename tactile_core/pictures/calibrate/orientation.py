@@ -12,7 +12,8 @@ import numpy as np
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
 from ...sensors.calibration_file import load_calibration
-from ..shading import Shader
+from ..presets import FAST
+from ..renderer import Renderer
 from .ball_pictures import FastPictures, smaller, whole_factor
 from .evaluate import fitted_size
 from .fit import unexplained_share
@@ -117,7 +118,7 @@ def _resting(unit: Calibration) -> list[np.ndarray]:
     known = [unit]
     with contextlib.suppress(TactileError):  # a sensor without a calibration, or of another aspect ratio
         known.append(load_calibration(None, unit.camera.sensor).at_size(unit.camera.width, unit.camera.height))
-    return [Shader(each).background for each in known]
+    return [Renderer(each, FAST).background for each in known]
 
 
 def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int]) -> dict[bool, Calibration]:

@@ -78,10 +78,12 @@ def read_photographs(
     folders: str | os.PathLike | Sequence[str | os.PathLike],
     background: str | os.PathLike | None = None,
     radii: Sequence[float] | None = None,
+    only: list[str] | None = None,
 ) -> Photographs:
     """Read all pictures of folders or videos, by name; without a background photograph it is estimated.
 
     radii : m, of each folder's ball; None where one ball, named to what uses the photographs, pressed all
+    only : names of the presses to keep, see ``chosen``; None for all
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
     pictures to tell the background; ModuleNotFoundError for a video without OpenCV.
     """
@@ -117,7 +119,8 @@ def read_photographs(
         advice = "Give the background with --background, or press harder"
         raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
     untouched = tuple(name for name, press in tried.items() if press is None)
-    return Photographs(folder, presses, rest, background is None, untouched, measured_noise(presses, rest))
+    every = Photographs(folder, presses, rest, background is None, untouched, measured_noise(presses, rest))
+    return every if only is None else chosen(every, only)
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:

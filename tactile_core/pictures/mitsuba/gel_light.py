@@ -9,14 +9,13 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
-from ..direct_light import evened, lookup
-from ..perspective import slopes
+from ..coating_spread import evened
+from ..perspective import lookup, slopes
 from ..presets import Preset
 from .gel_mesh import MM, GelMesh, check_mesh
-from .gel_scene import change_numbers, gel_shape, lamps, plugin_names, walls
+from .gel_scene import NOTHING, Surroundings, change_numbers, gel_shape, lamps, plugin_names, walls
 from .highlights import mirrored, narrow_lobe
 from .led_integrator import DIRECTIONS, bounced, direct, register
-from .surroundings import NOTHING, Surroundings
 from .tracer import MOST_MISSED
 from .variant import LLVM, activate
 from .window import camera_rays

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...sensors.calibration import Calibration
-from ..direct_light import Hits, direct_light, lookup, map_lookup
+from ..light import Surface, open_light
+from ..perspective import lookup, map_lookup
 from ..presets import Gather
 from .gel_mesh import MARGIN
 
@@ -18,7 +19,7 @@ REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole pic
 
 
 def interreflection(
-    height: np.ndarray, direct: np.ndarray, hits: Hits, unit: Calibration, gather: Gather
+    height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
     """Return the radiance (H, W, 3) float32 that the gel's own light adds to what pixels see.
 
@@ -54,15 +55,13 @@ def _on_gel(
 ) -> np.ndarray:
     """Radiance (h, w, 3) of a coarse map of the gel: the picture's inside it, open light on the rim, 0 beyond."""
     camera = unit.camera
-    place = np.stack([*np.meshgrid(right, down), height], -1).astype(np.float32)
-    flat = np.zeros_like(height)
-    rim = Hits.from_slopes(place, flat, flat)
-    radiance = direct_light(rim, None, [np.array([led.position]) for led in unit.leds], unit)
-    outside = np.maximum(np.abs(place[..., 0]) - camera.right[-1], np.abs(place[..., 1]) - camera.down[-1])
+    right, down, flat = right[None, :], down[:, None], np.zeros_like(height)
+    radiance = np.moveaxis(open_light(Surface(right, down, height, flat, flat), unit), 0, -1).copy()
+    outside = np.maximum(np.abs(right) - camera.right[-1], np.abs(down) - camera.down[-1])
     radiance[outside > MARGIN] = 0
     inside = slice(margin, -margin), slice(margin, -margin)
     nearer = 1 / (1 - height[inside] / camera.apparent_height)
-    look_up = map_lookup(place[(*inside, 0)] * nearer, place[(*inside, 1)] * nearer, camera)
+    look_up = map_lookup(right[:, inside[1]] * nearer, down[inside[0]] * nearer, camera)
     radiance[inside] = np.stack([look_up(direct[..., k]) for k in range(3)], -1)
     return radiance
 

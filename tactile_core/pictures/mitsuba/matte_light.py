@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Led
-from ..direct_light import Hits, direct_light
-from ..perspective import slopes
+from ..cast_shadows import bounding_box
+from ..coating_spread import evened
+from ..light import Surface, falling, lambert
+from ..perspective import map_lookup, slopes
 from ..presets import Preset
 from .gel_light import ASIDE
 from .gel_mesh import GelMesh
@@ -34,7 +38,7 @@ class MatteLight:
         height = np.asarray(height_map, np.float32)
         return self.completed(height, *self.direct(height))
 
-    def direct(self, height: np.ndarray) -> tuple[np.ndarray, Hits]:
+    def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
         """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W), and what the first pass saw."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
@@ -43,14 +47,14 @@ class MatteLight:
             total += self._one_pass(number, tilt)[0]
         return total / np.float32(self.preset.passes), first
 
-    def completed(self, height: np.ndarray, direct: np.ndarray, hits: Hits) -> np.ndarray:
+    def completed(self, height: np.ndarray, direct: np.ndarray, hits: Surface) -> np.ndarray:
         """Return the direct light with the preset's other effects: interreflection, and the window's refraction."""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
         return through_window(radiance, hits.height, self.unit) if preset.window else radiance
 
-    def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Hits]:
+    def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Surface]:
         """Direct light (H, W, 3) and what pixels saw."""
         leds, count = self.unit.leds, self.preset.points
         if self.preset.passes == 1:
@@ -60,8 +64,48 @@ class MatteLight:
             shift = (right - 0.5, down - 0.5)
             points = [sphere_points(led, count, turn, depth) for led in leds]
         place, seen = self._tracer.trace(np.concatenate(points), shift)
-        hits = Hits.on_map(place, tilt, self.unit.camera)
+        right, down, height = np.ascontiguousarray(np.moveaxis(place, -1, 0))
+        look_up = map_lookup(right, down, self.unit.camera)
+        hits = Surface(right, down, height, look_up(tilt[0]), look_up(tilt[1]))
         return direct_light(hits, seen, points, self.unit, soften=self.preset.passes == 1), hits
+
+
+def direct_light(
+    hits: Surface, seen: np.ndarray, points: Sequence[np.ndarray], unit: Calibration, *, soften: bool
+) -> np.ndarray:
+    """Return the radiance (H, W, L) float32, levels, of L LEDs on a matte coating.
+
+    seen : (H, W) uint32, a bit a point; points : (n, 3) m of each LED, n <= 8, in the order of the bits
+    soften : even out the steps that few points leave in a shadow's edge, over 3 x 3 pixels
+    """
+    positions, bit = np.array([led.position for led in unit.leds]), 0
+    lit, radiance = lambert(hits, positions), np.empty((*hits.height.shape, len(positions)), np.float32)
+    for k, (facing, cloud) in enumerate(zip(lit.facing, points, strict=True)):
+        part = (seen >> np.uint32(bit)) & np.uint32(2 ** len(cloud) - 1)
+        _dim(facing, hits, part, cloud, soften)
+        level = np.float32(np.square(positions[k]).sum() * unit.facing[k])
+        radiance[..., k] = falling(np.maximum(facing, 0), lit.square[k], lit.length, level)
+        bit += len(cloud)
+    return radiance
+
+
+def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
+    """Cosine times distance of a light's middle becomes, in place, the mean over its points of those that are seen.
+
+    They are so close together that they differ in direction alone: n . (l + d), d from the middle to the point.
+    """
+    every = 2 ** len(cloud) - 1
+    box = bounding_box(seen != every, margin=1)
+    if box is None:
+        return
+    codes = (np.arange(every + 1)[:, None] >> np.arange(len(cloud))) & 1
+    offsets = codes @ (cloud - cloud.mean(0)) / len(cloud)
+    tables = np.column_stack([codes.mean(1), offsets]).astype(np.float32).T
+    share, right, down, above = (table.take(seen[box]) for table in tables)
+    if soften:
+        share, right, down, above = (evened(values) for values in (share, right, down, above))
+    facing[box] *= share
+    facing[box] += above - hits.slope_right[box] * right - hits.slope_down[box] * down
 
 
 def light_points(led: Led, count: int) -> np.ndarray:

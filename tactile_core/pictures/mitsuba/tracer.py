@@ -6,8 +6,9 @@ they agree but for rounding. Never dr.freeze here: with moving vertices it gives
 
 from __future__ import annotations
 
+import abc
 import math
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -20,26 +21,9 @@ BEHIND_MM = 1e3  # nothing of the gel lies farther behind the plane of height ze
 MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
-class Tracer(Protocol):
+class Tracer(abc.ABC):
     """Renderer of one scene in one variant."""
 
-    def load(self, height: np.ndarray) -> None:
-        """Give the gel other heights (H, W) m."""
-
-    def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places (H, W, 3) float32 m that pixels see, and what these see of points (n, 3) m, 1 <= n <= 32.
-
-        shift : pixels to the right and down from each pixel's middle
-        Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front.
-        """
-
-
-def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
-    """Make a scene of a height map (H, W) m in ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
-    return (_LlvmTracer if variant == LLVM else _ScalarTracer)(mesh, height, variant)
-
-
-class _Scene:
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         self.mesh, self.variant = mesh, variant
         self.camera = mesh.camera
@@ -57,14 +41,28 @@ class _Scene:
         return {}
 
     def load(self, height: np.ndarray) -> None:
+        """Give the gel other heights (H, W) m."""
         vertices = self.mesh.vertices(height)
         check_mesh(vertices, self.mesh.faces, self.mesh.count)
         activate(self.variant)
         self.values["gel.vertex_positions"] = vertices.ravel()
         self.values.update()
 
+    @abc.abstractmethod
+    def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places (H, W, 3) float32 m that pixels see, and what these see of points (n, 3) m, 1 <= n <= 32.
 
-class _LlvmTracer(_Scene):
+        shift : pixels to the right and down from each pixel's middle
+        Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front.
+        """
+
+
+def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
+    """Make a scene of a height map (H, W) m in ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
+    return (_LlvmTracer if variant == LLVM else _ScalarTracer)(mesh, height, variant)
+
+
+class _LlvmTracer(Tracer):
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         mi = activate(self.variant)
         import drjit as dr
@@ -94,7 +92,7 @@ class _LlvmTracer(_Scene):
         return direction.reshape(3, -1).astype(np.float32)
 
 
-class _ScalarTracer(_Scene):
+class _ScalarTracer(Tracer):
     """Renderer with one render for the places and one for each point: loops over pixels stay inside Mitsuba."""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:

@@ -15,6 +15,7 @@ from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
 
 ACRYLIC = 3e-3  # m, thickness: assumed
+_SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inverts Snell's law
 
 
 def window_height(camera: Camera) -> float:
@@ -35,9 +36,8 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
-    sine = np.linspace(0, 0.999, 2000)  # of the ray in air
-    in_gel = tangent(sine / index)
-    slope = np.interp(distance, air * tangent(sine) + window_height(camera) * in_gel, in_gel)
+    in_gel = tangent(_SINES / index)
+    slope = np.interp(distance, air * tangent(_SINES) + window_height(camera) * in_gel, in_gel)
     return np.where(slope > 0, distance / np.where(slope > 0, slope, 1), camera.apparent_height)
 
 
@@ -81,9 +81,6 @@ def _catmull_rom(t: np.ndarray) -> list[np.ndarray]:
         0.5 * (t + 4 * t**2 - 3 * t**3),
         0.5 * (t**3 - t**2),
     ]
-
-
-_SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inverts Snell's law
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,8 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ...sensors import ELECTRODES
-from ...sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
+from ...sensors import ELECTRODES, SP, electrode_count
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
@@ -97,13 +96,13 @@ def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: 
         warnings=table.warnings,
         names=names,
         labels=table.labels(electrodes),
-        sensor="biotac_sp",
+        sensor=SP,
         snapshots=snapshots,
     )
 
 
 def _of_finger(style: str, finger: int) -> list[str]:
-    return [style.format(tuple(HAND)[finger], number) for number in range(1, SP_ELECTRODES + 1)]
+    return [style.format(tuple(HAND)[finger], number) for number in range(1, electrode_count(SP) + 1)]
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:

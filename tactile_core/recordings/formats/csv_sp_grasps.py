@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ...sensors import SP
 from ..recording import Recording
 from ..tables.table import Table
 from . import fingers_of, of_finger, share_of_fingers
 
-CONTAINER, SENSOR = "csv", "biotac_sp"
+CONTAINER, SENSOR = "csv", SP
 NAME = "CSV with ff_biotac_1..24, mf_..., th_... of BioTac SPs, a grasp a line"
 STYLE = "{}_biotac_{}"
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from ...sensors import SP
 from ..recording import Recording
 from ..tables.table import Table
 from . import fingers_of, of_finger, share_of_fingers
 
-CONTAINER, SENSOR = "csv", "biotac_sp"
+CONTAINER, SENSOR = "csv", SP
 NAME = "CSV with ff_e1..24 of a BioTac SP, a frame a line"
 STYLE = "{}_e{}"
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...sensors import ELECTRODES, SAMPLE_RATE
-from ...sensors.biotac_sp import ELECTRODES as SP_ELECTRODES
+from ...sensors import ELECTRODES, SAMPLE_RATE, SP, electrode_count
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
 from ..time_stamps import SECONDS
@@ -60,11 +59,12 @@ def _electrodes(table: Table, names: list[str]) -> list[str]:
         if len(inner) != ELECTRODES:
             check_electrodes(table.path, len(inner), names[0])
         return [f"{names[0]}[{place}]" for place in range(ELECTRODES)]
+    of_sp = electrode_count(SP)
     stems = [(found[1], found[3]) for found in map(NUMBERED.match, known) if found]
     for name in names:
         found = NUMBERED.match(name)
-        if found and stems.count((found[1], found[3])) == SP_ELECTRODES:
-            check_electrodes(table.path, SP_ELECTRODES, f"line 1, columns {found[1]}..{found[3]}")
+        if found and stems.count((found[1], found[3])) == of_sp:
+            check_electrodes(table.path, of_sp, f"line 1, columns {found[1]}..{found[3]}")
     return names
 
 

@@ -7,8 +7,8 @@ from tactile_core import sensors
 from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet, film_floor, reduced_sheet, signal_of_gaps
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes
-from tactile_core.sensors import biotac
 
+INNER = sensors.skin_of("biotac").skin_surface("inner").rest
 MIRROR = np.r_[10:16, 6, 8, 7, 9, 0:6, 16:19]  # E1..E6 and E11..E16, E8 and E9 are mirror images (docs/sources.md)
 
 
@@ -16,12 +16,12 @@ def dent(electrode: int, depth: float, width: float = 1.5e-3) -> np.ndarray:
     """Displacement (n_inner, 3) m of the inner skin toward one electrode, a bell ``width`` m wide."""
     feet = electrode_feet()
     place = sensors.electrodes()[electrode] + feet.gap[electrode] * feet.outward[electrode]
-    rest = biotac.skin_surface("inner").rest
+    rest = INNER
     away = np.linalg.norm(rest - place, axis=1)
     return -depth * np.exp(-((away / width) ** 2))[:, None] * feet.outward[electrode]
 
 
-REST = np.zeros((len(biotac.skin_surface("inner").rest), 3))
+REST = np.zeros_like(INNER)
 
 
 def electrode_films(sheet) -> np.ndarray:

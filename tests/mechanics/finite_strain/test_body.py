@@ -6,10 +6,10 @@ import pytest
 from tactile_core.geometry.indenters import Cylinder, Sphere
 from tactile_core.mechanics.finite_strain.body import _footprint, graded_body
 from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.sensors import biotac, digit
+from tactile_core.sensors import biotac_surface, digit_surface
 
 BALL, PLACE = Sphere(3.5e-3), Placement(-5e-3, 1e-3)
-LATTICES = {"digit": digit.gel_surface, "biotac": biotac.skin_surface}
+LATTICES = {"digit": digit_surface, "biotac": biotac_surface}
 
 
 @pytest.mark.parametrize("sensor", LATTICES)

@@ -3,14 +3,16 @@
 import numpy as np
 
 from tactile_core.mechanics.solids.biotac_core import Core, facing_core
-from tactile_core.sensors import biotac
+from tactile_core.sensors import skin_of
+
+SKIN = skin_of("biotac")
 
 
 def on_core(count=200, seed=0):
     """Places on the core's surface under the pad."""
     random = np.random.default_rng(seed)
     x, theta = random.uniform(-17e-3, 4e-3, count), random.uniform(-1.6, 1.6, count)
-    points = np.column_stack([x, biotac.AXIS_Y - 5e-3 * np.cos(theta), 5e-3 * np.sin(theta)])
+    points = np.column_stack([x, SKIN.axis_y - 5e-3 * np.cos(theta), 5e-3 * np.sin(theta)])
     for _ in range(8):
         gap, normal = Core("biotac").distance(points)
         points = points - gap[:, None] * normal
@@ -34,18 +36,18 @@ def test_curvature_is_symmetric_and_bounded():
 
 
 def test_the_smoothed_table_stays_with_the_table():
-    table = biotac.SHAPE.table
+    table = SKIN.table
     row = int(np.argmin(np.abs(table["x"] + 8e-3)))
     theta = table["theta"][np.abs(table["theta"]) < 1.7]
     radius = table["core"][row][np.abs(table["theta"]) < 1.7]
     points = np.column_stack([
-        np.full(len(theta), table["x"][row]), biotac.AXIS_Y - radius * np.cos(theta), radius * np.sin(theta)
+        np.full(len(theta), table["x"][row]), SKIN.axis_y - radius * np.cos(theta), radius * np.sin(theta)
     ])  # fmt: skip
     assert np.sqrt((Core("biotac").distance(points)[0] ** 2).mean()) < 20e-6  # the table's own roughness
 
 
 def test_nodes_that_may_touch_lie_over_the_pad_and_off_the_core():
-    inner = biotac.skin_surface("inner").rest
+    inner = SKIN.skin_surface("inner").rest
     facing = facing_core("biotac", inner)
     gap = Core("biotac").distance(inner[facing])[0]
     assert 0.3 < facing.mean() < 0.7 and gap.min() > 0.1e-3

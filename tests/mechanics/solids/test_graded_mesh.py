@@ -6,10 +6,10 @@ import pytest
 from tactile_core.mechanics.solids import graded_mesh
 from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
 from tactile_core.mechanics.solids.graded_mesh import Footprint
-from tactile_core.sensors import BIOTAC_SKIN, biotac, digit
+from tactile_core.sensors import biotac_surface, describe, digit_surface
 
 GEL, SKIN = Footprint((24, 17), (34, 27)), Footprint((26, 27), (36, 37))
-CASES = {"digit": (GEL, digit.gel_surface), "biotac": (SKIN, biotac.skin_surface)}
+CASES = {"digit": (GEL, digit_surface), "biotac": (SKIN, biotac_surface)}
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -57,7 +57,7 @@ def test_a_refined_mesh_has_eight_times_the_cells_and_the_same_volume(case):
         "digit" if surface.window else "biotac", Footprint(footprint.low, footprint.high, refine=2)
     )
     assert len(twice.mesh.cells) == 8 * len(graded.mesh.cells)
-    volumes = [FiniteStrainSolid(g.mesh, BIOTAC_SKIN, g.pattern).weight.sum() for g in (graded, twice)]
+    volumes = [FiniteStrainSolid(g.mesh, describe("biotac").material, g.pattern).weight.sum() for g in (graded, twice)]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.01)  # coarse cells at the gel's rim cut its corners
 
 

@@ -14,11 +14,10 @@ from pressed_unit import BALL, PLACES, write_photographs
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.pictures.calibrate.evaluate import METRICS, evaluate_unit, mean_metrics
+from tactile_core.pictures.calibrate.evaluate import TARGETS, evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.fit import Calibrated, calibrate
-from tactile_core.pictures.calibrate.parameters import NAMES
 from tactile_core.pictures.calibrate.photographs import chosen, read_photographs
-from tactile_core.pictures.calibrate.residuals import UnitResiduals
+from tactile_core.pictures.calibrate.residuals import NAMES, UnitResiduals
 from tactile_core.sensors.calibration import Calibration, Response
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
@@ -193,7 +192,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     words = ["calibrate", "--test", str(out), *common, "--json", str(rows), "--sheet", str(sheet)]
     assert main(words) == 0
     written = {row["name"]: row for row in json.loads(rows.read_text()) if row["set"] == folder.name}
-    assert set(written) == set(METRICS)
+    assert set(written) == set(TARGETS)
     assert written["roi_l1"]["value"] < 2 < written["roi_l1"]["baseline"]
     assert written["ball_radius_error"]["value"] < 0.03
     assert sheet.exists()

@@ -16,7 +16,7 @@ from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.calibrate.orientation import TURNS, Way, check_orientation
 from tactile_core.pictures.calibrate.photographs import Photographs, press_of, read_photographs
 from tactile_core.pictures.calibrate.press_fit import fit_ball
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
 ALL = [Way(*turn, colours) for turn, colours in itertools.product(TURNS, (False, True))]
@@ -74,7 +74,7 @@ def test_lights_that_stand_opposite_are_told_apart_by_the_untouched_gel(tmp_path
     """Exchange red and blue of a start of round numbers and mirror it top to bottom: the same prints."""
     start = load_calibration(request.config.rootpath / "scenes/calibrations/start_gelsight_mini.toml")
     unit = load_calibration(None, "gelsight_mini").at_size(80, 60)
-    rest = Shader(unit).background
+    rest = Renderer(unit, "fast").background
     picture = np.rint(rest + FastPictures(unit).change((1e-3, 0.5e-3, 0.8e-3, BALL))).clip(0, 255).astype(np.uint8)
     press = press_of("press.png", picture, rest)
     given = changed(Photographs(tmp_path, (press,), rest, False, (), (0.0,) * 3), way)

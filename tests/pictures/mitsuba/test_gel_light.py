@@ -12,8 +12,8 @@ from tactile_core.errors import TactileError
 from tactile_core.files.exr_file import read_exr
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_light import GelLight
+from tactile_core.pictures.mitsuba.gel_scene import NOTHING, Lamp, Occluder, Surroundings
 from tactile_core.pictures.mitsuba.scene_file import square_pixels, write_scene
-from tactile_core.pictures.mitsuba.surroundings import NOTHING, Lamp, Occluder, Surroundings
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.presets import QUALITY, REFERENCE, STANDARD
 from tactile_core.sensors.calibration import Coating

@@ -18,7 +18,7 @@ from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.perspective import slopes
 from tactile_core.pictures.presets import REFERENCE, STANDARD, Gather
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration import Coating
 
 UNBOUNCED = dataclasses.replace(STANDARD, gather=None)
@@ -192,7 +192,7 @@ def test_fast_is_the_reference_within_half_a_level_on_ten_random_contacts(any_va
     unit = plain_unit().at_size(120, 160)
     rest = rest_height_map(unit.camera)
     few = dataclasses.replace(DIRECT, passes=6 if any_variant == LLVM else 2)
-    reference, shader = MatteLight(unit, few, any_variant, rest, 0), Shader(unit, rest=rest)
+    reference, shader = MatteLight(unit, few, any_variant, rest, 0), Renderer(unit, "fast", rest=rest)
     resting = reference.radiance(rest), shader.radiance(rest)
     random = np.random.default_rng(zlib.crc32(b"ten random contacts"))
     squares = []

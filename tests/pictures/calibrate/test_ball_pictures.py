@@ -8,9 +8,8 @@ from gel_pictures import works
 from plain_unit import plain_unit
 from pressed_unit import BALL, GREY, PLACES
 
-from tactile_core.pictures.calibrate.ball_pictures import FastPictures
+from tactile_core.pictures.calibrate.ball_pictures import FastPictures, MitsubaPictures
 from tactile_core.pictures.calibrate.fit import calibrate
-from tactile_core.pictures.calibrate.mitsuba_pictures import MitsubaPictures
 from tactile_core.pictures.calibrate.photographs import Photographs, press_of
 from tactile_core.pictures.mitsuba.variant import LLVM
 from tactile_core.pictures.presets import QUALITY, STANDARD

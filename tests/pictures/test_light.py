@@ -8,7 +8,7 @@ from plain_unit import LEDS, LEVELS, plain_unit
 
 from tactile_core.errors import TactileError
 from tactile_core.pictures.height_map import rest_height_map
-from tactile_core.pictures.shading import Shader
+from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.camera import Led
 
 UNIT = plain_unit()
@@ -86,7 +86,7 @@ def brute_force(press: Press, right: np.ndarray, down: np.ndarray, led: Led, poi
 )
 def test_shadows_against_brute_force(depth: float, right: float, down: float, allowed: float) -> None:
     press = Press(depth, right, down)
-    shader = Shader(UNIT, rest=press.rest(RIGHT), background=GREY)
+    shader = Renderer(UNIT, "fast", rest=press.rest(RIGHT), background=GREY)
     fast = shader.radiance(press.height(RIGHT, DOWN))
     near = np.hypot(RIGHT - right, DOWN - down) < np.sqrt(2 * press.ball * depth) + 3e-3
     near[np.indices(near.shape).sum(0) % 7 != 0] = False  # every seventh pixel is enough
@@ -98,10 +98,10 @@ def test_shadows_against_brute_force(depth: float, right: float, down: float, al
 def test_undeformed_gel_that_shadows_itself_is_bit_equal_too() -> None:
     ridge = 1.0e-3 * np.exp(-((RIGHT / 0.8e-3) ** 2))
     low = tuple(dataclasses.replace(led, position=(*led.position[:2], 2.5e-3)) for led in DIGIT_LEDS)
-    shader = Shader(plain_unit(leds=low), rest=ridge, background=GREY)
+    shader = Renderer(plain_unit(leds=low), "fast", rest=ridge, background=GREY)
     np.testing.assert_array_equal(shader(ridge), GREY)
     # The ridge is there: without it the far side of the picture is brighter.
-    free = Shader(plain_unit(leds=low), rest=FLAT, background=GREY).radiance(FLAT)
+    free = Renderer(plain_unit(leds=low), "fast", rest=FLAT, background=GREY).radiance(FLAT)
     assert (free - shader.radiance(ridge))[..., 0].max() > 0.05 * LEVELS
 
 
@@ -109,7 +109,7 @@ def test_tilted_plane_is_lambert() -> None:
     led = Led("red", (9e-3, -3e-3, 9e-3), 1e-7, 1.0)
     plane = 0.2 * RIGHT - 0.1 * DOWN
     unit = plain_unit(leds=(led, *LEDS[1:]))
-    radiance = Shader(unit, rest=FLAT, background=GREY).radiance(plane)
+    radiance = Renderer(unit, "fast", rest=FLAT, background=GREY).radiance(plane)
     # The plane h = a . q s, s = 1 - h / H, is seen at s = 1 / (1 + a . q / H).
     near = 1 / (1 + plane / DIGIT_CAMERA.apparent_height)
     to_light = np.stack([9e-3 - RIGHT * near, -3e-3 - DOWN * near, 9e-3 - plane * near], -1)
@@ -121,7 +121,7 @@ def test_tilted_plane_is_lambert() -> None:
 
 
 def test_deeper_changes_more_and_pictures_stay_in_range() -> None:
-    shader = Shader()
+    shader = Renderer(preset="fast")
     changes = []
     for depth in (0.1e-3, 0.4e-3, 1.6e-3):
         press = Press(depth, 0.0, 0.0)
@@ -141,14 +141,14 @@ NAN = np.where(np.indices(DIGIT_CAMERA.shape).sum(0) == 9, np.nan, 0)
 )  # fmt: skip
 def test_bad_shader_is_refused(options: dict, where: str) -> None:
     with pytest.raises(TactileError, match=where):
-        Shader(**options)
+        Renderer(preset="fast", **options)
 
 
 @pytest.mark.parametrize("corner", [(0, 0), (0, -1), (-1, 0), (-1, -1)])
 def test_press_at_a_corner_changes_the_picture_there_alone(corner: tuple[int, int]) -> None:
     height = FLAT.copy()
     height[corner] = 0.3e-3
-    change = np.abs(Shader(UNIT, rest=FLAT, background=GREY)(height).astype(int) - 128).max(-1)
+    change = np.abs(Renderer(UNIT, "fast", rest=FLAT, background=GREY)(height).astype(int) - 128).max(-1)
     assert change[corner] > 20
     away = np.hypot(RIGHT - RIGHT[corner], DOWN - DOWN[corner]) > 1.5e-3  # a needle of 0.3 mm, lights at 20 degrees
     assert not change[away].any()

@@ -1,0 +1,185 @@
+"""Light of small LEDs on the gel that a camera sees: Lambert's cosine over the square of distance, and cast shadows.
+
+The one law of light for every picture: the fast one and calibrations see the gel in perspective, Mitsuba's rays without
+LLVM and the untouched gel at places in space. Any number of LEDs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ..files.compiled import Loop, available
+from ..sensors.calibration import Calibration
+from ..sensors.camera import Camera, Led
+from .cast_shadows import ShadowCaster, bounding_box, disc_share
+from .perspective import Perspective, slopes
+
+# A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
+# differences that slopes are made of.
+TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
+
+Box = tuple[slice, slice]  # rows and columns of pixels
+
+
+class Surface(NamedTuple):
+    """Gel that pixels see, float32: at places (right s, down s, height), image frame, m, where s = 1 - height inverse.
+
+    right : (1, W) or (H, W), down : (H, 1) or (H, W), height : (H, W), m
+    slope_right, slope_down : (H, W), of the height over right and down: the normal is along (-slopes, tilt), where
+        tilt = s - (right, down) . slopes inverse (from h(q) = height(q s))
+    inverse : 1/m, of the camera's apparent height, where right and down are those at which it sees the places; else 0
+    """
+
+    right: np.ndarray
+    down: np.ndarray
+    height: np.ndarray
+    slope_right: np.ndarray
+    slope_down: np.ndarray
+    inverse: np.float32 = np.float32(0)
+
+    @classmethod
+    def in_perspective(cls, view: Perspective, height: np.ndarray) -> Surface:
+        """Return the surface whose heights (H, W) m the pixels of a camera see."""
+        return cls(view.right, view.down, height, *slopes(height, view.camera), view.inverse)
+
+
+class Lit(NamedTuple):
+    """Light of L LEDs on a surface, nothing in their way, float32.
+
+    near, tilt, length : (H, W), s and the third component and the length of the normal, see ``Surface``
+    facing : (L, H, W) m, cosine times distance times the normal's length
+    square : (L, H, W) m2, of the distance; light : (L, H, W), relative to a coating that faces the LED at the origin
+    """
+
+    near: np.ndarray
+    tilt: np.ndarray
+    length: np.ndarray
+    facing: np.ndarray
+    square: np.ndarray
+    light: np.ndarray
+
+
+def lambert(surface: Surface, positions: np.ndarray) -> Lit:
+    """Return the light of LEDs at positions (L, 3) m, image frame, by Lambert's law and the inverse square."""
+    strengths = np.square(positions).sum(-1).astype(np.float32)
+    places = np.asarray(positions, np.float32)
+    right, down, height, slope_right, slope_down, inverse = surface
+    if available() and len(right) == 1:
+        row, column = np.ascontiguousarray(right[0]), np.ascontiguousarray(down[:, 0])
+        return Lit(*_lambert_loop(row, column, height, slope_right, slope_down, inverse, places, strengths))
+    near = 1 - height * inverse
+    outward = right * slope_right
+    outward += down * slope_down
+    tilt = near - outward * inverse
+    # Of the cosine: normal . (LED - place) = tilt LED_up - slopes . LED + own
+    own = outward * near
+    own -= tilt * height
+    length = np.sqrt(slope_right**2 + slope_down**2 + tilt**2)
+    from_origin = near**2 * (right**2 + down**2) + height**2
+    facing, squares, light = np.empty((3, len(places), *height.shape), np.float32)
+    for (aside, ahead, up), strength, faces, square, lit in zip(places, strengths, facing, squares, light, strict=True):
+        np.multiply(right * aside + down * ahead, near, out=square)
+        square += up * height
+        square *= -2
+        square += from_origin
+        square += strength
+        np.multiply(up, tilt, out=faces)
+        faces -= aside * slope_right
+        faces -= ahead * slope_down
+        faces += own
+        lit[:] = falling(np.maximum(faces, 0), square, length, strength)
+    return Lit(near, tilt, length, facing, squares, light)
+
+
+def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
+    """Return the light of one LED, ``strength`` m2 its squared distance from the origin; else as in ``Lit``."""
+    return facing / (square * np.sqrt(square) * length) * strength
+
+
+def open_light(surface: Surface, unit: Calibration) -> np.ndarray:
+    """Return the radiance (L, H, W) float32, levels, of a unit's LEDs on its coating, nothing in their way."""
+    light = lambert(surface, np.array([led.position for led in unit.leds])).light
+    light *= unit.facing.astype(np.float32)[:, None, None]
+    return light
+
+
+class Lamps:
+    """The LEDs of one camera's gel. Raises TactileError for those that ``ShadowCaster`` refuses."""
+
+    def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
+        self._casters = [ShadowCaster(camera, led) for led in leds]
+        self._positions = np.array([led.position for led in leds])
+
+    def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
+        """Return the light (L, H, W) float32, with shadows, on heights (H, W) m that pixels see; relative as ``Lit``'s.
+
+        An LED's shadows are soft: it is as wide as its radius.
+        """
+        surface = Surface.in_perspective(view, height)
+        lit, mapped = lambert(surface, self._positions), None
+        for k, caster in enumerate(self._casters):
+            edge = bounding_box(lit.facing[k] < np.float32(TANGENT * caster.led.radius) * lit.length, TANGENT_MARGIN)
+            if edge is not None:
+                mapped = height / lit.near if mapped is None else mapped
+                _cast_shadow(caster, lit, k, height, mapped, edge)
+        return lit.light
+
+
+def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, mapped: np.ndarray, edge: Box) -> None:
+    """Darken the light of LED k where gel of heights (H, W) m stands in its way; edge : where that may begin.
+
+    Of its disc the part above the horizon shines. With l the vector to the LED and e the unit vector upward across it,
+    that part's centre is l + radius moment / share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan
+    distance).
+    mapped : (H, W) m, the field on which shadows are cast, see ``cast_shadows``
+    """
+    sight, box = caster.sight(mapped, edge)
+    facing, square = lit.facing[k][box], lit.square[k][box]
+    share, moment = disc_share(sight)
+    above = caster.led.position[2] - height[box]
+    moment *= lit.tilt[box] * square - above * facing
+    moment *= np.float32(caster.led.radius) / np.sqrt((square - above**2) * square)
+    share *= facing
+    share += moment
+    strength = np.float32(np.square(caster.led.position).sum())
+    lit.light[k][box] = falling(np.maximum(share, 0, out=share), square, lit.length[box], strength)
+
+
+@Loop
+def _lambert_loop(right, down, height, slope_right, slope_down, inverse, position, strength):  # noqa: ANN001, ANN202
+    """Compute the fields of ``Lit`` as ``lambert`` does; right : (W,), down : (H,), position : (L, 3)."""
+    rows, columns = height.shape
+    one, zero, two = np.float32(1), np.float32(0), np.float32(-2)
+    near, tilt = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
+    length, shape = np.empty((rows, columns), np.float32), (len(position), rows, columns)
+    facing, distance, light = np.empty(shape, np.float32), np.empty(shape, np.float32), np.empty(shape, np.float32)
+    own, square = np.empty(columns, np.float32), np.empty(columns, np.float32)
+    for a in range(rows):  # a row stays in the processor's cache; loops without conditions are vectorised
+        for b in range(columns):
+            x, y, high = slope_right[a, b], slope_down[a, b], height[a, b]
+            nearness = one - high * inverse
+            outward = right[b] * x + down[a] * y
+            tilted = nearness - outward * inverse
+            near[a, b], tilt[a, b] = nearness, tilted
+            own[b] = outward * nearness - tilted * high
+            length[a, b] = np.sqrt(x * x + y * y + tilted * tilted)
+            square[b] = nearness * nearness * (right[b] * right[b] + down[a] * down[a]) + high * high
+        for led in range(len(position)):
+            aside, ahead, up = position[led, 0], position[led, 1], position[led, 2]
+            lower = down[a] * ahead
+            for b in range(columns):
+                far = (right[b] * aside + lower) * near[a, b]
+                far += up * height[a, b]
+                far *= two
+                far += square[b]
+                far += strength[led]
+                faces = up * tilt[a, b]
+                faces -= aside * slope_right[a, b]
+                faces -= ahead * slope_down[a, b]
+                faces += own[b]
+                facing[led, a, b], distance[led, a, b] = faces, far
+                light[led, a, b] = max(faces, zero) / (far * np.sqrt(far) * length[a, b]) * strength[led]
+    return near, tilt, length, facing, distance, light
