@@ -209,7 +209,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
         (["--ball-diameter", "6", "--out", "unit.png"], "ends in .toml"),
         (["--ball-diameter", "17", "--out", "unit.toml"], "ball diameter, mm: 17"),
         (["--test", "none.toml", "--ball-diameter", "nan"], "ball diameter, mm: nan"),
-        (["--ball-diameter", "6,17", "--out", "unit.toml"], "ball diameter, mm: 17"),
+        (["larger", "--ball-diameter", "6,17", "--out", "unit.toml"], "ball diameter, mm: 17"),
         (["--ball-diameter", "4,6", "--out", "unit.toml"], "--ball-diameter: 2 diameters, and 1 folders or videos"),
         (["--test", "none.toml", "--json", "same", "--sheet", "same"], "--json and --sheet"),
     ],
