@@ -17,6 +17,7 @@ import numpy as np
 from msgspec import Meta
 
 from ..errors import TactileError
+from ..files import outside
 from ..geometry.indenters import Indenter, MeshIndenter, Pose, Several
 from ..geometry.indenters.scene_form import SceneForm, forms
 
@@ -124,11 +125,7 @@ def _found(folder: pathlib.Path, spec: MeshSpec) -> pathlib.Path:
     names = pathlib.PureWindowsPath(spec.file)
     if names.anchor or ".." in names.parts or "\0" in spec.file:
         raise TactileError(where, repr(spec.file), expected, "Give a name without .. that does not begin with /")
-    try:
-        path = folder.joinpath(*names.parts).resolve(strict=True)
-        base = folder.resolve(strict=True)
-    except (OSError, RuntimeError) as error:  # RuntimeError: links in a circle, before Python 3.13
-        raise TactileError(where, f"{spec.file!r} cannot be read ({error})", expected) from error
-    if not path.is_relative_to(base):
-        raise TactileError(where, f"{spec.file!r} is a link to {path}", expected, "Copy the file")
+    path = outside.inside(folder, "/".join(names.parts), expected)
+    if not path.exists():
+        raise TactileError(where, f"{spec.file!r} is not there", expected)
     return path

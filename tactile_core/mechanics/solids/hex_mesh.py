@@ -87,17 +87,15 @@ def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: 
 
 def inner_faces(mesh: HexMesh) -> np.ndarray:
     """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
-    inner = np.zeros(len(mesh.nodes), bool)
-    inner[mesh.inner] = True
-    faces = mesh.cells[:, :9][inner[mesh.cells[:, :9]].all(axis=1)]
+    faces = mesh.cells[:, :9]
+    faces = faces[np.isin(faces, mesh.inner).all(axis=1)]
     return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
 
 
 def outer_faces(mesh: HexMesh) -> np.ndarray:
     """Quadratic faces (n, 9) of the surface that is touched, node 3 b + a at (xi, eta) = (a, b) - 1."""
-    outer = np.zeros(len(mesh.nodes), bool)
-    outer[mesh.surface] = True
-    return mesh.cells[:, 18:][outer[mesh.cells[:, 18:]].all(axis=1)]
+    faces = mesh.cells[:, 18:]
+    return faces[np.isin(faces, mesh.surface).all(axis=1)]
 
 
 @functools.cache

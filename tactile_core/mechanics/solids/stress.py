@@ -16,9 +16,16 @@ def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
     P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError where a cell is
     turned inside out.
     """
-    return np.concatenate([
-        np.einsum("eqiJ,eqkJ,eq->eqik", piola, f, 1 / j) for piola, f, j in _points(solid, state)
-    ])  # fmt: skip
+    f, j = solid.deformation(state.displacement)
+    if not (j > 0).all():
+        raise FloatingPointError("a cell is turned inside out")
+    p = state.pressure @ solid.linear.T
+    stress = np.empty_like(f)
+    for start in range(0, len(j), _BATCH):
+        part = slice(start, start + _BATCH)
+        piola, _ = solid.law.stress_tangent(f[part], j[part], p[part])
+        stress[part] = np.einsum("eqiJ,eqkJ,eq->eqik", piola, f[part], 1 / j[part])
+    return stress
 
 
 def nodal_force(solid: FiniteStrainSolid, state: State) -> np.ndarray:
@@ -26,21 +33,7 @@ def nodal_force(solid: FiniteStrainSolid, state: State) -> np.ndarray:
 
     Raises what ``cauchy`` raises.
     """
-    size = len(solid.mesh.nodes)
-    piola = np.concatenate([piola for piola, _, _ in _points(solid, state)])
-    force = np.einsum("eq,eqiJ,eqaJ->eai", solid.weight, piola, solid.gradient, optimize=True).reshape(-1, 3)
-    nodes = solid.mesh.cells.ravel()
-    return np.stack([np.bincount(nodes, force[:, k], minlength=size) for k in range(3)], -1)
-
-
-def _points(solid: FiniteStrainSolid, state: State):  # noqa: ANN202 (batches of P, F, J)
-    f, j = solid.deformation(state.displacement)
-    if not (j > 0).all():
-        raise FloatingPointError("a cell is turned inside out")
-    p = state.pressure @ solid.linear.T
-    for start in range(0, len(j), _BATCH):
-        part = slice(start, start + _BATCH)
-        yield solid.law.stress_tangent(f[part], j[part], p[part])[0], f[part], j[part]
+    return solid.linearise(state).internal_force(condensed=False).reshape(-1, 3)
 
 
 def von_mises(stress: np.ndarray) -> np.ndarray:
