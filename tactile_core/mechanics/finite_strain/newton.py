@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-from collections.abc import Callable
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +18,7 @@ from ..first_touch import between
 from ..penetration import BEHIND
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
-from ..solids.sparse_cholesky import DampedFactor, NotPositiveDefiniteError, PatternFactor, held_back
-from . import solved_contact
+from ..solids.sparse_cholesky import DampedFactor, LinearSystem, NotPositiveDefiniteError, PatternFactor, held_back
 from .contact_set import ContactSet, Obstacle, PlacedIndenter
 from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
 from .solved_contact import EXACT, ContactState, NoEquilibriumError, NotConvergedError, Tolerance, guarded
@@ -94,7 +91,7 @@ class FiniteStrainContact:
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
             return dataclasses.replace(touch, steps=0)
-        touch = self._along(touch, self.pose.moved(depth), step / (depth - touch.depth), "a smaller depth")
+        touch = self._follow(touch, self.pose.moved(depth), step / (depth - touch.depth))
         return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
@@ -104,16 +101,8 @@ class FiniteStrainContact:
         """
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
-        touch = self._along(start, pose, step / max(way, turned, 1e-12), "a shorter way, or less force")
+        touch = self._follow(start, pose, step / max(way, turned, 1e-12))
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
-
-    def _along(self, start: ContactState, pose: Pose, step: float, wanted: str) -> ContactState:
-        """Go straight to a pose, in load steps of at most a share ``step`` of the way."""
-        try:
-            return self._follow(lambda part: between(start.pose, pose, part), start, step)
-        except solved_contact.PathEndsError as end:
-            found = f"no equilibrium beyond {end.part:.0%} of the way"
-            raise NoEquilibriumError("finite-strain solver", found, wanted) from None
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve a contact without friction at another pose as ``move`` does, by a way with friction that then fades.
@@ -135,13 +124,13 @@ class FiniteStrainContact:
         rubbed.friction, rubbed._between = friction, None
         return rubbed
 
-    def _follow(self, along: Callable[[float], Pose], start: ContactState, step: float) -> ContactState:
-        """Load steps from ``along(0)``, where ``start`` is solved, to ``along(1)``; a step that fails is halved."""
+    def _follow(self, start: ContactState, pose: Pose, step: float) -> ContactState:
+        """Go straight to a pose, in load steps of at most a share ``step`` of the way; one that fails is halved."""
         touch, done, size, steps, failures = start, 0.0, step, 0, 0
         while done < 1 - 1e-9:
             goal = min(done + size, 1.0)
             try:
-                touch = self._solve(along(goal), touch)
+                touch = self._solve(between(start.pose, pose, goal), touch)
                 done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
             except _FAILURES:
                 steps += 1
@@ -150,7 +139,9 @@ class FiniteStrainContact:
                     continue
                 size, failures = min(size, goal - done) / 2, failures + 1
                 if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
-                    raise solved_contact.PathEndsError(done) from None
+                    found = f"no equilibrium beyond {done:.0%} of the way"
+                    expected = "a shorter way, or less depth or force"
+                    raise NoEquilibriumError("finite-strain solver", found, expected) from None
             else:
                 steps += 1
         return dataclasses.replace(self._stiffened(touch), steps=steps)
@@ -254,7 +245,9 @@ class FiniteStrainContact:
         matrix = pattern.sparse(blocks)
         for values in (residual, swell):
             values[nodes] = np.einsum("nji,nj->ni", frames, values[nodes])
-        system = _System(self._factor.solver(blocks, held), matrix, residual, step, np.where(held, 0.0, swell), excess)
+        system = LinearSystem(
+            self._factor.solver(blocks, held), matrix, residual, step, np.where(held, 0.0, swell), excess
+        )
         step, reaction, rise = self._pull(system, swell, outer)
         for touching in (outer, inner):
             touching.press(reaction[touching.nodes])
@@ -268,7 +261,7 @@ class FiniteStrainContact:
         step[nodes] = np.einsum("nij,nj->ni", frames, step[nodes])
         return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
-    def _pull(self, system: _System, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
+    def _pull(self, system: LinearSystem, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
         """Step (n, 3) m, reactions (n, 3) N and rise of the fluid's pressure, Pa.
 
         swell : (n, 3) m2, gradient of the fluid's volume. Friction follows the normal forces.
@@ -287,22 +280,6 @@ class FiniteStrainContact:
             reaction = system.residual + (system.matrix @ step.ravel()).reshape(-1, 3) - rise * swell
             outer.follow(reaction[outer.nodes])
         return step, reaction, rise
-
-
-class _System(NamedTuple):
-    """Linear system of a Newton step, in the frames of the nodes that touch.
-
-    solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
-    residual : (n, 3) N; prescribed : (n, 3) m, of what is held
-    loose_swell : (n, 3) m2, gradient of the fluid's volume where nothing is held; excess : m3, of the fluid's volume
-    """
-
-    solve: Callable[[np.ndarray], np.ndarray]
-    matrix: Any
-    residual: np.ndarray
-    prescribed: np.ndarray
-    loose_swell: np.ndarray
-    excess: float
 
 
 _FADING = 0.78, 0.3, 0.1, 0.03  # friction that fades, after the fast tier's own (assumed: a third each time)

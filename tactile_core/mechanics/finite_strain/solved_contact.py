@@ -81,11 +81,3 @@ class NoEquilibriumError(TactileError):
 
 class NotConvergedError(Exception):
     """A load step is too large."""
-
-
-class PathEndsError(Exception):
-    """Even a small load step fails; part : of the way that was reached."""
-
-    def __init__(self, part: float) -> None:
-        super().__init__(part)
-        self.part = part

@@ -11,6 +11,7 @@ import os
 import pathlib
 import sys
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -183,3 +184,19 @@ def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     size = np.abs(bending).max(axis=(1, 2))
     most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3
     return bending * np.minimum(1.0, most / np.maximum(size, 1e-30))[:, None, None]
+
+
+class LinearSystem(NamedTuple):
+    """Linear system of a Newton step, in the frames of the nodes that touch.
+
+    solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
+    residual : (n, 3) N; prescribed : (n, 3) m, of what is held
+    loose_swell : (n, 3) m2, gradient of the fluid's volume where nothing is held; excess : m3, of the fluid's volume
+    """
+
+    solve: Callable[[np.ndarray], np.ndarray]
+    matrix: Any
+    residual: np.ndarray
+    prescribed: np.ndarray
+    loose_swell: np.ndarray
+    excess: float
