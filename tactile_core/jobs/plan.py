@@ -17,7 +17,7 @@ from ..sensors import PAIR, SOURCE, TARGET, title
 if TYPE_CHECKING:
     from ..simulation.tier_choice import TierChoice
 
-COSTS, TIERS = shipped("costs.json"), shipped("mechanics_tiers.json")
+COSTS = shipped("costs.json")
 # Once, where matrices are not cached: CPU time measured on one core (AMD EPYC with AVX-512), memory as
 # ``compliance.build`` asks for, and the size of the files.
 BUILD_S, BUILD_MB, MATRICES_MB = {SOURCE: 42.0, TARGET: 18.0}, 2200.0, {SOURCE: 342.0, TARGET: 151.0}
@@ -147,7 +147,9 @@ def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept:
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":
-        tiers = json.loads(TIERS.read_text(encoding="utf-8"))["tiers"]
+        from ..mechanics.error_estimate import measured
+
+        tiers = measured()["tiers"]
         full = costs()["full_ms"][sensor]["rough" if rough else "smooth"]
         ms += full * tiers[choice.tier][sensor]["ms"] / tiers["full"][sensor]["ms"]
     seconds = max(part["start"] - start["start"], 0) + ms * contacts / 1e3
