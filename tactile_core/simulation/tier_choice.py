@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..mechanics.error_estimate import expected_error, measured
 from ..mechanics.fast.compliance import stored
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import DEPTH_LIMIT, Placement
-from ..mechanics.solution import TIERS
+from ..mechanics.solution import TIERS, Tier
 from ..mechanics.solve import solve
 from ..sensors import title
 from .scene import RecordingSpec, load_scene
@@ -26,7 +26,7 @@ class TierChoice(NamedTuple):
     tier : its name; error : um rms, which 95 of 100 contacts stay below; ms : a contact; share : depth reached.
     """
 
-    tier: str
+    tier: Tier
     error: float
     ms: float
     share: float
@@ -64,7 +64,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
     rows = tier_errors(sensor, share)
     what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
     found = rows[0] if bound is None else cheapest(rows, bound, "um", what)
-    return TierChoice(found.name.split()[1], found.error, found.ms, share)
+    return TierChoice(cast(Tier, found.name.split()[1]), found.error, found.ms, share)
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:

@@ -15,6 +15,7 @@ from .common import NOTHING, check_seed, electrodes_argument, error_argument, pr
 
 if TYPE_CHECKING:
     from ...jobs.plan import Plan
+    from ...mechanics.solution import Tier
     from ...simulation.tier_choice import TierChoice
 
 BRIEF = "simulate the recording that a scene describes"
@@ -123,7 +124,7 @@ def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mappin
     return choices, of_scene(options.scene, keep, choices)
 
 
-def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, str]:
+def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier]:
     """Return the tiers within the bound, and print the reason.
 
     Raises TactileError for a long simulation without consent.

@@ -118,10 +118,11 @@ class MeshIndenter(Summary, Indenter):
             array_cache.store(folder, _arrays_of(built, error), _ROOM)
             arrays = _load(folder)
         coefficients, origin, hull, error, stem, stem_place = arrays
-        grid: SplineGrid | TipGrid = SplineGrid(origin, spacing, coefficients)
-        if len(stem):
-            grid = TipGrid(grid, SplineGrid(stem_place[:3], float(stem_place[3]), stem), float(stem_place[4]))
-        return cls(grid, hull, tuple(error.tolist()))
+        fine, rms_and_largest = SplineGrid(origin, spacing, coefficients), (float(error[0]), float(error[1]))
+        if not len(stem):
+            return cls(fine, hull, rms_and_largest)
+        coarse = SplineGrid(stem_place[:3], float(stem_place[3]), stem)
+        return cls(TipGrid(fine, coarse, float(stem_place[4])), hull, rms_and_largest)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``: the spline's value, and the unit normal of its level surface.
@@ -146,10 +147,11 @@ class MeshIndenter(Summary, Indenter):
 
 def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
     """Return what the cache keeps, by its names. stem_place : the coarse grid's origin and spacing, the tip's top"""
-    fine, stem, place = built.grid, np.zeros((0, 0, 0), np.float32), np.zeros(0)
-    if isinstance(fine, TipGrid):
-        coarse = fine.coarse
-        fine, stem, place = fine.fine, coarse.coefficients, np.array([*coarse.origin, coarse.spacing, fine.top])
+    grid, stem, place = built.grid, np.zeros((0, 0, 0), np.float32), np.zeros(0)
+    fine = grid.fine if isinstance(grid, TipGrid) else grid
+    if isinstance(grid, TipGrid):
+        coarse = grid.coarse
+        stem, place = coarse.coefficients, np.array([*coarse.origin, coarse.spacing, grid.top])
     return dict(zip(_ARRAYS, (fine.coefficients, fine.origin, built.hull, error, stem, place), strict=True))
 
 
