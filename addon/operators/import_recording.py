@@ -11,7 +11,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, electrode_markers
 from ..settings import properties
-from ..settings.properties import MOTIONS, POLARITIES, POLARITY_HELP, WEIGHTS_HELP
+from ..settings.properties import MOTIONS, RecordingOptions
 from ..settings.reports import TactileOperator, shown
 from . import recording_data, set_style, view
 
@@ -20,7 +20,7 @@ _APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housi
 LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
 
 
-class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
+class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelper):
     """Import a recording of a BioTac or a BioTac SP as an animated skin with its core and electrodes"""
 
     bl_idname = "tactile.import_recording"
@@ -30,15 +30,6 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
     filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
     filename_ext = ".csv"
     filter_glob: bpy.props.StringProperty(default=SUFFIXES, options={"HIDDEN"})
-    tare: bpy.props.StringProperty(
-        name="Tare", description="Frames without contact as A:B, auto to find them, none to keep the file's own zero",
-        default="auto",
-    )  # fmt: skip
-    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
-    frames: bpy.props.StringProperty(
-        name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
-    )
-    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH")
     first_frame: bpy.props.IntProperty(
         name="First Frame", description="Scene frame on which the recording's frame 0 is put", default=0
     )
@@ -58,7 +49,7 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
         if self.motion == "MESH_CACHE" and not bpy.data.is_saved:
             raise TactileError(path, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
         with shown(context) as progress:
-            found = recording_data.load(path, self.tare, self.frames, progress, self.polarity, self.weights)
+            found = recording_data.load(path, self, progress)
         scene, source = context.scene, found.translator.source
         placed = table_of(source).is_file()
         if placed:
@@ -114,8 +105,9 @@ class TACTILE_OT_import_recording(TactileOperator, ImportHelper):
             skin.location.y -= _APART * skin.tactile.per_metre
         about = skin.tactile
         about.recording = bpy.path.relpath(path) if bpy.data.is_saved else os.path.abspath(path)
-        about.tare, about.frames, about.first_frame = self.tare, self.frames, self.first_frame
-        about.polarity, about.weights = self.polarity, self.weights
+        for name in RecordingOptions.__annotations__:
+            setattr(about, name, getattr(self, name))
+        about.first_frame = self.first_frame
         biotac_objects.add_core(group, skin)
         if placed:
             electrode_markers.add_markers(skin, group, found.signals.change, frames)

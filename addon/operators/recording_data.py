@@ -13,11 +13,11 @@ import numpy as np
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import results
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
-from ...tactile_core.recordings.polarity import AUTO
 from ...tactile_core.translation.translate import PreparedRows, load_translator, translated
 from ...tactile_core.translation.translator import Translation, Translator
 from ...tactile_core.translation.weights import CARD_NAME
 from ..process import recording_reader
+from ..settings.properties import RecordingOptions
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,18 +62,16 @@ def translator_of(weights: str, path: str) -> Translator:
     return _translator(folder, source, changed)
 
 
-def load(
-    path: str, tare: str, frames: str, progress: Callable[[float], None], polarity: str = AUTO, weights: str = ""
-) -> Translated:
+def load(path: str, asked: RecordingOptions, progress: Callable[[float], None]) -> Translated:
     """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
-    known = translator_of(weights, path)
+    known = translator_of(asked.weights, path)
     try:
         changed = os.stat(path).st_mtime_ns
     except OSError:
         changed = 0  # the reader says what is wrong
-    key = (path, changed, tare, frames, polarity, known.sha256)
+    key = (path, changed, asked.tare, asked.frames, asked.polarity, known.sha256)
     if key not in _KEPT:
-        found = _translated(known, path, tare, frames, progress, polarity)
+        found = _translated(known, path, asked, progress)
         _KEPT.clear()
         _KEPT[key] = found
     return _KEPT[key]
@@ -83,19 +81,15 @@ _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating a
 
 
 def _translated(
-    translator: Translator,
-    path: str,
-    tare: str,
-    frames: str,
-    progress: Callable[[float], None],
-    polarity: str,
+    translator: Translator, path: str, asked: RecordingOptions, progress: Callable[[float], None]
 ) -> Translated:
     recording = recording_reader.read(path, translator.source)
     if np.isnan(recording.time).all():
         found, advice = "snapshots, which do not follow each other", "Use `tactile convert --frames-apart`"
         raise TactileError(path, found, "frames in order", advice)
-    chosen = results.select(results.parse_frames(frames), len(recording))
-    options = PrepareOptions(tare=None if tare in ("", "auto") else tare, polarity=polarity)
+    chosen = results.select(results.parse_frames(asked.frames), len(recording))
+    tare = None if asked.tare in ("", "auto") else asked.tare
+    options = PrepareOptions(tare=tare, polarity=asked.polarity)
     rows = PreparedRows(recording, chosen, translator.answer, options)
     translation = translated(translator, rows, chosen, progress)
     return Translated(translator, recording, chosen, rows.read(chosen)[1], translation)

@@ -43,8 +43,7 @@ class TACTILE_OT_translate(JobOperator):
         properties.check_own(skin)
         about = skin.tactile
         with shown(context) as progress:
-            path = bpy.path.abspath(about.recording)
-            found = recording_data.load(path, about.tare, about.frames, progress, about.polarity, about.weights)
+            found = recording_data.load(bpy.path.abspath(about.recording), about, progress)
         own = found.translator.target
         self._skin, self._target = skin.name, self.to.lower() if self.properties.is_property_set("to") else own
         self._found = found

@@ -72,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--preset", default="fast", help="of the pictures (default: fast)")
         verb.add_argument("--error", default="", help="largest error to add: 50um (tier), 0.6levels (preset), or both")
         verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
-        verb.add_argument("--polarity", choices=("auto", "falls", "rises"), default="auto",
+        verb.add_argument("--polarity", choices=[name for name, _, _ in properties.POLARITIES], default="auto",
                           help="of recordings: what counts do where a film thins")  # fmt: skip
         verb.add_argument(
             "--weights",

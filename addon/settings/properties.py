@@ -40,9 +40,6 @@ MOTIONS = (  # numbers as in files of before: 1 was compact keys
 
 
 OF_ROLE = {"BIOTAC": sensors.SOURCE, "DIGIT": sensors.TARGET}  # the sensors of objects that name none
-WEIGHTS_HELP = "Folder of the networks, which name their two sensors; empty: those that ship for the recording's sensor"
-
-POLARITY_HELP = "What the electrodes' counts do where the film over them thins"
 POLARITIES = (
     ("auto", "Automatic", "As the file says, or the recording shows"),
     ("falls", "Falls", "Counts fall, as raw readings of a BioTac do"),
@@ -50,7 +47,26 @@ POLARITIES = (
 )
 
 
-class TactileObject(bpy.types.PropertyGroup):
+class RecordingOptions:
+    """How a recording is read and translated: of the operator that imports it, and kept by its skin."""
+
+    tare: bpy.props.StringProperty(
+        name="Tare", description="Frames without contact as A:B, auto to find them, none to keep the file's own zero",
+        default="auto",
+    )  # fmt: skip
+    polarity: bpy.props.EnumProperty(
+        name="Polarity", description="What the electrodes' counts do where the film over them thins", items=POLARITIES
+    )
+    frames: bpy.props.StringProperty(
+        name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
+    )
+    weights: bpy.props.StringProperty(
+        name="Weights", description="Folder of the networks, which name their two sensors; empty: those that ship for"
+        " the recording's sensor", subtype="DIR_PATH", options=RELATIVE,
+    )  # fmt: skip
+
+
+class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
     """Properties of each object."""
 
     role: bpy.props.EnumProperty(name="Role", description="What this object is to the Tactile add-on", items=ROLES)
@@ -59,11 +75,7 @@ class TactileObject(bpy.types.PropertyGroup):
     recording: bpy.props.StringProperty(
         name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=RELATIVE
     )
-    tare: bpy.props.StringProperty(name="Tare", description="Frames without contact A:B, auto or none", default="auto")
-    polarity: bpy.props.EnumProperty(name="Polarity", description=POLARITY_HELP, items=POLARITIES)
     sensor: bpy.props.StringProperty(name="Sensor", description="Whose skin or gel it is, as its descriptor is named")
-    weights: bpy.props.StringProperty(name="Weights", description=WEIGHTS_HELP, subtype="DIR_PATH", options=RELATIVE)
-    frames: bpy.props.StringProperty(name="Frames", description="Part of the recording, A:B:STEP", default=":")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
     colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")
     spec: bpy.props.StringProperty(

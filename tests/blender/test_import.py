@@ -14,7 +14,8 @@ TOLERANCE = 1e-3  # mm: ten times what float32 rounds coordinates of 30 mm to, t
 
 
 def _translated(part, frames="40:140"):
-    return part("addon.operators.recording_data").load(str(RECORDING), "auto", frames, lambda share: None)
+    asked = SimpleNamespace(tare="auto", polarity="auto", frames=frames, weights="")
+    return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None)
 
 
 def _wanted(part, frame):

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -23,7 +24,8 @@ def gel(imported):
 
 
 def _translation(part):
-    return part("addon.operators.recording_data").load(str(RECORDING), "auto", "40:140", lambda share: None).translation
+    asked = SimpleNamespace(tare="auto", polarity="auto", frames="40:140", weights="")
+    return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None).translation
 
 
 def test_the_gel_moves_as_translated(gel, nodes_of, part):

@@ -26,7 +26,6 @@ from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.simulated_likeness import residual_shares, unlike
 from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translator, contact_center
-from tactile_core.translation.unit_rest import find_rest
 
 from . import fluid_pressure, prints
 from .noise import as_read
@@ -76,7 +75,7 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
              if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
     found += prints.rows("grip", prepared, network)
-    return [*found, fluid_pressure.grip_row(every, network), _unexplained_row(held, prepared), *_rest_rows(files)]
+    return [*found, fluid_pressure.grip_row(every, network), _unexplained_row(held, prepared)]
 
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
@@ -143,31 +142,5 @@ def in_box(place: np.ndarray) -> bool:
     return bool(x.min() - MARGIN <= place[0] <= x.max() + MARGIN and abs(place[1]) <= LARGEST_Z)
 
 
-def _rest_rows(files: list[Path]) -> list[Row]:
-    """Measure the error of rest found in other trials, and with each soft object left out."""
-    soft = [path for path in files if not path.name.startswith(HARD)]
-    names = sorted({_object(path) for path in soft})
-    for finger, _ in enumerate(each_finger(soft[0])):
-        levels = {path: recordings.read(f"{path}#{finger}") for path in soft}
-        rest = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING])
-        later = find_rest([levels[path] for path in soft if _trial(path) in REPORTING])
-        yield _rest_row(f"rest_finger{finger}_other_trials", later.counts - rest.counts, rest.spread)
-        for name in names:
-            rest = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING])
-            left = find_rest([levels[path] for path in soft if _trial(path) in CHOOSING and _object(path) != name])
-            yield _rest_row(f"rest_finger{finger}_without_{name}", left.counts - rest.counts, rest.spread)
-
-
-def _rest_row(name: str, off: np.ndarray, spread: np.ndarray) -> Row:
-    worst = int(np.abs(off).argmax())
-    by_channel = " ".join(f"{value:.0f}" for value in off)
-    of = f"largest at E{worst + 1}, whose spread is reported as {spread[worst]:.0f}; E1 to E19: {by_channel}"
-    return row(name, float(np.sqrt(np.mean(off**2))), "counts rms", of=of)
-
-
 def _trial(path: Path) -> str:
     return path.stem.split("_")[-2]
-
-
-def _object(path: Path) -> str:
-    return "_".join(path.stem.split("_")[:-3])
