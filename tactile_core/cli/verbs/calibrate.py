@@ -78,7 +78,8 @@ def run(options: argparse.Namespace) -> int:
     diameters = [1e-3 * mm for mm in options.ball_diameter or ()]
     radii = [each / 2 for each in diameters] if len(diameters) > 1 else None
     only = None if options.only is None else [name.strip() for name in options.only.split(",")]
-    with bar("test" if options.test else "calibrate", "%", options.progress) as progress:
+    work, unit_of_work = ("test", "press") if options.test else ("calibrate", "%")
+    with bar(work, unit_of_work, options.progress) as progress:
         for diameter in diameters:
             check_diameter(diameter)
         unit = load_calibration(options.test or options.start, options.gel)

@@ -14,8 +14,7 @@ from ..perspective import lookup, slopes
 from ..presets import Preset
 from .gel_mesh import MM, GelMesh, check_mesh
 from .gel_scene import NOTHING, Surroundings, change_numbers, gel_shape, lamps, plugin_names, walls
-from .highlights import mirrored, narrow_lobe
-from .led_integrator import DIRECTIONS, bounced, direct, register
+from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe, register
 from .tracer import MOST_MISSED
 from .variant import LLVM, activate
 from .window import camera_rays

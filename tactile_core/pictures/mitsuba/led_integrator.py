@@ -3,6 +3,11 @@
 It asks the scene's emitters and materials, so whatever shines or is painted takes part; Mitsuba's path integrator,
 given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and
 nothing in the way, their mean is exact. Nothing here is random.
+
+Light that a glossy coating mirrors onto other gel is followed forward from where it is mirrored. Beside a print's rim,
+gel is lit by the highlights of the flank above it. They are narrow, and directions that a place looks into miss them;
+from the flank they are easily followed. What an LED's light does near the mirror's direction is counted by ``mirrored``
+(half vectors within the lobe), all else by ``bounced``: each path once.
 """
 
 from __future__ import annotations
@@ -13,13 +18,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...sensors.calibration import DIFFUSE, PRINCIPLED, Coating
+
 NAME = "tactile_leds"
 RING = 0.5  # share of a sphere's solid angle inside the ring
 RINGS, SPOKES = 4, 4  # directions of light that arrives by a bounce: even in solid angle, as most of it comes in low
 DIRECTIONS = RINGS * SPOKES
 
 
-class Lit(NamedTuple):
+class EmitterLight(NamedTuple):
     """Light of one emitter: its unoccluded radiance, and the share that arrives."""
 
     open: Any
@@ -28,7 +35,7 @@ class Lit(NamedTuple):
 
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
-) -> list[Lit]:
+) -> list[EmitterLight]:
     """Compute the light of each emitter at surface interactions, by a number of points on the emitter.
 
     scene : what stands in the way; phase : 0..1, turns the points, in shares of their distance
@@ -51,7 +58,7 @@ def direct(
             free += light
             arrived += dr.select(blocked, 0, light)
         share = dr.select(dr.sum(free) > 0, dr.sum(arrived) / dr.sum(free), 0)
-        found.append(Lit(free, share))
+        found.append(EmitterLight(free, share))
     return found
 
 
@@ -103,3 +110,88 @@ def register(mi: Any, variant: str) -> None:
             return f"LedIntegrator[points={self.points}]"
 
     mi.register_integrator(NAME, LedIntegrator)
+
+
+NARROW = 0.2  # GGX's alpha: wider lobes are as wide as the bounce's directions lie apart
+REACH = 2.0  # of a lobe, in alpha, as the tangent of the half vector's angle: 80 % of its facets
+STEEPEST = 0.05  # least share of a pixel's surface that faces the camera
+
+
+def narrow_lobe(coating: Coating) -> tuple[float, float] | None:
+    """GGX's alpha of a coating's highlights and the cosine at their lobe's end; None where they are wide or absent."""
+    alpha = coating.roughness**2 if coating.bsdf == PRINCIPLED else coating.roughness
+    if coating.bsdf == DIFFUSE or alpha > NARROW:
+        return None
+    return alpha, float(1 / np.hypot(1, REACH * alpha))
+
+
+def mirrored(
+    mi: Any,
+    meet: Callable[[Any], Any],
+    scene: Any,
+    emitters: Sequence[Any],
+    hit: Any,
+    phase: Any,
+    lobe: tuple[Any, Any],
+    camera_height: Any,
+    to_cell: Callable[[Any], Any],
+    shape: tuple[int, int],
+) -> np.ndarray:
+    """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
+
+    hit : the places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
+    phase : 0..1 of each, turns its directions; lobe : alpha, and the cosine at its end
+    camera_height : mm; to_cell : where (column, row) the camera sees a point
+    """
+    import drjit as dr
+
+    number = mi.Float(dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS)
+    ring = dr.floor(number / SPOKES)
+    turned = (number - SPOKES * ring + phase + ring / RINGS) / SPOKES
+    square = mi.Point2f((ring + phase) / RINGS, turned - dr.floor(turned))
+    facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, lobe[0], True)
+    material, context = hit.bsdf(), mi.BSDFContext()
+    found = []
+    for emitter in emitters:
+        toward, weight = emitter.sample_direction(hit, mi.Point2f(RING, (number + phase) / DIRECTIONS), True)
+        arriving = hit.to_local(toward.d)
+        facet, density = facets.sample(arriving, square)
+        leaving, density = mi.reflect(arriving, facet), density / (4 * dr.dot(arriving, facet))
+        counts = hit.is_valid() & (arriving.z > 0) & (leaving.z > 0) & (facet.z >= lobe[1]) & (density > 0)
+        seen = mi.SurfaceInteraction3f(hit)
+        seen.wi = leaving
+        power = material.eval(context, seen, arriving) * weight * leaving.z / (density * DIRECTIONS)
+        ray = hit.spawn_ray(hit.to_world(leaving))
+        ray.maxt = dr.select(counts, ray.maxt, 0)
+        far = meet(ray)
+        counts &= far.is_valid() & (far.wi.z > 0)
+        counts &= ~scene.ray_test(hit.spawn_ray_to(toward.p), counts)
+        incoming = mi.Vector3f(far.wi)  # a copy: the next line writes over it
+        far.wi = far.to_local(dr.normalize(mi.Point3f(0, 0, camera_height) - far.p))
+        shown = far.bsdf().eval(context, far, incoming) / dr.maximum(incoming.z, 1e-3)
+        # Surface in a cell: larger where it is farther from the camera or steep.
+        areas = dr.square((camera_height - hit.p.z) / (camera_height - far.p.z))
+        areas *= dr.maximum(far.sh_frame.n.z, STEEPEST) / dr.maximum(hit.sh_frame.n.z, STEEPEST)
+        found.append((to_cell(far.p), dr.select(counts, power * shown * areas, 0)))
+    dr.eval(*[part for pair in found for part in pair])
+    return sum((_deposited(np.array(cell), np.array(light), shape) for cell, light in found), np.zeros((*shape, 3)))
+
+
+def _deposited(cell: np.ndarray, light: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Light (3, n) summed over (h, w, 3), each shared among the four cells round its (column, row) of cell (2, n).
+
+    In numpy, where sums have one order: Mitsuba's threads would add in another each time.
+    """
+    some = light.any(0)
+    light, (column, row) = light[:, some], cell[:, some]
+    left, upper = np.floor(column).astype(int), np.floor(row).astype(int)
+    total = np.zeros((3, shape[0] * shape[1]))
+    for right in (0, 1):
+        for down in (0, 1):
+            share = (1 - np.abs(column - left - right)) * (1 - np.abs(row - upper - down))
+            at_row, at_column = upper + down, left + right
+            inside = (at_row >= 0) & (at_row < shape[0]) & (at_column >= 0) & (at_column < shape[1])
+            at = (at_row * shape[1] + at_column)[inside]
+            for band in range(3):
+                total[band] += np.bincount(at, (light[band] * share)[inside], total.shape[1])
+    return total.T.reshape(*shape, 3)

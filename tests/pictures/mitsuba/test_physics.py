@@ -13,8 +13,7 @@ from plain_unit import LEVELS, plain_unit
 from tactile_core.accuracy import order
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.mitsuba.gel_mesh import MM, GelMesh
-from tactile_core.pictures.mitsuba.interreflection import irradiance
-from tactile_core.pictures.mitsuba.matte_light import MatteLight
+from tactile_core.pictures.mitsuba.matte_light import MatteLight, irradiance
 from tactile_core.pictures.mitsuba.variant import LLVM, activate
 from tactile_core.pictures.perspective import slopes
 from tactile_core.pictures.presets import REFERENCE, STANDARD, Gather
