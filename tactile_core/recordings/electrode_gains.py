@@ -20,6 +20,7 @@ from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
 from .answers import unanswered
 from .fingers import FINGERS, short_of
 from .signals import Rest, Signals, doubt_law
+from .unit import film
 
 FORMAT = "tactile-sensor-2"
 OLD_FORMAT = "tactile-sensor-1"  # its offsets were of counts that rise where a film thins
@@ -35,6 +36,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     gain : counts a count; offset_counts : counts; note : how it was made
     rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
         single recordings; rest_pdc : counts
+    film : thickness of its fluid film over a typical unit's, where known
     """
 
     note: str
@@ -43,6 +45,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     rest_counts: Row | None = None
     rest_spread_counts: Row | None = None
     rest_pdc: float | None = None
+    film: float | None = None
 
     def rest(self) -> Rest | None:
         """Return the unit's rest in the form that `prepare` takes."""
@@ -154,6 +157,9 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
                 if not least <= value <= most:  # false for nan
                     place = f"{where}, {name}.{field}, E{electrode}"
                     raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
+        if section.film is not None and not film.LEAST <= section.film <= film.MOST:
+            found, expected = f"{section.film:g}", f"{film.LEAST:g} to {film.MOST:g} of a typical unit's"
+            raise TactileError(f"{where}, {name}.film", found, expected, ADVICE)
         if section.rest_pdc is not None and not 0 <= section.rest_pdc <= COUNT_MAX:
             raise TactileError(f"{where}, {name}.rest_pdc", f"{section.rest_pdc:g}", f"0 to {COUNT_MAX:g}", ADVICE)
 
@@ -163,7 +169,8 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
     head: tuple[str, ...] = (
         f"A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
-        "gain in counts a count, all else in counts. Used by: tactile convert RECORDING --sensor THIS_FILE",
+        "gain in counts a count, film over a typical unit's, all else in counts. Used by: tactile convert RECORDING",
+        "--sensor THIS_FILE",
     )
     if typical_rest(sensor.sensor) is None:
         head = (f"Rest of a {name}, E1 to {last}, in counts. Used by: tactile info RECORDING --sensor THIS_FILE",)

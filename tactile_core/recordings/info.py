@@ -76,6 +76,7 @@ def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, s
         ("polarity", f"{report['polarity']}: {report['polarity_evidence']}"),
         ("tare", f"{report['quiet_evidence']}{_parts(recording, signals)}"),
         ("drift", _drift(signals)),
+        *_film(signals),
         (
             "suspicious",
             f"{report['samples_glitch']} glitch samples, {report['samples_interpolated']} unreadable samples"
@@ -139,6 +140,15 @@ def _drift(signals: Signals) -> str:
         return "not removed: " + ("its sign is lost" if signals.kind == "rectified" else "it needs two quiet parts")
     worst = int(np.argmax(np.abs(signals.drift)))
     return f"removed, up to {abs(signals.drift[worst]):.3f} counts/s (E{worst + 1})"
+
+
+def _film(signals: Signals) -> list[tuple[str, str]]:
+    found = signals.report["film"]
+    if found is None:
+        return []
+    least, most = found["conductivity_since_rest"]
+    thick = f"{found['thickness']:.2f} as thick as a typical unit's ({found['evidence']})"
+    return [("fluid film", f"{thick}; conductivity {least:.2f} to {most:.2f} of that at rest")]
 
 
 def _places(recording: Recording, signals: Signals) -> str:

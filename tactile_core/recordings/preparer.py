@@ -36,7 +36,7 @@ class Preparer:
     ) -> None:
         """Take the options, the unit (None: a typical one), and what gives all parts, looked through for polarity."""
         options = options or PrepareOptions()
-        self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest())
+        self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest(), film=unit.film)
         self._unit, self._parts = unit, parts
         self._rest: np.ndarray | None = None  # at the end of the part before, with its PDC, counts
         self._rest_pdc = np.nan
@@ -55,10 +55,11 @@ class Preparer:
             if options.polarity == AUTO and signals.flags[0] & DOUBTS and self._look_for_polarity():
                 signals = prepare(part, self._options, rows)
             self._doubts = np.uint16(0) if self._polarity_found else signals.flags[0] & DOUBTS
-            factor, polarity = (signals.report[name] for name in ("counts_per_unit", "polarity"))
+            factor, polarity, film = (signals.report[name] for name in ("counts_per_unit", "polarity", "film"))
             self._options = dataclasses.replace(
-                self._options, kind=signals.kind, counts_per_unit=factor, polarity=polarity
-            )
+                self._options, kind=signals.kind, counts_per_unit=factor, polarity=polarity,
+                film=self._options.film if film is None else film["thickness"],
+            )  # fmt: skip
         elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
             signals = self._carried(part, signals, rest, rows, given=options.tare is not None)
         signals = self._decided_once(signals, first=first)

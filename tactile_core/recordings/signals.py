@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import COUNT_MAX, SOURCE, contacts_of, divider, typical_rest
-from ..sensors.fluid_sensor import FALLS, POLARITIES
-from . import contact_law
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from .doubt import LAW, Doubt, Reason, without
 from .electrode_faults import dead, saturated
 from .flags import Flag
@@ -21,6 +21,7 @@ from .repair import fill, find_glitches, is_time_series, smooth
 from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
 from .signal_kind import KINDS, detect, full_scale
 from .tables.column_map import ColumnMap
+from .unit import contact_law, film
 
 LONGEST = 101  # frames, a second, to smooth over: beyond, touch itself is smoothed away (assumed)
 # Frames where the user gives none. Rectified signals need it: folded noise does not average out in the networks.
@@ -63,6 +64,7 @@ class PrepareOptions:
     smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
     polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
     rest : the unit's own, for raw recordings that hold no calm part near it
+    film : thickness of a raw recording's fluid film over a typical unit's; None: as rest and contacts show it
     columns : which column of a CSV file is what, for those who read the recording; None: as its layout says
     """
 
@@ -74,6 +76,7 @@ class PrepareOptions:
     smooth: int | None = None
     polarity: str = AUTO
     rest: Rest | None = None
+    film: float | None = None
     columns: ColumnMap | None = None
 
     def check(self) -> None:
@@ -84,6 +87,8 @@ class PrepareOptions:
             raise TactileError("option counts_per_unit", f"{self.counts_per_unit:g}", "counts a unit, above 0")
         if self.smooth is not None and not (1 <= self.smooth <= LONGEST and self.smooth % 2):
             raise TactileError("option smooth", f"{self.smooth} frames", f"an odd number from 1 to {LONGEST}")
+        if self.film is not None and not film.LEAST <= self.film <= film.MOST:
+            raise TactileError("option film", f"{self.film:g}", f"{film.LEAST:g} to {film.MOST:g} of a typical unit's")
         if self.polarity not in (AUTO, *POLARITIES):
             raise TactileError("option polarity", repr(self.polarity), ", ".join((AUTO, *POLARITIES)))
 
@@ -92,9 +97,9 @@ class PrepareOptions:
 class Signals:
     """Signals ready for the networks.
 
-    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as reported; with the sign of a
-        raw reading, which falls where a film thins, whatever the file's own polarity is. Rectified: |change| minus its
-        quiet level
+    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as reported, as over a typical
+        unit's films where ``film`` found others; with the sign of a raw reading, which falls where a film thins,
+        whatever the file's own polarity is. Rectified: |change| minus its quiet level
     rest : (19,) float, counts, readings without contact at the first frame
     drift : (19,) float, counts/s, mean slope of the rest level over the recording
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
@@ -185,6 +190,11 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     if polarity.sign < 0:
         change = change.then(np.negative)
     pdc = _pressure_change(recording, kind, quiet, unit_rest)
+    fluid = None
+    if kind == "raw" and polarity.name == FALLS and (unit_rest is not None or quiet.parts):
+        fluid = _film(recording, change, rest, pdc, options, own_rest=unit_rest is None)
+    if fluid is not None:
+        change = fluid.changes(change, rest)
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))
         warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
@@ -193,11 +203,25 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired
     report |= {
         "smoothed_frames": window, "polarity": polarity.name, "polarity_evidence": polarity.evidence,
+        "film": None if fluid is None else fluid.report(),
     }  # fmt: skip
     return Signals(
         change=change[frames], rest=at_start.copy(), drift=slope, electrodes=readings[frames], kind=kind,
         quiet=quiet.mask[frames], flags=flags[frames], pdc=pdc[frames],
         warnings=(*warnings, *filter(None, [doubt])), report=report, sensor=recording.sensor,
+    )  # fmt: skip
+
+
+def _film(
+    recording: Recording, change: Changes, rest: Baseline, pdc: np.ndarray, options: PrepareOptions, *, own_rest: bool
+) -> film.Film | None:
+    """Return the fluid film of a raw recording whose rest is known; None of a sensor without simulated contacts."""
+    if contacts_of(recording.sensor) is None:
+        return None
+    pressure = of_kind(recording.sensor, Fluid).readout.pressure * pdc if np.isfinite(pdc).any() else None
+    return film.find(
+        change, Changes(len(recording), rest.at), recording.time, pressure, recording.sensor,
+        thickness=options.film, own_rest=own_rest, drifts=options.drift,
     )  # fmt: skip
 
 

@@ -15,11 +15,12 @@ from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, units_file
 from ..recordings.fingers import FINGERS, short_of, split
-from ..recordings.gain_matching import PRIOR, Match, match
 from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
 from ..recordings.tables.truncated_cell import listed
-from ..sensors import title, typical_rest
+from ..recordings.unit import film
+from ..recordings.unit.gain_matching import PRIOR, Match, match
+from ..sensors import PRESSURE_PER_COUNT, title, typical_rest
 from . import reference_signals
 from .reference_signals import ReferenceSignals
 from .unit_rest import UnitRest, find_rest, find_rest_sp
@@ -32,6 +33,7 @@ FEW_CONTACTS = 20  # different ones; with fewer, gains of 30 % are found to 20 %
 # of 15 and 30 % scatter, 15 to 320 different contacts, with noise (tests/translation/test_adapt.py). What is found is
 # shrunk towards 1, the more so the fewer contacts there are; matching by wrong gains leaves the rest.
 LEAST_LEFT, LEFT = 0.17, 6.3
+BETWEEN = 3600.0  # s between two recordings of a unit, in which its fluid's conductivity may drift (assumed)
 TOUCHED = 2.0  # contacts that tell an electrode's gain; below, it is not fitted (assumed)
 MOVED = 5.0  # counts that the 99 % level of an electrode must reach, three times the noise: else it was never touched
 SHOWN = 3  # names spelled out
@@ -64,6 +66,8 @@ def adapt(
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings)
     bare = _bare(rest)
+    if bare is not None:
+        bare = msgspec.structs.replace(bare, film=_film(recordings, options, bare))
     for path, recording in zip(paths, recordings, strict=True):
         signals = Preparer(options, bare)(recording)
         if signals.kind == "scaled":
@@ -138,6 +142,18 @@ def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
         return None
 
 
+def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare: ElectrodeGains) -> float:
+    """Return the thickness of the unit's film by all its recordings, which are raw, together."""
+    plain = dataclasses.replace(options or PrepareOptions(), film=1.0, drift=False)
+    every = [Preparer(plain, bare)(one) for one in recordings]
+    change = np.concatenate([one.change for one in every])
+    rest = np.concatenate([np.broadcast_to(one.rest, one.change.shape) for one in every])
+    starts = np.cumsum([0.0, *(one.duration + BETWEEN for one in recordings[:-1])])
+    time = np.concatenate([start + one.time for start, one in zip(starts, recordings, strict=True)])
+    pressure = PRESSURE_PER_COUNT * np.concatenate([one.pdc for one in every])
+    return film.find(change, rest, time, pressure, recordings[0].sensor, own_rest=False).thickness
+
+
 def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
     """Return a unit with a known rest alone."""
     if rest is None:
@@ -162,7 +178,7 @@ def _fitted(
         found = fit(change, rectified, typical, f"{note}; {bare.note}")
     except TactileError as error:
         return Adapted(bare, np.zeros(change.shape[1], bool), (f"no gains: {error}",), np.nan)
-    fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc")}
+    fields = {name: getattr(bare, name) for name in ("rest_counts", "rest_spread_counts", "rest_pdc", "film")}
     return dataclasses.replace(found, sensor=msgspec.structs.replace(found.sensor, **fields))
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..recordings.gain_matching import match
+from ..recordings.unit.gain_matching import match
 from ..sensors import electrode_count
 from ..sensors.readout import NOISE
 from . import weights

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .polarity import SCALE
+from ..polarity import SCALE
 
 ROUNDS = 30  # most turns; 10 to 20 are usual
 SETTLED = 0.01  # largest change of a log gain in a turn that counts as none

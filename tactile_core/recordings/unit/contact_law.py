@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..sensors import SOURCE, contact_pressures_of, contacts_of
-from ..sensors.descriptor import of_kind
-from ..sensors.fluid_sensor import Fluid
-from .doubt import Doubt, Reason
-from .flags import Flag
+from ...sensors import SOURCE, contact_pressures_of, contacts_of
+from ...sensors.descriptor import of_kind
+from ...sensors.fluid_sensor import Fluid
+from ..doubt import Doubt, Reason
+from ..flags import Flag
+from ..polarity import contact_signals, patterns, spread_out, touching, unit
+from ..rest_level import Framewise
 from .gain_matching import match
-from .polarity import contact_signals, patterns, spread_out, touching, unit
-from .rest_level import Framewise
 
 MOST = 2000  # frames looked at, evenly spread
 MOST_MATCHED = 200  # of them by which gains are fitted, which takes longer

@@ -1,0 +1,187 @@
+"""Find a unit's fluid film from its recording: how thick it is, and how the fluid's conductivity drifts.
+
+The film over an electrode has an impedance of 1 over its thickness and the fluid's conductivity. Where the same
+movement of the skin leaves a thinner film, impedances grow more: of a unit with films half as thick as a typical one's
+the networks would read contacts three times too firm. The counts at rest give the product of thickness and
+conductivity. How the two share in it is a belief, until contacts show it: simulated ones resemble a unit's only where
+its films are scaled as they are.
+
+The conductivity changes all electrodes alike, as no contact does: temperature alone moves it by a quarter in minutes.
+It is tracked as what makes each moment most alike to a simulated contact, or to none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...sensors import divider, places_of
+from ..polarity import SCALE, TOUCHING, contact_signals, spread_out
+from ..rest_level import Baseline, Changes, Framewise
+from .contact_law import FEWEST, FEWEST_PRESSED, pressure_ratio
+
+FRAMES = 600  # looked at, evenly spread
+WINDOW, MOST_WINDOWS = 5.0, 300  # s that say of the conductivity what one contact does, longer where they would be more
+LEAST, MOST = 0.2, 3.0  # thickness that a unit may have over a typical one's (assumed)
+THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # over a typical unit's, that are tried: .33 to 1.52
+TYPICAL, CLEARLY, DRIFTS = 8, 2.0, 3.0  # which is 1; nats by which another, and a drift, must be likelier (assumed)
+CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 3 counts apart at rest
+# Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of six units, whose
+# films are .4 (three), 1 (two) and .8, and conductivities .6 to 1.1 of a typical one's.
+THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.3
+# The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
+# second (assumed: an idle finger drifted by .25 in 225 s, steadily).
+AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
+# Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
+# the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
+MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
+SKIN = 0.75, 0.35  # measured over simulated pressure of real skins (descriptor of the BioTac), and its spread (assumed)
+
+
+@dataclass(frozen=True)
+class Film:
+    """Film of the unit that made a recording.
+
+    thickness : over a typical unit's; evidence : what shows it, in words
+    conductivity : (P,) logarithms of the fluid's over that at rest, at rising frames (P,); linear between them
+    """
+
+    thickness: float
+    evidence: str
+    frames: np.ndarray
+    conductivity: np.ndarray
+
+    def changes(self, change: Changes, rest: Baseline) -> Changes:
+        """Return the changes (T, e) counts that a unit of typical films would show from the same rest."""
+        if self.thickness == 1 and not self.conductivity.any():
+            return change
+
+        def of_typical_film(frames: np.ndarray) -> np.ndarray:
+            since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
+            return divider.of_typical_film(change[frames], rest.at(frames), self.thickness, since_rest)
+
+        return Changes(len(change), of_typical_film)
+
+    def report(self) -> dict[str, object]:
+        """Return it in numbers and words fit for JSON."""
+        least, most = np.exp([self.conductivity.min(), self.conductivity.max()])
+        return {
+            "thickness": round(self.thickness, 4), "evidence": self.evidence,
+            "conductivity_since_rest": [round(float(least), 4), round(float(most), 4)],
+        }  # fmt: skip
+
+
+class _Seen:
+    """Frames of a recording that are looked at: changes (n, e) counts from rest (n, e), and times (n,) s."""
+
+    def __init__(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> None:
+        self.change, self.rest, self.sensor = change, rest, sensor
+        self.typical_rest = places_of(sensor).rest_counts
+        window = max(WINDOW, (time[-1] - time[0]) / MOST_WINDOWS)
+        self.windows, self.window_of = np.unique(((time - time[0]) / window).astype(int), return_inverse=True)
+        self.seconds = window * np.maximum(np.diff(self.windows), 1)
+        self._known = np.arcsinh(contact_signals(sensor) / SCALE)
+        self._squares = np.square(self._known).sum(axis=1)
+
+    def typical(self, thickness: float, conductivity: float | np.ndarray) -> np.ndarray:
+        """Changes (n, e) counts of a typical unit, where this one's film and conductivity (n, 1) over rest are so."""
+        change = divider.of_typical_film(self.change, self.rest, thickness, conductivity)
+        return divider.typical(change, self.rest, self.typical_rest)
+
+    def apart(self, typical: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Squared distance (n,) to the nearest simulated contact, which (n,), and squared length (n,), compressed."""
+        seen = np.arcsinh(typical / SCALE)
+        length = np.square(seen).sum(axis=1)
+        apart = length[:, None] - 2 * seen @ self._known.T + self._squares
+        nearest = apart.argmin(axis=1)
+        return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
+
+
+def find(
+    change: Framewise, rest: Framewise, time: np.ndarray, pressure: np.ndarray | None, sensor: str, *,
+    thickness: float | None = None, own_rest: bool, drifts: bool = True,
+) -> Film:  # fmt: skip
+    """Find the film of the unit that made a raw recording.
+
+    change : (T, e) counts from rest (T, e); time : (T,) s; pressure : (T,) Pa, NaN where it was not measured
+    thickness : where it is known; own_rest : whether rest was found in the recording itself
+    drifts : whether the conductivity may
+    """
+    frames = spread_out(len(change), FRAMES)
+    seen = _Seen(change[frames], rest[frames], time[frames], sensor)
+    believed = _believed(_doubt_at_rest(_impedance_at_rest(seen))) if thickness is None else thickness
+    log = _tracked(seen, believed, AT_REST if own_rest else SINCE_REST) if drifts else np.zeros(len(seen.windows))
+    if thickness is None:
+        measured = None if pressure is None else pressure[frames]
+        thickness, evidence = _thickness(seen, np.exp(log)[seen.window_of, None], measured)
+    else:
+        evidence = "given"
+    middle = np.bincount(seen.window_of, frames) / np.bincount(seen.window_of)
+    return Film(thickness, evidence, middle, log)
+
+
+def _impedance_at_rest(seen: _Seen) -> float:
+    """Impedance at rest over a typical unit's, median of the electrodes."""
+    unit, typical = divider.film_impedance(seen.rest[0]), divider.film_impedance(seen.typical_rest)
+    return float(np.median(unit / typical))
+
+
+def _doubt_at_rest(impedance: float) -> np.ndarray:
+    """Negative log probability of each thickness, nats, by the impedance at rest over a typical unit's alone."""
+    of_fluid = np.log(impedance * THICKNESSES) / CONDUCTIVITY_SPREAD
+    return (np.square(np.log(THICKNESSES) / THICKNESS_SPREAD) + np.square(of_fluid)) / 2
+
+
+def _believed(doubt: np.ndarray) -> float:
+    """Thickness, the mean by negative log probabilities; a typical unit's unless another is clearly likelier."""
+    if doubt[TYPICAL] < doubt.min() + CLEARLY:
+        return 1.0
+    likely = np.exp(doubt.min() - doubt)
+    return round(float(np.exp(np.log(THICKNESSES) @ likely / likely.sum())), 2)
+
+
+def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
+    """Most plausible course of the conductivity: logarithms (windows,) over that at rest (Viterbi's algorithm)."""
+    still = seen.apart(seen.typical(thickness, 1.0))[2]
+    scale = 2 * (len(seen.rest[0]) * (NOISE / SCALE) ** 2 + MISFIT**2 * still)
+    cost = np.empty((len(seen.windows), len(CONDUCTIVITIES)))
+    for column, log in enumerate(CONDUCTIVITIES):
+        apart, _, length = seen.apart(seen.typical(thickness, np.exp(log)))
+        cost[:, column] = np.bincount(seen.window_of, np.minimum(apart, length) / scale)
+    cost /= np.bincount(seen.window_of)[:, None]
+    steps = np.square(CONDUCTIVITIES[:, None] - CONDUCTIVITIES)
+    total, back = cost[0] + np.square(CONDUCTIVITIES / at_start) / 2, []
+    for window, seconds in zip(cost[1:], seen.seconds, strict=True):
+        through = total[:, None] + steps / (2 * A_SECOND**2 * seconds)
+        back.append(through.argmin(axis=0))
+        total = through.min(axis=0) + window
+    if total.min() > cost[:, len(CONDUCTIVITIES) // 2].sum() - DRIFTS:
+        return np.zeros(len(cost))
+    course = [int(total.argmin())]
+    for before in back[::-1]:
+        course.append(int(before[course[-1]]))
+    return CONDUCTIVITIES[course[::-1]]
+
+
+def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str]:
+    """Most plausible thickness by the counts at rest and enough different contacts, and what showed it."""
+    impedance = _impedance_at_rest(seen)
+    doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
+    at_first = seen.typical(_believed(doubt), conductivity)
+    touching = np.linalg.norm(at_first, axis=1) >= TOUCHING
+    _, which = np.unique(seen.apart(at_first[touching])[1], return_inverse=True)
+    contacts = int(which.max(initial=-1)) + 1
+    if contacts < FEWEST:
+        return _believed(doubt), evidence
+    pressure = None if pressure is None else pressure[touching]
+    for row, thickness in enumerate(THICKNESSES):
+        typical = seen.typical(thickness, conductivity)[touching]
+        apart, _, length = seen.apart(typical)
+        left = (np.bincount(which, apart / length) / np.bincount(which)).mean()
+        doubt[row] += contacts * INDEPENDENT / 2 * np.log(left)
+        if pressure is not None:
+            ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)
+            if pressed >= FEWEST_PRESSED:
+                doubt[row] += (np.log(ratio / SKIN[0]) / SKIN[1]) ** 2 / 2
+    return _believed(doubt), f"{evidence}, {contacts} different contacts"

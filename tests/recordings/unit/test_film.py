@@ -1,0 +1,122 @@
+"""A unit's fluid film: found from its recording and taken off; made-up units, and real ones beside a force sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_core.errors import TactileError
+from tactile_core.recordings import PrepareOptions, electrode_gains, prepare
+from tactile_core.recordings.assemble import assemble
+from tactile_core.recordings.polarity import contact_signals
+from tactile_core.recordings.rest_level import Baseline, Changes
+from tactile_core.recordings.unit import film
+from tactile_core.sensors import REST_COUNTS, divider
+from tactile_core.translation.translate import translate
+
+CONTACTS, EACH = 60, 40  # different contacts of a made-up recording, and frames of each, at 10 Hz
+
+
+def made_up(thickness, conductivity, seconds_of_drift=0.0, drift=0.0):
+    """Changes (T, 19), rest (19,) and times (T,) of a unit whose film and fluid are so; the fluid may drift."""
+    random = np.random.default_rng(0)
+    typical = contact_signals()[random.permutation(len(contact_signals()))[:CONTACTS]] * np.exp(
+        0.1 * random.standard_normal(19)
+    )
+    still = divider.film_impedance(REST_COUNTS)
+    thinned = 1 - still / divider.film_impedance(REST_COUNTS + np.repeat(typical, EACH, axis=0))
+    time = np.arange(len(thinned)) / 10
+    now = conductivity * np.exp(drift * np.minimum(time / max(seconds_of_drift, 1e-9), 1))[:, None]
+    rest = counts(still / thickness / conductivity)
+    readings = counts(still / thickness / now / np.maximum(1 - thinned / thickness, 0.02))
+    return readings - rest + 1.5 * random.standard_normal(readings.shape), rest, time
+
+
+def counts(impedance):
+    """Readings (..., 19) of impedances (..., 19) of the film, the inverse of `divider.film_impedance`."""
+    series = 4095 / REST_COUNTS - 1 - divider.film_impedance(REST_COUNTS)
+    return 4095 / (1 + series + impedance)
+
+
+def found(change, rest, time, **options):
+    here = Changes(len(change), change.__getitem__)
+    level = Changes(len(change), Baseline.constant(rest).at)
+    return film.find(here, level, time, None, "biotac", own_rest=True, **options)
+
+
+@pytest.mark.parametrize(("thickness", "conductivity"), [(0.4, 1.0), (0.5, 0.9)])
+def test_a_thin_film_is_found_by_rest_and_contacts(thickness, conductivity):
+    one = found(*made_up(thickness, conductivity))
+    assert one.thickness == pytest.approx(thickness, rel=0.3)  # two of the tried ones off, 1.15 apart
+    assert not one.conductivity.any() and "different contacts" in one.evidence
+
+
+@pytest.mark.parametrize("conductivity", [0.7, 1.0, 1.2])
+def test_another_fluid_alone_is_no_other_film(conductivity):
+    assert found(*made_up(1.0, conductivity)).thickness == 1.0
+
+
+def test_drift_of_the_fluid_is_followed_through_contacts_and_a_steady_fluid_stays():
+    one = found(*made_up(1.0, 1.0, seconds_of_drift=240, drift=0.2), thickness=1.0)
+    assert one.conductivity[-4:] == pytest.approx(0.2, abs=0.04)  # of gains 10 % off, and of a walk that lags
+    assert not found(*made_up(1.0, 1.0)).conductivity.any()
+
+
+def test_a_typical_unit_is_left_as_it_is():
+    change, rest, _ = made_up(1.0, 1.0)
+    same = film.Film(1.0, "", np.zeros(1), np.zeros(1))
+    whole = Changes(len(change), change.__getitem__)
+    assert same.changes(whole, Baseline.constant(rest)) is whole
+
+
+@pytest.mark.parametrize("thickness", [0.05, 30.0, np.nan])
+def test_impossible_films_are_refused(thickness, press):
+    recording = assemble("press.npz", "NPZ", electrodes=press.electrodes, stamps=press.time)
+    with pytest.raises(TactileError, match=r"option film.*0.2 to 3 of a typical unit's"):
+        prepare(recording, PrepareOptions(film=thickness))
+
+
+def test_a_unit_s_file_holds_its_film(tmp_path, press):
+    unit = electrode_gains.ElectrodeGains("", [1.0] * 19, [0.0] * 19, film=0.5)
+    electrode_gains.write(tmp_path / "unit.toml", electrode_gains.units_file({"unit": unit}))
+    assert electrode_gains.read(tmp_path / "unit.toml").sections()["unit"].film == 0.5
+    text = (tmp_path / "unit.toml").read_text()
+    (tmp_path / "unit.toml").write_text(text.replace("film = 0.5", "film = 9"))
+    with pytest.raises(TactileError, match=r"unit\.film: 9; expected 0.2 to 3"):
+        electrode_gains.read(tmp_path / "unit.toml")
+
+
+@pytest.fixture(scope="module")
+def forced(outside_data):
+    """Recordings of a pressed finger and of an idle one beside it, from their own rest; and the true force (T,) N."""
+    folder = outside_data("biotac_force")
+    read = {name: np.loadtxt(folder / f"{name}.txt") for name in (
+        "finger1_rest", "finger1_counts", "finger2_rest", "idle_finger2_counts", "finger1_force")}  # fmt: skip
+    force = np.linalg.norm(read.pop("finger1_force"), axis=1)
+
+    def joined(rest, rows):
+        every = np.concatenate([read[rest], read[rows]])
+        return assemble(f"{rows}.txt", "text", electrodes=every, stamps=np.arange(len(every)) / 100), len(read[rest])
+
+    return joined("finger1_rest", "finger1_counts"), joined("finger2_rest", "idle_finger2_counts"), force
+
+
+def force_of(recording, rest, step=50):
+    """Translated force (n,) N of every so many frames after the rest."""
+    touch = translate(recording, prepare=PrepareOptions(tare=slice(0, rest)), frames=slice(rest, None, step))
+    return np.linalg.norm(touch.force, axis=1)
+
+
+def test_force_of_a_real_finger_is_of_the_right_size(forced):
+    """Rest from the file and nothing else given; typical films make it 2.7 times too high."""
+    (pressed, rest), _, true = forced
+    found = force_of(pressed, rest)
+    true = true[::50]  # which the counts follow by two rows, a fiftieth of a second
+    assert 0.8 < np.median(found / true) < 1.25
+    assert np.abs(found - true).mean() < 1.0
+
+
+def test_an_idle_finger_whose_fluid_warms_is_hardly_touched(forced):
+    """It drifts by 16 to 220 counts; with typical films, and drift between quiet parts alone, up to 4.4 N."""
+    _, (idle, rest), _ = forced
+    assert force_of(idle, rest).max() < 0.6
