@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from tactile_core import TactileError
-from tactile_core.jobs.convert import load_tools
+from tactile_core.jobs.convert import ToolOptions, load_tools
 from tactile_core.jobs.frame_pass import Tools
 from tactile_core.jobs.live import Shown, View
 from tactile_core.recordings.assemble import assemble
@@ -83,7 +83,7 @@ def main() -> None:
     options, ros = parser.parse_known_args()
     rclpy.init(args=ros)
     node = rclpy.create_node("tactile")
-    finger = Finger(options.type, options.finger, load_tools(options.weights))
+    finger = Finger(options.type, options.finger, load_tools(ToolOptions(options.weights)))
     pictures = node.create_publisher(Image, "tactile/image", 1)
     forces = node.create_publisher(WrenchStamped, "tactile/wrench", 1)
 

@@ -107,7 +107,7 @@ def rounding() -> float:
     signals = prepare(read(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"))
     nets = networks.load()
     change = signals.typical[60:340:10]
-    gels = [one.decode_digit(one.likely_latents(one.encode_signal(change))[1]) for one in (nets, Double(nets))]
+    gels = [one.decode_target(one.likely_latents(one.encode_signal(change))[1]) for one in (nets, Double(nets))]
     return float(np.abs(gels[0] - gels[1]).max())
 
 

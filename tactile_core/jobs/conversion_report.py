@@ -1,20 +1,28 @@
-"""What a conversion tells its user: warnings, errors to expect, and the contact sheet."""
+"""What a conversion tells its user: warnings, errors to expect, and the contact sheet, a few frames as columns."""
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import os
+import textwrap
+import warnings as python_warnings
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files import atomic
 from ..recordings import flags
-from ..sensors import PRESSURE_PER_COUNT
+from ..sensors import PRESSURE_PER_COUNT, SOURCE, title
+from ..sensors.camera import Camera
 from ..translation.card import doubt
-from ..translation.trust_words import SENTENCES
-from .contact_sheet import Contents, choose_frames, contact_sheet
+from ..translation.trust_words import LOW_CONFIDENCE, SENTENCES
 from .frame_pass import FramePass, Tools
 from .frames_file import described
 from .sampling_error import depth_share
+from .sheet_figure import FRAMES, SheetFigure, scale
 
 if TYPE_CHECKING:
     from ..translation.translate import PreparedRows
@@ -112,6 +120,7 @@ class ConversionReport:
         skin = None if truth is None else truth.displacement_biotac
         contents = Contents(
             name=recording.name,
+            camera=self._tools.drawer.camera,
             time=self._frames if timeless else recording.time[rows],
             snapshots=timeless,
             electrodes=signals.change[rows],
@@ -125,4 +134,122 @@ class ConversionReport:
             source=self._tools.translator.source,
             **columns,
         )
-        contact_sheet(path, contents, self._tools.drawer.camera)
+        contact_sheet(path, contents)
+
+
+WARNING_LINES, WARNING_WIDTH = 5, 200
+# Lines in pieces: Agg refuses a noisy line of a hundred thousand points as a whole.
+STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Contents:
+    """Contents of a sheet of a recording of T frames, in k columns.
+
+    name : of the recording; time : (T,) s, of snapshots their numbers; electrodes : (T, 19) counts, change from rest
+    pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
+    frames : (k,) which of the T frames are the columns
+    displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
+    force : (k, 3) N; confidence : (k,) 0..1; flags : (k,) uint16; expected_error_digit : (k,) m, of the largest node
+    contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
+    true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
+    source : the sensor that was read, whose skin is drawn; camera : of the gel
+    """
+
+    name: str
+    camera: Camera
+    time: np.ndarray
+    electrodes: np.ndarray
+    frames: np.ndarray
+    displacement_biotac: np.ndarray
+    displacement_digit: np.ndarray
+    pictures: np.ndarray
+    force: np.ndarray
+    confidence: np.ndarray
+    flags: np.ndarray
+    expected_error_digit: np.ndarray
+    contact_center: np.ndarray | None = None
+    pressure: np.ndarray | None = None
+    pressure_measured: np.ndarray | None = None
+    true_displacement_biotac: np.ndarray | None = None
+    simulated: bool = False
+    mount_shift: np.ndarray | float = 0.0
+    warnings: Sequence[str] = ()
+    source: str = SOURCE
+    snapshots: bool = False
+
+
+def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
+    """Choose the frames (k,) to show, in order: the strongest contacts that lie apart from each other.
+
+    Taken one by one, each at least half of a `count`-th of the recording away from those before.
+    strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none
+    """
+    left = np.where(np.isfinite(strength), strength, -1.0)
+    count = min(count, len(left))
+    frames, chosen = np.arange(len(left)), []
+    for _ in range(count):
+        best = int(np.argmax(left))
+        chosen.append(best)
+        left[np.abs(frames - best) < len(left) / (2 * count)] = -np.inf
+    return np.sort(chosen)
+
+
+def contact_sheet(path: str | os.PathLike, shown: Contents) -> None:
+    """Draw the sheet and write it to `path` as a PNG; equal contents make equal bytes."""
+    with _plain_matplotlib():
+        content = _drawn(shown).png()
+    atomic.write_bytes(path, content)
+
+
+@contextlib.contextmanager
+def _plain_matplotlib() -> Iterator[None]:
+    """Use matplotlib in our style alone: a user's own settings must not change the bytes."""
+    import matplotlib
+
+    with matplotlib.rc_context(), python_warnings.catch_warnings():
+        # Names may hold characters that the font lacks, which are drawn as boxes.
+        python_warnings.filterwarnings("ignore", "Glyph .* missing from", UserWarning)
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(STYLE)
+        yield
+
+
+def _drawn(shown: Contents) -> SheetFigure:
+    displacement, truth = shown.displacement_biotac, shown.true_displacement_biotac
+    figure = SheetFigure(
+        len(shown.frames),
+        shown.camera,
+        _sentences(shown.warnings, shown.confidence),
+        truth is not None,
+        pressure=shown.pressure is not None,
+        snapshots=shown.snapshots,
+    )
+    # File names may hold what is no text at all.
+    figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
+    figure.electrodes(shown.time, shown.electrodes, shown.frames)
+    if shown.pressure is not None:
+        figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
+    figure.headings(shown.time[shown.frames])
+    largest = scale(displacement, truth)
+    name = title(shown.source)
+    label = f"{name}, unrolled\n" + ("translated" if shown.simulated else "displacement")
+    center = None if shown.contact_center is None else shown.contact_center - shown.mount_shift
+    figure.skin_row(label, displacement, largest, center, shown.source)
+    if truth is not None:
+        figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
+    gel = title(shown.camera.sensor)
+    figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, shown.contact_center)
+    figure.picture_row(f"{gel} picture", shown.pictures)
+    figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit)
+    return figure
+
+
+def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
+    """Return warnings as lines that fit the sheet, no more than it has room for."""
+    lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
+    if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
+        lines.insert(0, "Low confidence in every frame shown: take this as a guess.")
+    if len(lines) > WARNING_LINES:
+        lines = [*lines[: WARNING_LINES - 1], f"... and {len(lines) - WARNING_LINES + 1} more lines: see note.json"]
+    return lines

@@ -14,7 +14,9 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
+from ..pictures.presets import FAST
 from ..sensors import SOURCE, TARGET
+from ..translation.answer import Answer
 from ..translation.translate import PreparedRows, load_translator
 from . import results, sampling_error
 from .conversion_report import ConversionReport
@@ -25,7 +27,7 @@ from .results import SOLVED, TRANSLATED, GelKind, frames_text, select
 if TYPE_CHECKING:
     from ..recordings import PrepareOptions, Recording
     from ..recordings.electrode_gains import SensorFile
-    from ..translation.answer import Answer
+    from ..recordings.tables.column_map import ColumnMap
     from ..translation.translator import Translator
     from .sampling_error import Budget
 
@@ -49,38 +51,49 @@ class Options:
     error: Budget | None = None
     calibration: str | os.PathLike | None = None
 
+    @property
+    def columns(self) -> ColumnMap | None:
+        """Map of the columns of the recordings; None: as their layouts say."""
+        return None if self.prepare is None else self.prepare.columns
 
-def load_tools(
-    weights: str | os.PathLike | None = None,
-    calibration: str | os.PathLike | None = None,
-    preset: str = "fast",
-    variant: str | None = None,
-    answer: Answer | None = None,
-    gel: GelKind = TRANSLATED,
-    target: str = TARGET,
-    source: str | None = SOURCE,
-) -> Tools:
-    """Load the weights, shipped or of a folder, and camera and lights of a gel, the unit's that ships or a file's.
 
-    preset, variant : of ``renderer.Renderer``, for all pictures but fast ones
+@dataclasses.dataclass(frozen=True)
+class ToolOptions:
+    """What translates and draws all recordings of a command.
+
+    weights : folder of the networks, None for those that ship; source : the sensor whose recordings they must
+        translate, None for whichever they do
+    calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``, for
+        all pictures but fast ones
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
     gel : the networks', or the found contact solved on the target (``solved_gel``), as for any target to which the
-        shipped weights do not lead
-    target : the gel, to which the weights must translate unless it is solved
-    source : the sensor whose recordings they must translate; None for whichever they do
+        shipped weights do not lead; target : the gel, to which the weights must translate unless it is solved
+    """
+
+    weights: str | None = None
+    calibration: str | None = None
+    preset: str = FAST
+    variant: str | None = None
+    answer: Answer = Answer()  # noqa: RUF009 - frozen
+    gel: GelKind = TRANSLATED
+    target: str = TARGET
+    source: str | None = SOURCE
+
+    def load_networks(self) -> tuple[Translator, bool]:
+        """Load the networks, and tell whether the target is solved under the contacts that they find."""
+        must_lead_to = None if self.gel == SOLVED or self.weights is None else self.target
+        translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
+        return translator, self.gel == SOLVED or translator.target != self.target
+
+
+def load_tools(options: ToolOptions) -> Tools:
+    """Load the weights, and camera and lights of the gel.
+
     Raises TactileError for weights that are missing, changed or of another shape, and what `load_drawer` raises.
     """
-    translator, solves = load_networks(weights, answer, gel, target, source)
-    return Tools(translator, load_drawer(calibration, preset, variant, target, translator.target, solves=solves))
-
-
-def load_networks(
-    weights: str | os.PathLike | None, answer: Answer | None, gel: GelKind, target: str, source: str | None
-) -> tuple[Translator, bool]:
-    """Load the networks, and tell whether the target is solved under the contacts that they find; see `load_tools`."""
-    must_lead_to = None if gel == SOLVED or weights is None else target
-    translator = load_translator(weights, answer, must_lead_to, source)
-    return translator, gel == SOLVED or translator.target != target
+    translator, solves = options.load_networks()
+    unit = options.calibration, options.preset, options.variant, options.target
+    return Tools(translator, load_drawer(*unit, translator.target, solves=solves))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,8 +127,7 @@ def convert(
         sampling_error.check_gel(tools.drawer.target)
     clock, answer = Stopwatch(), tools.translator.answer
     with clock.stage("read"):
-        columns = None if options.prepare is None else options.prepare.columns
-        recording = recordings.read(recording_path, columns, tools.translator.source, lean=True)
+        recording = recordings.read(recording_path, options.columns, tools.translator.source, lean=True)
         check_order(recording, answer)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
@@ -132,7 +144,8 @@ def convert(
             added = _added(options, report)
             with clock.stage("sheet"):
                 report.draw_sheet(unfinished / results.SHEET)
-            atomic.write_json(unfinished / results.NOTE, note(rows, frames, report, options, tools))
+            origin = note(rows, frames, report, options, tools)
+            atomic.write_json(unfinished / results.NOTE, origin)
             timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": provenance.machine()}
             atomic.write_json(unfinished / results.TIMINGS, timings)
     except OSError as error:
@@ -151,6 +164,7 @@ def _write_frames(
     pictures, done = _Pictures(folder / results.IMAGES) if "image" in options.keep else None, 0
 
     def take(some: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
+        """Report and draw some frames, as they come."""
         nonlocal done
         report.take(some, arrays)
         if pictures is not None:

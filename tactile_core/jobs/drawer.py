@@ -26,7 +26,7 @@ class Drawer:
 
     height_map : (T, M, 3) m -> (T, H, W) m
     shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
-    camera : of the gel that is drawn, by which contacts beside its picture are flagged; None: none are
+    camera : of the gel that is drawn, by which contacts beside its picture are flagged
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     dots : on the gel that is drawn; None: it has none
     target : the gel; found_on : the gel of the networks, on which contacts are found that are solved on another
@@ -34,8 +34,8 @@ class Drawer:
 
     height_map: Callable[[np.ndarray], np.ndarray]
     shade: Callable[..., np.ndarray]
+    camera: Camera
     preset: str = "fast"
-    camera: Camera | None = None
     solve: Solver | None = None
     dots: MarkerField | None = None
     target: str = TARGET
@@ -99,7 +99,8 @@ def load_drawer(
     if preset == "fast" and unit.markers is None:
         if unit.photograph:
             background.read_photograph(unit.photograph, unit.camera)  # a bad one is refused before any work
-        shade = _made_at_first_call(functools.partial(renderer.Renderer, unit, preset))
+        made = functools.cache(functools.partial(renderer.Renderer, unit, preset))
+        shade = lambda height, *marks: made()(height, *marks)  # noqa: E731
     else:
         shade = renderer.Renderer(unit, preset, variant)
         dots = shade.dots
@@ -109,10 +110,4 @@ def load_drawer(
 
         solved_gel.prepare(target)
         solve = functools.partial(solved_gel.solved, gel=target, found_on=found_on)
-    return Drawer(mapper, shade, preset, unit.camera, solve, dots, target, found_on)
-
-
-def _made_at_first_call(make: Callable[[], Callable[..., np.ndarray]]) -> Callable[..., np.ndarray]:
-    """Return a tool that `make` makes when it is first called."""
-    made = functools.cache(make)
-    return lambda *arguments: made()(*arguments)
+    return Drawer(mapper, shade, unit.camera, preset, solve, dots, target, found_on)

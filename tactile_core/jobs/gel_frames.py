@@ -54,17 +54,16 @@ class Frames:
             yield from (self.displacement[row] * self.scale for row in rows)
 
 
-def _untold() -> AbstractContextManager[Callable[[int, int], None]]:
-    return nullcontext(lambda done, total: None)
-
-
 def is_scene(path: Path) -> bool:
     """Return true if an input is a scene, which is simulated first."""
     return path.is_dir() or path.suffix == ".toml"
 
 
 def read_frames(
-    path: str | os.PathLike, progress: Progress = _untold, tier: Tier = "fast", gel: str = TARGET
+    path: str | os.PathLike,
+    progress: Progress = lambda: nullcontext(lambda done, total: None),
+    tier: Tier = "fast",
+    gel: str = TARGET,
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 
@@ -83,18 +82,19 @@ def read_frames(
         from ..files.exr_file import read_height
 
         return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
-    if not _is_hdf5(path):
-        raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)
-    return _of_hdf5(path, gel)
+    return read_displacement(path, gel)
 
 
-def _is_hdf5(path: Path) -> bool:
-    """Return true if a file begins like HDF5; the project's own files for this have no user block."""
-    with open(path, "rb") as file:
-        return file.read(len(SIGNATURE)) == SIGNATURE
+def read_displacement(path: str | os.PathLike, gel: str = TARGET) -> Frames:
+    """Read the displacement of a sensor's surface from ``frames.h5`` or a simulated recording.
 
-
-def _of_hdf5(path: Path, gel: str) -> Frames:
+    Raises TactileError for another file, and one whose displacement was not kept or lies on another surface.
+    """
+    if not os.path.isfile(path):
+        raise TactileError(path, "there is no such file", EXPECTED)
+    with open(path, "rb") as file:  # the project's own files for this have no user block
+        if file.read(len(SIGNATURE)) != SIGNATURE:
+            raise TactileError(path, "no HDF5 file", EXPECTED, CONVERT)
     with open_hdf5(os.fspath(path)) as store:
         kind = store.attributes.get("format")
         if kind == CONVERTED:
@@ -135,7 +135,7 @@ def _of_scene(path: Path, progress: Progress, tier: Tier, gel: str) -> Frames:
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
         simulate_recording(path, simulated, progress=shown, keep=(f"displacement_{gel}",), tiers={gel: tier})
-        return dataclasses.replace(_of_hdf5(simulated, gel), kind="scene")
+        return dataclasses.replace(read_displacement(simulated, gel), kind="scene")
 
 
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
@@ -144,10 +144,7 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
     Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
     not kept or lies on another surface, and a frame that it does not hold.
     """
-    if not os.path.isfile(path):
-        expected = "frames.h5 of `tactile convert`, or a simulated recording"
-        raise TactileError(path, "there is no such file", expected)
-    held = _of_hdf5(Path(path), sensor)
+    held = read_displacement(path, sensor)
     row = np.flatnonzero(held.numbers == frame)
     if held.displacement is None or len(row) != 1:
         span = f"{held.numbers.min():g} to {held.numbers.max():g}"

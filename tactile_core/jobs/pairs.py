@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import os
-import pathlib
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -24,19 +23,16 @@ from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
-from ..sensors.gel_sensor import Gel
+from ..sensors.gel_sensor import GelSensor
 from ..simulation.pairs_writer import Made, card, card_path, merge
 from ..simulation.scene import Scene
 from .engine import job as jobs
-from .engine import result_parts, scene_input
 from .engine import run as runs
-from .engine.inputs import Input
+from .engine.inputs import Input, load_scene_of, read_scene
 from .engine.job import Job
-from .engine.kinds import InputFacts
-from .engine.local import InProcess, Local
-from .engine.recipes import Law, Pairs
-from .engine.run import Place
-from .engine.scene_input import load
+from .engine.local import InProcess
+from .engine.recipes import InputFacts, Law, Pairs
+from .engine.run import Place, Progress
 
 GROWS = True
 BLOCK = 4  # presses a block: a few seconds of work
@@ -51,9 +47,8 @@ def make_pairs(
     count: int,
     seed: int,
     out: str | os.PathLike,
-    workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-    place: Callable[[pathlib.Path], Place] | None = None,
+    progress: Progress = lambda done, known: None,
+    place: Callable[[Path], Place] = InProcess,
     electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
@@ -62,36 +57,32 @@ def make_pairs(
 
     progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
-    workers : processes, this one alone for 1; place : where blocks are made instead, from the job's folder
+    place : where blocks are made, from the job's folder
     electrodes : the law of their counts, of ``law.LAWS``; pair : the sensors, source and target
     keep : words of ``pairs_file.KEEPABLE``
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """
-    out = pathlib.Path(out)
+    out = Path(out)
     job, names, text = plan(scene_path, count, seed, out, electrodes, pair, keep)
     compliance_of(pair[1]), compliance_of(pair[0])  # built once here, not by every worker at the same time
-    with result_parts.begun(out, job) as folder:
-        open_place = place or (InProcess if workers == 1 else lambda folder: Local(folder.resolve(), workers))
-        where = open_place(folder)
-        result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
+    with runs.completed(out, job, place, progress) as folder:
         merge(blocks(folder, job), count, out, Made(text, names, seed, electrodes, pair, keep))
         atomic.write_json(card_path(out), card(out, *pair))
-        result_parts.finished(folder)
 
 
 def plan(
     scene_path: str | os.PathLike,
     count: int,
     seed: int,
-    out: pathlib.Path,
+    out: Path,
     electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> tuple[Job[Pairs], list[str], str]:
     """Return the job, the names of the indenters and the scene's text; raises as ``make_pairs``."""
     source, target = pair
-    of_kind(source, Fluid), of_kind(target, Gel)
-    scene, text, inputs, files = scene_input.read_inputs(scene_path, ["presses"])
+    of_kind(source, Fluid), of_kind(target, GelSensor)
+    scene, text, inputs, files = read_scene(scene_path, ["presses"])
     if scene.pairs is None:
         raise TactileError(f"{scene_path}, pairs", "missing", "a [pairs] table", "See scenes/press_sphere/scene.toml")
     if not 1 <= count <= MOST:
@@ -185,4 +176,4 @@ def _count(file: Path) -> int:
 
 @functools.lru_cache(maxsize=2)
 def _scene(one: Input, files: tuple[str, ...]) -> Scene:
-    return load(one, files)[0]
+    return load_scene_of(one, files)[0]

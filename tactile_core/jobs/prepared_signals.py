@@ -109,6 +109,7 @@ def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signal
     unit = None if sensor is None else sensor.gains_for(path, split(path).section, "--sensor", source)
 
     def parts() -> Iterator[Recording]:
+        """Yield the parts once more."""
         return (part.recording for part in read_parts(path, options.columns, source))
 
     prepare = Preparer(options, unit, parts)

@@ -97,9 +97,7 @@ def render(
     shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
-        made = pictures(
-            options.calibration, preset, options.variant, shape, options.size, options.noise, options.exr, clock
-        )
+        made = pictures(options, preset, shape, clock)
     about = background_of(made.renderer)
     if isinstance(about, dict):
         by = about["corrects_lights_by"]
@@ -238,23 +236,16 @@ class Pictures:
 
 
 def pictures(
-    calibration: str | os.PathLike | None,
-    preset: str,
-    variant: str | None,
-    heights: tuple[int, int] | None,
-    size: tuple[int, int] | None,
-    noise: bool,
-    exr: bool,
-    clock: Stopwatch | None = None,
+    options: Options, preset: str, heights: tuple[int, int] | None, clock: Stopwatch | None = None
 ) -> Pictures:
-    """Return the writer of frames; heights : (H, W) of height maps, None for displacements; the rest as of `Options`.
+    """Return the writer of frames; heights : (H, W) of height maps, None for displacements.
 
     Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
-    """  # fmt: skip
-    unit = at_size(load_calibration(calibration), heights, size)
+    """
+    unit = at_size(load_calibration(options.calibration), heights, options.size)
     about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
-    renderer = Renderer(unit, preset, variant)
-    return Pictures(renderer, clock or Stopwatch(), about, heights is not None, noise, exr)
+    renderer = Renderer(unit, preset, options.variant)
+    return Pictures(renderer, clock or Stopwatch(), about, heights is not None, options.noise, options.exr)
 
 
 def note_of(

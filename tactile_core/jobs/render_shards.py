@@ -15,16 +15,16 @@ from ..files import array_pack, atomic, checksummed
 from ..pictures.mitsuba.variant import variant_for
 from ..sensors.calibration_file import load_calibration
 from . import results
-from .engine import inputs, result_parts
+from .engine import inputs
 from .engine import job as jobs
 from .engine import run as runs
 from .engine.inputs import content_hash
 from .engine.job import Job
-from .engine.kinds import InputFacts
-from .engine.recipes import Render
+from .engine.recipes import InputFacts, Render
 from .engine.run import Place
+from .gel_frames import read_frames
 from .render import Options, Pictures, claimed, note_of, pictures
-from .results import frames_text
+from .results import frames_text, parse_frames, select
 from .translate_shards import check_unit
 
 GROWS = False
@@ -45,11 +45,11 @@ def render_in_parts(
     """
     out = Path(out)
     job = plan(path, out, options)
-    with result_parts.begun(out, job) as folder:
-        result_parts.check(runs.run(folder, job, place(folder), None, progress))
-        with atomic.writing(out, advice="Make room, then give the command again"):
-            _put_together(folder, job, out, options)
-        result_parts.finished(folder)
+    with (
+        runs.completed(out, job, place, progress) as folder,
+        atomic.writing(out, advice="Make room, then give the command again"),
+    ):
+        _put_together(folder, job, out, options)
     return out
 
 
@@ -59,9 +59,9 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
     file = Path(path).resolve()
     file = file / "scene.toml" if file.is_dir() else file
     unit = "" if options.calibration is None else inputs.unit_hash(Path(options.calibration))
-    frames = "" if frames_text(options.frames) == "all" else frames_text(options.frames)
+    frames = frames_text(options.frames).replace("all", ":")
     recipe = Render(
-        preset, variant_for(preset, options.variant), frames or ":", options.size, options.exr, options.noise, unit
+        preset, variant_for(preset, options.variant), frames, options.size, options.exr, options.noise, unit
     )
     calibration = None if options.calibration is None else os.fspath(options.calibration)
     return jobs.make(inputs.hashed([file], lambda done, total: None), recipe, None, calibration)
@@ -73,9 +73,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
     shape = None
     if heights:
         shape = array_pack.read(jobs.prepared_file(folder, name), slice(0, 1), (VALUES,))[VALUES].shape[1:]
-    made = pictures(
-        job.calibration, recipe.preset, recipe.variant or None, shape, recipe.size, recipe.noise, recipe.exr
-    )
+    made = _pictures(job.calibration, recipe, shape)
     with atomic.new_folder(out, overwrite=options.overwrite) as partial:
         made.begin(partial)
         made.write_rest(partial)
@@ -87,9 +85,6 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
     """Read the input, simulating a scene; keep the values to be rendered."""
-    from .gel_frames import read_frames
-    from .results import parse_frames, select
-
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None
@@ -151,8 +146,8 @@ def _frames(folder: Path, job: Job[Render], index: int) -> int:
 @functools.lru_cache(maxsize=2)
 def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
     """The renderer, once a process; heights : (H, W) of height maps, None for displacements."""
-    from .render import pictures
-
     check_unit(calibration, recipe.calibration)
-    preset, variant = recipe.preset, recipe.variant or None
-    return pictures(calibration, preset, variant, heights, recipe.size, recipe.noise, recipe.exr)
+    options = Options(
+        calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise
+    )
+    return pictures(options, recipe.preset, heights)

@@ -62,11 +62,11 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
                 recording, f"has the same name as {seen[name]}", "one name for each result folder", advice
             )
         seen[name] = recording
-    check_writable(out)
-    atomic.sweep(out)
     folders = [out / name_of(recording) for recording in recordings]
     for folder in folders:
         check_free(folder, overwrite)
+    check_writable(out)
+    atomic.sweep(out)
     return folders
 
 

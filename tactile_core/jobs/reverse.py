@@ -10,10 +10,9 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic
 from ..files.hdf5_writer import Disk
-from ..sensors import title
 from ..translation.translate import CHUNK
 from ..translation.translator import Translator
-from .gel_frames import read_frames
+from .gel_frames import read_displacement
 from .results import select
 
 FORMAT = "tactile-reverse-1"
@@ -35,7 +34,7 @@ def reverse(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Translate the gel of frames.h5, or of a simulated recording or scene, back into a new HDF5 file of ``ARRAYS``.
+    """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``ARRAYS``.
 
     translator : whose networks lead from the skin to that gel; progress : called with (frames done, frames in all)
     Raises TactileError for an input without that gel's displacement, and an output that is there or cannot be written.
@@ -44,9 +43,7 @@ def reverse(
 
     if os.path.lexists(out) and not overwrite:
         raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
-    held = read_frames(path, gel=translator.target)
-    if held.displacement is None:
-        raise TactileError(path, f"a {held.kind}", f"the displacement of a {title(translator.target)}'s gel")
+    held = read_displacement(path, translator.target)
     rows = select(frames, len(held.numbers))
     advice = "Name another --out"
     with atomic.writing(out, "a file in a writable folder", advice), atomic.new_file(out) as unfinished:

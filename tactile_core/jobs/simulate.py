@@ -22,14 +22,12 @@ from ..simulation.scene import Scene, to_toml
 from ..simulation.scene_grid import combinations, name_of, with_values
 from ..simulation.scene_recording import DEFAULT, check_places, recording_of
 from .engine import job as jobs
-from .engine import result_parts, scene_input
 from .engine import run as runs
+from .engine.inputs import load_scene_of, read_scene
 from .engine.job import Job
-from .engine.kinds import InputFacts
 from .engine.local import InProcess
-from .engine.recipes import Law, Simulate
-from .engine.run import Place
-from .engine.scene_input import load
+from .engine.recipes import InputFacts, Law, Simulate
+from .engine.run import Place, Progress
 
 GRID = "grid.json"
 FORMAT = "tactile-grid-1"
@@ -39,21 +37,18 @@ GROWS = False
 def simulate_grid(
     job: Job[Simulate],
     out: str | os.PathLike,
-    progress: Callable[[int, int], None] | None = None,
-    place: Callable[[Path], Place] | None = None,
+    progress: Progress = lambda done, known: None,
+    place: Callable[[Path], Place] = InProcess,
 ) -> None:
     """Simulate all recordings of a `plan` into the folder ``out``.
 
-    progress : (tasks done, known so far); place : where the work is done, from the job's folder; None for this process
+    progress : (tasks done, known so far); place : where the work is done, from the job's folder
     The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done.
     """
     for sensor in PAIR:
         compliance_of(sensor)  # built once here, not by every worker at the same time
-    with result_parts.begun(Path(out), job) as folder:
-        where = (place or InProcess)(folder)
-        result_parts.check(runs.run(folder, job, where, None, progress or (lambda done, known: None)))
+    with runs.completed(Path(out), job, place, progress) as folder:
         _put_together(folder, job, Path(out))
-        result_parts.finished(folder)
 
 
 def plan(
@@ -71,7 +66,7 @@ def plan(
     Raises TactileError for a bad scene, grid or place, before any work.
     """
     values = combinations(grid)
-    scene, _, inputs, files = scene_input.read_inputs(scene_path, [name_of(one) for one in values])
+    scene, _, inputs, files = read_scene(scene_path, [name_of(one) for one in values])
     for one in values:
         check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
     atomic.claim(out)
@@ -104,7 +99,7 @@ def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
     file = jobs.shard_file(folder, one.name, number)
     if checksummed.verified_checksum(file) is not None:
         return False
-    scene, text = load(one, tuple(job.recipe.files))
+    scene, text = load_scene_of(one, tuple(job.recipe.files))
     values = job.recipe.values[index]
     varied = with_values(msgspec.toml.decode(text, type=Scene), values, one.path)  # its files named as the scene does
     scene = with_values(scene, values, one.path)

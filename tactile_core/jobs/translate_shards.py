@@ -16,18 +16,17 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import open_plain
-from . import prepared_signals
+from . import convert, prepared_signals
+from .convert import ToolOptions
 from .engine import job as jobs
 from .engine.inputs import unit_hash
-from .engine.kinds import InputFacts
+from .engine.recipes import InputFacts
 from .frame_pass import FramePass, Tools
 from .prepared_signals import Prepared
 
 if TYPE_CHECKING:
-    from ..translation.answer import Answer
     from .engine.job import Job
     from .engine.recipes import Translate
-    from .results import GelKind
 
 GROWS = False
 # kB a frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
@@ -52,8 +51,9 @@ def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
     Raises TactileError for a damaged prepared file, OSError where the disk cannot be written.
     """
     recipe, name = job.recipe, job.inputs[index].name
-    unit = job.calibration, recipe.calibration, recipe.preset, recipe.variant
-    tools = _tools(job.weights, recipe.weights, *unit, recipe.answer, recipe.gel, recipe.source, recipe.target)
+    pictures, pair = (job.calibration, recipe.preset, recipe.variant or None), (recipe.target, recipe.source)
+    options = ToolOptions(job.weights, *pictures, recipe.answer, recipe.gel, *pair)
+    tools = _tools(options, recipe.weights, recipe.calibration)
     file, prepared = jobs.shard_file(folder, name, number), Prepared(jobs.prepared_file(folder, name))
     about, total = prepared.about(), len(prepared)
     if checksummed.verified_checksum(file) is not None and is_of(file, job, index, number, total):
@@ -100,26 +100,13 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
 
 
 @functools.lru_cache(maxsize=2)
-def _tools(
-    weights: str | None,
-    sha256: str,
-    calibration: str | None,
-    unit_sha256: str,
-    preset: str,
-    variant: str,
-    answer: Answer,
-    gel: GelKind,
-    source: str,
-    target: str,
-) -> Tools:
+def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
     """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
-    from .convert import load_tools
-
-    check_unit(calibration, unit_sha256)
-    tools = load_tools(weights, calibration, preset, variant or None, answer, gel, target, source)
+    check_unit(options.calibration, unit_sha256)
+    tools = convert.load_tools(options)
     if tools.translator.sha256 != sha256:
         found, advice = f"sha256 {tools.translator.sha256[:12]}...", "Use the weights that the job was made with"
-        raise TactileError(weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)
+        raise TactileError(options.weights or "the shipped weights", found, f"{sha256[:12]}..., as in the job", advice)
     return tools
 
 

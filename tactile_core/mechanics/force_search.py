@@ -28,10 +28,12 @@ class _Pressed(Protocol):
     """A contact at a ``depth``, m, under a ``force`` (3,) N."""
 
     @property
-    def depth(self) -> float: ...
+    def depth(self) -> float:
+        """Depth past first touch, m."""
 
     @property
-    def force(self) -> np.ndarray: ...
+    def force(self) -> np.ndarray:
+        """Force (3,) N of the indenter."""
 
 
 _Found = TypeVar("_Found", bound=_Pressed)

@@ -15,7 +15,7 @@ from ..geometry.lattice import Lattice
 from .descriptor import describe, of_kind
 from .electrodes import contact_pressures_of, contacts_of, places_of, typical_rest
 from .fluid_sensor import FALLS, Fluid
-from .gel_sensor import Gel
+from .gel_sensor import GelSensor
 from .gel_shape import shape_of
 from .skin_shape import skin_of
 from .toml_fields import Material
@@ -121,7 +121,7 @@ def is_gel(sensor: str) -> bool:
 
     Raises TactileError for a name that is none.
     """
-    return isinstance(describe(sensor), Gel)
+    return isinstance(describe(sensor), GelSensor)
 
 
 def thickness(sensor: str) -> float:

@@ -9,7 +9,7 @@ from .calibration_file import load_calibration
 from .descriptor import describe, passed_over
 from .electrodes import table_of
 from .fluid_sensor import Fluid
-from .gel_sensor import Gel
+from .gel_sensor import GelSensor
 
 
 def about(name: str) -> str:
@@ -21,7 +21,7 @@ def about(name: str) -> str:
     size = " x ".join(f"{1e3 * each:.2f}" for each in np.ptp(surface.rest, axis=0)[[0, 2]])
     lines = [
         f"{name}: {found.title}",
-        *(_of_gel(name, found) if isinstance(found, Gel) else _of_skin(name, found)),
+        *(_of_gel(name, found) if isinstance(found, GelSensor) else _of_skin(name, found)),
         f"size: {size} mm along and across the finger",
         f"material: Young's modulus {1e-6 * found.material.youngs:g} MPa, Poisson's ratio {found.material.poisson:g}",
         f"surface: {len(surface.rest)} nodes, {len(surface.faces)} triangles{_apart(name, found)}",
@@ -35,11 +35,13 @@ def about(name: str) -> str:
     return "\n".join(lines)
 
 
-def _apart(name: str, sensor: Fluid | Gel) -> str:
-    return f"; {1e3 * shape_of(name).spacing:.2g} mm apart where the camera looks" if isinstance(sensor, Gel) else ""
+def _apart(name: str, sensor: Fluid | GelSensor) -> str:
+    return (
+        f"; {1e3 * shape_of(name).spacing:.2g} mm apart where the camera looks" if isinstance(sensor, GelSensor) else ""
+    )
 
 
-def _of_gel(name: str, gel: Gel) -> list[str]:
+def _of_gel(name: str, gel: GelSensor) -> list[str]:
     form = "flat" if gel.dome is None else "domed"
     picture = "no calibration"
     if gel.camera.calibration:

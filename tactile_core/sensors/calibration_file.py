@@ -18,7 +18,7 @@ from ..files.outside import toml_quoted
 from .calibration import Calibration, Coating, Fit, Markers, Response
 from .camera import COLOURS, Camera, Led
 from .descriptor import describe, of_kind
-from .gel_sensor import Gel
+from .gel_sensor import GelSensor
 from .toml_fields import MAY_MISS, file_beside, number, one_of, read_table, read_toml
 
 FORMAT = "tactile-calibration-3"
@@ -50,7 +50,7 @@ def load_calibration(path: str | os.PathLike | None = None, sensor: str | None =
 
 def calibration_path(sensor: str) -> Path:
     """Return the file of the calibration that a gel's descriptor names. Raises TactileError where it names none."""
-    gel = of_kind(sensor, Gel)
+    gel = of_kind(sensor, GelSensor)
     if not gel.camera.calibration:
         advice = "Make one: `tactile calibrate --start FILE`, as docs/extend.md says"
         raise TactileError(f"sensor {sensor!r}, camera, calibration", "none", "a file beside the descriptor", advice)

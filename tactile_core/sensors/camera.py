@@ -15,11 +15,11 @@ import numpy as np
 from ..errors import TactileError
 from ..geometry.lattice import Lattice
 from .descriptor import of_kind
-from .gel_sensor import Gel
+from .gel_sensor import GelSensor
 from .gel_shape import shape_of
 from .toml_fields import IN_PYTHON, number
 
-HEIGHT_ZERO_Y = of_kind("digit", Gel).camera.height_zero_y  # of a DIGIT's cameras
+HEIGHT_ZERO_Y = of_kind("digit", GelSensor).camera.height_zero_y  # of a DIGIT's cameras
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
 FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)
 LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
@@ -71,12 +71,12 @@ class Camera:
         if not (math.isfinite(self.apparent_height) and self.apparent_height >= LOWEST_CAMERA):
             expected = f"{LOWEST_CAMERA} m or more, above the gel"
             raise TactileError("camera, apparent_height", repr(self.apparent_height), expected)
-        of_kind(self.sensor, Gel)  # refused where it is none
+        of_kind(self.sensor, GelSensor)  # refused where it is none
 
     @property
     def height_zero_y(self) -> float:
         """The plane of height zero, y m. Heights grow with y, toward the camera: an indentation raises them."""
-        return of_kind(self.sensor, Gel).camera.height_zero_y
+        return of_kind(self.sensor, GelSensor).camera.height_zero_y
 
     @property
     def surface(self) -> Lattice:

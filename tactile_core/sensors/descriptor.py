@@ -9,15 +9,15 @@ from typing import Any, TypeVar
 
 from ..errors import TactileError
 from .fluid_sensor import Fluid
-from .gel_sensor import Gel
+from .gel_sensor import GelSensor
 from .toml_fields import read_table, read_toml
 
 FOLDER = Path(__file__).parent
 OWN = "TACTILE_SENSORS"  # environment variable: a folder with the user's own sensors
 FILE, FORMAT = "sensor.toml", "tactile-sensor-1"
-_S = TypeVar("_S", Fluid, Gel)
+_S = TypeVar("_S", Fluid, GelSensor)
 
-KINDS: dict[str, type[Fluid] | type[Gel]] = {"fluid": Fluid, "gel": Gel}
+KINDS: dict[str, type[Fluid] | type[GelSensor]] = {"fluid": Fluid, "gel": GelSensor}
 
 
 def _folders() -> dict[str, Path]:
@@ -50,7 +50,7 @@ def names() -> tuple[str, ...]:
 
 
 @functools.cache
-def describe(name: str) -> Fluid | Gel:
+def describe(name: str) -> Fluid | GelSensor:
     """Read the descriptor of a known sensor. Raises TactileError for an unknown name."""
     folder = _folders().get(name)
     if folder is None:
@@ -59,7 +59,7 @@ def describe(name: str) -> Fluid | Gel:
 
 
 def of_kind(name: str, form: type[_S]) -> _S:
-    """Read the descriptor of a sensor of one kind, ``Fluid`` or ``Gel``. Raises TactileError for another's."""
+    """Read the descriptor of a sensor of one kind, ``Fluid`` or ``GelSensor``. Raises TactileError for another's."""
     found = describe(name)
     if not isinstance(found, form):
         kinds = {form: kind for kind, form in KINDS.items()}
@@ -67,7 +67,7 @@ def of_kind(name: str, form: type[_S]) -> _S:
     return found
 
 
-def read(folder: Path) -> Fluid | Gel:
+def read(folder: Path) -> Fluid | GelSensor:
     """Read the descriptor in a folder.
 
     Raises TactileError naming file and field for one that is missing, unknown, in another unit or out of its range.
@@ -75,7 +75,7 @@ def read(folder: Path) -> Fluid | Gel:
     return read_toml(folder / FILE, lambda content: _sensor(content, folder), "a sensor's descriptor")
 
 
-def _sensor(content: dict[str, Any], folder: Path) -> Fluid | Gel:
+def _sensor(content: dict[str, Any], folder: Path) -> Fluid | GelSensor:
     if content.get("format") != FORMAT:
         raise TactileError("format", repr(content.get("format")), repr(FORMAT))
     kind = content.get("kind")

@@ -1,4 +1,4 @@
-"""Descriptor of a gel on a window, such as the DIGIT's: ``Gel`` and its tables."""
+"""Descriptor of a gel on a window, such as the DIGIT's: ``GelSensor`` and its tables."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class CameraMount:
 
 
 @dataclasses.dataclass(frozen=True)
-class Gel:
+class GelSensor:
     """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat"""
 
     title: str

@@ -9,14 +9,14 @@ import numpy as np
 from ..errors import TactileError
 from ..geometry.lattice import Lattice, grid_faces
 from .descriptor import of_kind
-from .gel_sensor import ROUND, Dome, Gel
+from .gel_sensor import ROUND, Dome, GelSensor
 from .profiles import read_heights
 
 
 @functools.cache
 def shape_of(name: str) -> GelShape:
     """Return the shape of a sensor's gel. Raises TactileError for a sensor without one."""
-    return GelShape(of_kind(name, Gel))
+    return GelShape(of_kind(name, GelSensor))
 
 
 class GelShape:
@@ -26,7 +26,7 @@ class GelShape:
     back_y : of the flat back; thickness : at the apex; spacing : of the lattice's window along x
     """
 
-    def __init__(self, descriptor: Gel) -> None:
+    def __init__(self, descriptor: GelSensor) -> None:
         self.descriptor = descriptor
         self._outline, self._body, self._lattice = descriptor.outline, descriptor.body, descriptor.lattice
         self.half_width, self.tip_x, self.base_x = self._outline.half_width, self._outline.tip_x, self._outline.base_x

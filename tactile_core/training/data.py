@@ -14,9 +14,8 @@ from ..sensors.readout import converted
 from ..simulation.pairs_file import Pairs, Split
 from ..translation.contact_frame import ContactFrame
 from ..translation.posterior import DEPTH_SCALE, FORCE_SCALE
-from .mirror_augmentation import across, image_of_electrodes
 from .options import Options
-from .surface_codec import SILENT, SurfaceCodec, touching
+from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, touching
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,12 @@ import torch
 from .. import accuracy
 from ..accuracy import Row
 from ..sensors import TARGET
-from ..translation import error_bounds
-from ..translation.error_bounds import KINDS
+from ..translation.card import KINDS, SURFACES, fit_bounds
 from ..translation.layers import DISTANCES
-from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks
 from ..translation.translator import silent_level
 from ..translation.weights import write_bytes
 from .data import Contacts
-from .error_summary import metric_row, metric_rows
 from .stages import Model
 from .step_errors import (
     Bodies,
@@ -28,6 +25,8 @@ from .step_errors import (
     error_columns,
     joined,
     mesh_columns,
+    metric_row,
+    metric_rows,
     parts,
     translation_metrics,
     true_displacement,
@@ -72,6 +71,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:
+        """Return the errors of some contacts."""
         change = torch.from_numpy(measure.change[part])
         with torch.no_grad():
             latent = model.directly(torch.cat([change, torch.zeros(len(change), 1)], -1))
@@ -96,8 +96,8 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
     state = nets.contact(signal)
     biotac, digit = nets.latents(signal, state)
     return {
-        "biotac_m": accuracy.lengths(nets.decode_biotac(biotac)).max(-1),
-        "digit_m": accuracy.lengths(nets.decode_digit(digit)).max(-1),
+        "biotac_m": accuracy.lengths(nets.decode_source(biotac)).max(-1),
+        "digit_m": accuracy.lengths(nets.decode_target(digit)).max(-1),
         "force_N": accuracy.lengths(nets.force_in(state, biotac)),
     }
 
@@ -136,7 +136,7 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `error_bounds.fit` on the validation presses, signed and rectified apart; silence : the card's."""
+    """Fit `card.fit_bounds` on the validation presses, signed and rectified apart; silence : the card's."""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():
@@ -146,7 +146,7 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
             for part in parts(len(rows))
         )
         errors = {name: (columns[f"{name}_max_m"], columns[f"{name}_expected_m"]) for name in SURFACES}
-        bounds[kind] = {name: error_bounds.fit(*error, columns["x_m"]) for name, error in errors.items()}
+        bounds[kind] = {name: fit_bounds(*error, columns["x_m"]) for name, error in errors.items()}
     return bounds
 
 

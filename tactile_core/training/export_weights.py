@@ -12,8 +12,7 @@ from ..files.version import __version__
 from ..sensors import places_of
 from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
-from ..translation.card import NODES, REST
-from ..translation.network_sizes import ERROR_FEATURES, NETS, PLACE, POSTERIORS, SURFACES
+from ..translation.card import ERROR_FEATURES, NETS, NODES, PLACE, POSTERIORS, REST, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
@@ -92,7 +91,7 @@ def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndar
 
 
 def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
-    """Return the sizes in the card, from which `network_sizes.tensor_shapes` knows every shape."""
+    """Return the sizes in the card, from which `card.tensor_shapes` knows every shape."""
     options = contacts.options
     head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}

@@ -9,8 +9,8 @@ import torch
 from torch import Tensor, nn
 
 from ..sensors import ELECTRODES
+from ..translation.card import PLACE, SIGNAL_HIDDEN, STATE
 from ..translation.layers import COUNT_SCALE, NORM_EPSILON
-from ..translation.network_sizes import PLACE, SIGNAL_HIDDEN, STATE
 from ..translation.networks import LEAST_SPREAD, SPREAD_LIMITS
 from ..translation.posterior import LEAST_TOUCH, MEAN_SHIFTS
 from .surface_codec import SurfaceCodec

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from ..translation.network_sizes import ERROR_FEATURES, PLACE, SURFACES
+from ..translation.card import ERROR_FEATURES, PLACE, SURFACES
 from ..translation.networks import ERROR_UNIT, PRESSURE_SCALE
 from ..translation.posterior import FORCE_SCALE
 from .data import Batch, Contacts
@@ -46,34 +46,34 @@ class Model(nn.Module):
         initialise(self, generator)
 
     def from_signal(self, signal: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) to latent_biotac and latent_digit of the most plausible contact."""
+        """Map signal (B, 20) to latent_source and latent_target of the most plausible contact."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         state = torch.where(rectified, self.R2MPN.contact(latent), self.S2MPN.contact(latent))
         biotac, _ = self.given(signal, state)
-        return biotac, self.to_digit(state, biotac)
+        return biotac, self.to_target(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) and contact's state (B, STATE) to latent_biotac, and the surprise (B,) at the state."""
+        """Map signal (B, 20) and contact's state (B, STATE) to latent_source, and the surprise (B,) at the state."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
         return biotac, torch.where(rectified[:, 0], *surprises)
 
-    def across(self, latent_biotac: Tensor) -> Tensor:
-        """Map latent_biotac to latent_digit."""
-        return self.M2MPN(self.MVB.placed(latent_biotac))
+    def across(self, latent_source: Tensor) -> Tensor:
+        """Map latent_source to latent_target."""
+        return self.M2MPN(self.MVB.placed(latent_source))
 
-    def to_digit(self, state: Tensor, latent_biotac: Tensor) -> Tensor:
-        """Map a contact's state (B, STATE) and its latent_biotac to latent_digit, whose place is the state's."""
-        return torch.cat([state[:, :PLACE], self.across(latent_biotac)[:, PLACE:]], -1)
+    def to_target(self, state: Tensor, latent_source: Tensor) -> Tensor:
+        """Map a contact's state (B, STATE) and its latent_source to latent_target, whose place is the state's."""
+        return torch.cat([state[:, :PLACE], self.across(latent_source)[:, PLACE:]], -1)
 
-    def back(self, latent_digit: Tensor) -> Tensor:
-        """Map latent_digit to latent_biotac."""
-        return self.D2BPN(self.MVD.placed(latent_digit))
+    def back(self, latent_target: Tensor) -> Tensor:
+        """Map latent_target to latent_source."""
+        return self.D2BPN(self.MVD.placed(latent_target))
 
-    def to_signal(self, latent_biotac: Tensor) -> Tensor:
-        """Map latent_biotac to compressed changes (B, 19)."""
-        return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_biotac)))
+    def to_signal(self, latent_source: Tensor) -> Tensor:
+        """Map latent_source to compressed changes (B, 19)."""
+        return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_source)))
 
     def expected_error(self, signal: Tensor) -> Tensor:
         """Map signal (B, 20) to the logarithm (B, 2) of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
@@ -160,7 +160,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
     meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
     """
     biotac, _ = model.given(batch.signal, batch.state)
-    digit, across = model.to_digit(batch.state, biotac), model.across(model.MVB.mean(batch.biotac))
+    digit, across = model.to_target(batch.state, biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
     return (
         model.MVB.shape_loss(biotac, batch.rows)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from .. import accuracy, sensors
+from ..accuracy import Row, row
 from ..geometry.lattice import Lattice
 from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from ..simulation.pairs_file import Pairs
+from ..translation.card import SURFACES
 from ..translation.gel_place import contact_patch
-from ..translation.network_sizes import SURFACES
 from ..translation.networks import Networks
 from ..translation.translator import contact_center
 
@@ -69,22 +70,22 @@ def joined(columns: Iterator[Columns]) -> Columns:
 def _part(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
     skin, gel = (true_displacement(pairs, sensor, rows) for sensor in PAIR)
     patch = pairs.contact_patch_digit[rows]
-    mesh, read = nets.encode_biotac(skin), nets.encode_signal(change)
+    mesh, read = nets.encode_source(skin), nets.encode_signal(change)
     state = nets.contact(read)
     signal, chained = nets.latents(read, state)
     found = {
         **mesh_columns("baseline_biotac", np.zeros_like(skin), skin, accuracy.lengths),
         **mesh_columns("baseline_digit", np.zeros_like(gel), gel),
-        **mesh_columns("MVB", nets.decode_biotac(mesh), skin, accuracy.lengths),
-        **mesh_columns("MVD", nets.decode_digit(nets.encode_digit(gel)), gel),
-        **mesh_columns("S2MPN", nets.decode_biotac(signal), skin, accuracy.lengths),
-        "S2MPN_position_mm": 1e3 * _skin_offset(nets.decode_biotac(signal), skin, bodies),
+        **mesh_columns("MVB", nets.decode_source(mesh), skin, accuracy.lengths),
+        **mesh_columns("MVD", nets.decode_target(nets.encode_target(gel)), gel),
+        **mesh_columns("S2MPN", nets.decode_source(signal), skin, accuracy.lengths),
+        "S2MPN_position_mm": 1e3 * _skin_offset(nets.decode_source(signal), skin, bodies),
     }
     for name, latent in (("M2MPN", nets.m2m(mesh)), ("chain", chained)):
-        answer = nets.decode_digit(latent)
+        answer = nets.decode_target(latent)
         found |= mesh_columns(name, answer, gel) | digit_columns(name, answer, patch, bodies)
-    back = nets.m2m_back(nets.encode_digit(gel))
-    found |= mesh_columns("D2B", nets.decode_biotac(back), skin, accuracy.lengths)
+    back = nets.m2m_back(nets.encode_target(gel))
+    found |= mesh_columns("D2B", nets.decode_source(back), skin, accuracy.lengths)
     for name, latent in (("B2S", mesh), ("D2S", back)):
         found[f"{name}_counts"] = _rms(nets.decode_signal(nets.m2s(latent)) - pairs.signal[rows])
     found["baseline_counts"] = _rms(pairs.signal[rows])
@@ -114,7 +115,7 @@ def error_columns(
     ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
     """
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
-    answers = {SOURCE: nets.decode_biotac(biotac), TARGET: nets.decode_digit(digit)}
+    answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
     found = {f"{name}_max_m": accuracy.max_error(answer, truth[name]) for name, answer in answers.items()}
     expected = nets.expected_error(change, rectified)
@@ -155,3 +156,67 @@ def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndar
     places = bodies.unrolled[on_pad]
     first, second = (accuracy.core_center(accuracy.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))
     return accuracy.lengths(first - second)
+
+
+BINS = (0.1e-3, 0.3e-3, 0.6e-3, 0.9e-3, 1.2e-3)  # m, of depth on the BioTac, the sensor that is read (assumed)
+
+MEDIANS = ("position_mm", "percent")
+BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "baseline_biotac"}
+
+
+def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
+    """Return the mean over depths of the mean over indenters of contacts' mean (or median); None without any."""
+    middle = np.median if median else np.mean
+    bins = []
+    for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        inside = np.isfinite(values) & (depth >= low) & (depth < high)
+        each = [middle(values[inside & (indenter == kind)]) for kind in np.unique(indenter[inside])]
+        if each:
+            bins.append(np.mean(each))
+    return float(np.mean(bins)) if bins else None
+
+
+def metric_rows(
+    columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
+) -> list[Row]:
+    """Make a row for each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
+    still = ~pairs.slide[rows].any(-1)
+    depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
+    found = []
+    for name, values in columns.items():
+        if not name.startswith("baseline_"):
+            at = np.where(still, values, np.nan)
+            value = in_bins(at, depth, indenter, is_median(name))
+            baseline = in_bins(np.where(still, _baseline(columns, name), np.nan), depth, indenter, is_median(name))
+            found.append(metric_row(name, value, baseline, targets.get(name), set_name))
+    return found
+
+
+def is_median(name: str) -> bool:
+    """Return true if a metric is summarised by its median: distances of places and shares of forces and peaks."""
+    return name.endswith(MEDIANS)
+
+
+def _baseline(columns: Columns, name: str) -> np.ndarray:
+    step, metric = name.split("_", 1)
+    nothing = columns.get(
+        "baseline_counts" if metric == "counts" else f"{BASELINES.get(step, 'baseline_digit')}_{metric}"
+    )
+    return np.full(len(columns[name]), np.nan) if nothing is None else nothing
+
+
+def metric_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
+    """Make one row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
+    unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
+    target = None if value is None else target
+    return row(name, value, unit, target, baseline=baseline, of=set_name, at_least=name.endswith("iou"))
+
+
+def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
+    """Yield name and mask over ``rows`` of contacts with rows of their own: light, of each depth, deeper, sliding."""
+    depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
+    yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
+    for low, high in zip(BINS[:-1], BINS[1:], strict=True):
+        yield f"{1e3 * low:g} to {1e3 * high:g} mm", (depth >= low) & (depth < high) & ~sliding
+    yield "deeper than 1.2 mm", (depth >= BINS[-1]) & ~sliding
+    yield "sliding", sliding

@@ -22,8 +22,8 @@ from ..errors import TactileError
 from ..files import atomic
 from ..sensors import sensor_surface
 from ..simulation.pairs_file import Pairs, Split, read_pairs, split_presses
+from ..translation.card import SURFACES
 from ..translation.contact_frame import ContactFrame, frame_of
-from ..translation.network_sizes import SURFACES
 from . import checkpoint
 from .data import Contacts
 from .error_report import draw_losses, write_log
@@ -212,6 +212,7 @@ def epoch_losses(
     signal = contacts.read(rows, rng, options.rectified, options.unit)
 
     def loss(step: int) -> torch.Tensor:
+        """Compute the loss of one batch."""
         part = slice(step * options.batch, (step + 1) * options.batch)
         batch = contacts.batch(rows[part], signal[part])
         return stage.loss(model, contacts, batch, options, generator)

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .card import PLACE, STATE
 from .layers import COMPRESSED_LIMIT
-from .network_sizes import PLACE, STATE
 from .posterior import LEAST_TOUCH, Posterior, touches
 
 # Standard deviation of what a state changes by in 10 ms. Places are in tens of cells of the gel, 0.4 mm each: 0.18 mm;

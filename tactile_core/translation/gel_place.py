@@ -11,8 +11,8 @@ from ..geometry.lattice import Lattice
 from ..recordings.flags import Flag
 from ..sensors.camera import Camera
 from ..sensors.unrolling import node_normals
+from .card import PLACE
 from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
-from .network_sizes import PLACE
 
 STEPS = 8  # of Newton's method; it ends in three on our lattice, whose cells are nearly squares
 FADE = 5e-3  # m beside the gel, over which a moved field fades out (assumed: a step at its rim would show in pictures)
@@ -52,10 +52,8 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
     return place
 
 
-def beyond_picture(center: np.ndarray, camera: Camera | None) -> np.ndarray:
+def beyond_picture(center: np.ndarray, camera: Camera) -> np.ndarray:
     """Return the flags (T,) uint16 of contacts (T, 2) = (x, z) m on the gel that a camera does not see."""
-    if camera is None:
-        return np.zeros(len(center), np.uint16)
     beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
     return np.where(beside, Flag.BEYOND_PICTURE, 0).astype(np.uint16)
 

@@ -24,10 +24,9 @@ import numpy as np
 from ..errors import TactileError
 from ..files.shipped import shipped
 from ..sensors import SOURCE, electrode_count
-from .card import pair_of
+from .card import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, pair_of, tensor_shapes
 from .contact_frame import ContactFrame
 from .layers import COMPRESSED_LIMIT, SignalDistance, Tensors, compress, expand, in_blocks, plain, residual
-from .network_sizes import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, tensor_shapes
 from .posterior import FORCE_SCALE, Posterior
 from .weights import ADVICE, CARD_NAME, read_card, read_verified
 
@@ -87,19 +86,19 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one, to latent_biotac (T, L)."""
+        """Map latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one, to latent_source (T, L)."""
         return self._either("code", np.concatenate([latent_signal, state], -1), rectified)
 
-    def m2m(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """Map latent_biotac (T, L) to latent_digit (T, L')."""
-        return self._map_placed("M2MPN", "MVB", latent_biotac)
+    def m2m(self, latent_source: np.ndarray) -> np.ndarray:
+        """Map latent_source (T, L) to latent_target (T, L')."""
+        return self._map_placed("M2MPN", "MVB", latent_source)
 
     def latents(
         self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), states (T, STATE), rectified (T,) or one, to latent_biotac and latent_digit."""
-        latent_biotac = self.given(latent_signal, state, rectified)
-        return latent_biotac, self.to_digit(state, latent_biotac)
+        """Map latent_signal (T, K), states (T, STATE), rectified (T,) or one, to latent_source and latent_target."""
+        latent_source = self.given(latent_signal, state, rectified)
+        return latent_source, self.to_target(state, latent_source)
 
     def likely_latents(
         self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False
@@ -107,19 +106,19 @@ class Networks:
         """Compute `latents` of the most plausible contact."""
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
-    def to_digit(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
-        """Map states of contacts (T, STATE) and their latent_biotac (T, L) to latent_digit (T, L') at their place."""
-        latent = self.m2m(latent_biotac)
+    def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
+        """Map states of contacts (T, STATE) and their latent_source (T, L) to latent_target (T, L') at their place."""
+        latent = self.m2m(latent_source)
         latent[:, :PLACE] = state[:, :PLACE]
         return latent
 
-    def m2m_back(self, latent_digit: np.ndarray) -> np.ndarray:
-        """Map latent_digit (T, L') to latent_biotac (T, L)."""
-        return self._map_placed("D2BPN", "MVD", latent_digit)
+    def m2m_back(self, latent_target: np.ndarray) -> np.ndarray:
+        """Map latent_target (T, L') to latent_source (T, L)."""
+        return self._map_placed("D2BPN", "MVD", latent_target)
 
-    def m2s(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """Map latent_biotac (T, L) to latent_signal (T, K)."""
-        return self._map_placed("B2SPN", "MVB", latent_biotac)
+    def m2s(self, latent_source: np.ndarray) -> np.ndarray:
+        """Map latent_source (T, L) to latent_signal (T, K)."""
+        return self._map_placed("B2SPN", "MVB", latent_source)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Return the expected largest node errors (T, 2) m of BioTac and DIGIT, of change (T, 19) counts.
@@ -128,29 +127,29 @@ class Networks:
         """
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
-    def encode_biotac(self, displacement: np.ndarray) -> np.ndarray:
-        """Encode displacement (T, N, 3) m of the BioTac's outer skin as latent_biotac (T, L)."""
+    def encode_source(self, displacement: np.ndarray) -> np.ndarray:
+        """Encode displacement (T, N, 3) m of the source's skin as latent_source (T, L)."""
         return self._encode_mesh("MVB", displacement)
 
-    def encode_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Encode displacement (T, M, 3) m of the DIGIT's gel as latent_digit (T, L')."""
+    def encode_target(self, displacement: np.ndarray) -> np.ndarray:
+        """Encode displacement (T, M, 3) m of the target's gel as latent_target (T, L')."""
         return self._encode_mesh("MVD", displacement)
 
-    def decode_biotac(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """Decode latent_biotac (T, L) to displacement (T, N, 3) m of the BioTac's outer skin."""
-        return self._decode_mesh("MVB", latent_biotac)
+    def decode_source(self, latent_source: np.ndarray) -> np.ndarray:
+        """Decode latent_source (T, L) to displacement (T, N, 3) m of the source's skin."""
+        return self._decode_mesh("MVB", latent_source)
 
-    def decode_digit(self, latent_digit: np.ndarray) -> np.ndarray:
-        """Decode latent_digit (T, L') to displacement (T, M, 3) m of the DIGIT's gel."""
-        return self._decode_mesh("MVD", latent_digit)
+    def decode_target(self, latent_target: np.ndarray) -> np.ndarray:
+        """Decode latent_target (T, L') to displacement (T, M, 3) m of the target's gel."""
+        return self._decode_mesh("MVD", latent_target)
 
-    def force(self, latent_biotac: np.ndarray) -> np.ndarray:
-        """Return the force (T, 3) N exerted by the object, sensor frame, from latent_biotac (T, L)."""
-        return in_blocks(self._force, latent_biotac, (self.sizes["MVB"]["latent"],), "force")
+    def force(self, latent_source: np.ndarray) -> np.ndarray:
+        """Return the force (T, 3) N exerted by the object, sensor frame, from latent_source (T, L)."""
+        return in_blocks(self._force, latent_source, (self.sizes["MVB"]["latent"],), "force")
 
-    def force_in(self, state: np.ndarray, latent_biotac: np.ndarray) -> np.ndarray:
-        """Return the force (T, 3) N, of the states' size, from states (T, STATE) and their latent_biotac (T, L)."""
-        estimate = self.force(latent_biotac)
+    def force_in(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
+        """Return the force (T, 3) N, of the states' size, from states (T, STATE) and their latent_source (T, L)."""
+        estimate = self.force(latent_source)
         length = np.sqrt(np.square(estimate).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
@@ -232,6 +231,7 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def encode(block: np.ndarray) -> np.ndarray:
+            """Encode (BLOCK, n, 3) m."""
             local = frame.to_local(block)
             place = frame.place(local)
             cells, left = frame.cells(place)
@@ -248,6 +248,7 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def decode(block: np.ndarray) -> np.ndarray:
+            """Decode (BLOCK, L)."""
             placed, cells = self._placed(net, block)
             modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
             wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]

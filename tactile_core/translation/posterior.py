@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .network_sizes import PLACE
+from .card import PLACE
 
 FORCE_SCALE = 0.1  # N: the force is 0.1 N sinh(head), which spans light touches and firm presses alike (assumed)
 DEPTH_SCALE = 20e-6  # m, likewise, of the depth in a contact's state (assumed)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -15,15 +14,12 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals
 from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
-from . import error_bounds, networks, reference_signals
+from . import networks, reference_signals
 from .answer import Answer
-from .card import NODES, pair_of
+from .card import NODES, check_pair, check_tables
 from .contact_track import Evidence, Tracker, needed
-from .error_bounds import KINDS
-from .layers import DISTANCES
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
-from .weights import ADVICE
 
 if TYPE_CHECKING:
     from ..recordings.electrode_gains import ElectrodeGains
@@ -169,43 +165,6 @@ def _shared_translator(weights: str | None, source: str | None, answer: Answer) 
     return load_translator(weights, answer, None, source)
 
 
-def _check_quantiles(card: dict, where: str) -> None:
-    """Check the quantiles behind confidence and silence: growing finite numbers, one a level."""
-    _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
-    distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
-    for kind in KINDS:
-        table: Any = distance.get(kind) if isinstance(distance.get(kind), dict) else {}
-        _check_table({"levels": distance.get("levels"), **table}, DISTANCES, f"{where}, distance.{kind}")
-
-
-def _check_table(table: Any, names: tuple[str, ...], where: str) -> None:
-    levels: Any = table.get("levels") if isinstance(table, dict) else None
-    for name in ("levels", *names):
-        values: Any = table.get(name) if isinstance(table, dict) else None
-        if not (_grows(values) and len(values) == len(levels)):
-            expected = "as many growing, finite numbers as levels"
-            raise TactileError(f"{where}.{name}", f"{values!r:.80}", expected, ADVICE)
-
-
-def _grows(values: Any) -> bool:
-    numbers = isinstance(values, list) and len(values) > 0 and all(type(v) in (int, float) for v in values)
-    return numbers and all(0 <= v <= sys.float_info.max for v in values) and values == sorted(values)
-
-
-def _check_pair(card: dict[str, Any], source: str | None, target: str | None, where: str) -> None:
-    """Check that a card's networks, which its hashes of surfaces name, lead from a sensor to the gel of another."""
-    if target is not None:
-        sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
-    known = pair_of(card, where)
-    if source not in (None, known[0]):
-        advice = "`tactile convert` takes them, with recordings of that sensor"
-        expected = f"networks that translate recordings of {source}"
-        raise TactileError(where, f"networks of {' and '.join(known)}", expected, advice)
-    if target not in (None, known[1]):
-        advice = "Train some (docs/extend.md), or solve the gel under the contact that these find: --gel solved"
-        raise TactileError(where, f"networks of {' and '.join(known)}", f"networks that translate to {target}", advice)
-
-
 def load_translator(
     folder: str | os.PathLike | None = None, answer: Answer | None = None, target: str | None = TARGET,
     source: str | None = SOURCE,
@@ -220,9 +179,8 @@ def load_translator(
     """
     nets, place = networks.load(folder, source), folder or networks.shipped_folder(source)
     card_file = f"{place}, card.json"
-    _check_quantiles(nets.card, card_file)
-    error_bounds.check(nets.card, card_file)
-    _check_pair(nets.card, source, target, card_file)
+    check_tables(nets.card, card_file)
+    check_pair(nets.card, source, target, card_file)
     pair = nets.source, nets.target
     for key, here in ((f"{sensor}{NODES}", sensors.sensor_surface(sensor).sha256) for sensor in pair):
         if nets.card.get(key) != here:

@@ -13,14 +13,12 @@ from ..files.short_text import Summary
 from ..recordings import Signals
 from ..recordings.flags import Flag
 from ..sensors import unrolling as surface
-from . import error_bounds, gel_place
+from . import gel_place
 from .answer import MEAN, Answer
-from .card import REST, doubt
+from .card import KINDS, PLACE, REST, STATE, SURFACES, doubt, error_bound
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence
-from .error_bounds import KINDS
 from .layers import COMPRESSED_LIMIT, DISTANCES
-from .network_sizes import PLACE, STATE, SURFACES
 from .networks import Networks
 from .posterior import FORCE_SCALE, Posterior, touches
 from .simulated_likeness import Patterns, recovered, residual_shares, two_contacts, unlike
@@ -183,17 +181,17 @@ class Translator:
         latent_signal, unsigned = evidence.latent, evidence.unsigned
         if state is None:
             state = evidence.average if self.answer.kind == MEAN else evidence.likely
-        latent_biotac, latent_digit = nets.latents(latent_signal, state, unsigned)
+        latent_source, latent_target = nets.latents(latent_signal, state, unsigned)
         touched = touches(state)
-        biotac, digit = (
+        skin, gel = (
             decode(latent) * touched[:, None, None]
-            for decode, latent in ((nets.decode_biotac, latent_biotac), (nets.decode_digit, latent_digit))
+            for decode, latent in ((nets.decode_source, latent_source), (nets.decode_target, latent_target))
         )
         if self._shift is not None:
-            digit = self._shift(digit)
+            gel = self._shift(gel)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
         center = contact_center(
-            digit, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
+            gel, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
         )
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
@@ -201,13 +199,13 @@ class Translator:
         shares = residual_shares(change, rectified, self._patterns)
         flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
         confidence = self._confidence(change, flags, rectified)
-        flags[self._beyond_digit(biotac)] |= np.uint16(Flag.BEYOND_DIGIT)
+        flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)
         flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
-            latent_signal, latent_biotac, latent_digit, biotac, digit,
-            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_biotac)),
+            latent_signal, latent_source, latent_target, skin, gel,
+            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_source)),
             pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
@@ -220,9 +218,9 @@ class Translator:
         rest. All are zero where no node of the gel moves as far as noise alone makes the networks move one.
         """
         nets = self.nets
-        skin = nets.m2m_back(nets.encode_digit(displacement))
+        skin = nets.m2m_back(nets.encode_target(displacement))
         found = {
-            "displacement": nets.decode_biotac(skin), "force": nets.force(skin),
+            "displacement": nets.decode_source(skin), "force": nets.force(skin),
             "electrodes": nets.decode_signal(nets.m2s(skin)),
         }  # fmt: skip
         still = accuracy.lengths(displacement).max(axis=1) < self.silent("digit_m")
@@ -244,8 +242,8 @@ class Translator:
         return found
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
-        """Bound (T,) m on 95 of 100 largest errors, by `error_bounds.bound`."""
-        return error_bounds.bound(expected, x, self.card["error_bounds"][kind][surface])
+        """Bound (T,) m on 95 of 100 largest errors, by `card.error_bound`."""
+        return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""

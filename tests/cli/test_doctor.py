@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tactile_core.cli import doctor
 from tactile_core.cli.main import main
+from tactile_core.cli.verbs import doctor
 from tactile_core.pictures.mitsuba import variant
 
 
@@ -43,7 +43,7 @@ def test_a_library_that_fails_is_told(module, words, tmp_path, monkeypatch):
 
 
 def test_without_llvm_it_says_why_and_how_to_get_it(monkeypatch):
-    monkeypatch.setattr(doctor, "llvm_trouble", lambda library: "LLVM was not found")
+    monkeypatch.setattr(variant, "llvm_trouble", lambda library: "LLVM was not found")
     lines = list(doctor._mitsuba(True))
     assert "scalar_rgb" in lines[0] and "LLVM was not found" in lines[0]
     assert "LLVM 18 or newer" in lines[1]

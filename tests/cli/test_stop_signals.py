@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from tactile_core.cli.stop_signals import Stopped, stopping
+from tactile_core.cli.main import Stopped, stopping
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows ends a process on SIGTERM without asking it")
 

@@ -259,7 +259,7 @@ def test_single_networks() -> Found:
     """Frames of the shipped recording through both."""
     nets = networks.load()
     change = prepared()[1].change[100::60]
-    single, double = (n.decode_digit(n.likely_latents(n.encode_signal(change))[1]) for n in (nets, Double(nets)))
+    single, double = (n.decode_target(n.likely_latents(n.encode_signal(change))[1]) for n in (nets, Double(nets)))
     words = f"{len(change)} frames, nodes move up to {np.abs(double).max() * 1e6:.0f} um"
     return Found(float(np.abs(single - double).max()) * 1e6, "um", 0.5, words=words)
 

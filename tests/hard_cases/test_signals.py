@@ -15,7 +15,7 @@ import numpy as np
 
 from hard_cases.case import FAST_PICTURE, HEIGHT_MAP, TRANSLATION, Found, case
 from tactile_core import accuracy, recordings
-from tactile_core.jobs.convert import Options, convert, load_tools
+from tactile_core.jobs.convert import Options, ToolOptions, convert, load_tools
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.recordings import Recording, Signals
@@ -194,7 +194,7 @@ def test_out_of_range() -> Found:
 def _wild() -> np.ndarray:
     nets = networks.load()
     latent = np.random.default_rng(3).normal(0, 12, (8, nets.sizes["MVD"]["latent"])).astype(np.float32)
-    return nets.decode_digit(latent)
+    return nets.decode_target(latent)
 
 
 @case("wild_latents_height_map", "out-of-range latents", HEIGHT_MAP,
@@ -234,7 +234,7 @@ def test_one_frame() -> Found:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "one.csv"
         path.write_text(",".join(header) + "\n" + ",".join(line) + "\n")
-        done = convert(path, Path(folder) / "out", Options(keep=("image", "displacement")), load_tools())
+        done = convert(path, Path(folder) / "out", Options(keep=("image", "displacement")), load_tools(ToolOptions()))
         with h5py.File(Path(folder) / "out/frames.h5") as file:
             flags, confidence = int(file["flags"][0]), float(file["confidence"][0])
             finite = all(np.isfinite(file[name][0]).all() for name in ("displacement_digit", "force"))

@@ -18,6 +18,7 @@ from tactile_core.jobs.drawer import Drawer
 from tactile_core.jobs.frame_pass import Tools
 from tactile_core.recordings import Signals
 from tactile_core.recordings.flags import Flag
+from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.translator import Translation
 
@@ -82,7 +83,7 @@ class Networks:
 def tools(source: str = "biotac", answer: Answer = Networks.answer) -> Tools:
     networks = Networks()
     networks.source, networks.answer = source, answer
-    return Tools(networks, Drawer(height_map, shade))
+    return Tools(networks, Drawer(height_map, shade, load_calibration().camera))
 
 
 if __name__ == "__main__":

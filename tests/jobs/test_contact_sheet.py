@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.jobs.contact_sheet import Contents, choose_frames, contact_sheet
+from tactile_core.jobs.conversion_report import Contents, choose_frames, contact_sheet
 from tactile_core.jobs.sheet_figure import CAPTION, FOOT, SheetFigure
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
@@ -18,6 +18,7 @@ def columns() -> dict:
     biotac, digit = len(sensors.biotac_surface().rest), len(sensors.digit_surface().rest)
     return {
         "name": "touch",
+        "camera": load_calibration().camera,
         "time": np.arange(50) / 100,
         "electrodes": rng.normal(size=(50, 19)),
         "frames": np.array([10, 30]),
@@ -86,13 +87,6 @@ def test_one_frame_without_contact(tmp_path: Path, columns: dict) -> None:
     columns |= {"frames": np.array([0]), "time": np.zeros(1), "electrodes": np.full((1, 19), np.nan)}
     contact_sheet(tmp_path / "a.png", Contents(**columns))
     assert size(tmp_path / "a.png")[0] == 1600
-
-
-def test_columns_must_count_alike(tmp_path: Path, columns: dict) -> None:
-    columns["force"] = columns["force"][:1]
-    with pytest.raises(ValueError, match="1 of force for 2 frames"):
-        contact_sheet(tmp_path / "a.png", Contents(**columns))
-    assert not list(tmp_path.iterdir())
 
 
 def test_frames_are_the_strongest_that_lie_apart() -> None:

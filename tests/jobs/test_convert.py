@@ -325,7 +325,7 @@ def test_a_bound_on_pictures_picks_their_preset(monkeypatch):
     assert variant.fitting(5) == "fast" and "fast" in presets.describe_choice("fast", 5)
     exact = presets.measured()["presets"]["quality"]["error"]
     assert (preset := variant.fitting(exact)) == "quality" and "quality" in presets.describe_choice(preset, exact)
-    assert convert.load_tools(preset=preset).drawer.preset == "quality" and drawn == ["quality"]
+    assert convert.load_tools(convert.ToolOptions(preset=preset)).drawer.preset == "quality" and drawn == ["quality"]
 
 
 def test_the_command_tells_the_translation_s_own_error_beside_it(slide_csv, tmp_path, monkeypatch, capsys, no_sheet):

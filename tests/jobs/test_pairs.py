@@ -10,9 +10,8 @@ from msgspec import structs
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.jobs.engine import result_parts
 from tactile_core.jobs.engine import run as runs
-from tactile_core.jobs.engine.local import InProcess
+from tactile_core.jobs.engine.local import InProcess, Local
 from tactile_core.jobs.pairs import make_pairs, plan, wanted
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
@@ -33,7 +32,7 @@ def scene(request):
 @pytest.fixture(scope="module")
 def made(scene, tmp_path_factory):
     out = tmp_path_factory.mktemp("pairs") / "pairs.h5"
-    make_pairs(scene, 40, 7, out, workers=1)
+    make_pairs(scene, 40, 7, out)
     return out
 
 
@@ -83,7 +82,7 @@ def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path
 
     interrupt(scene, resumed)
     assert not resumed.exists() and resumed.with_name("resumed.h5.parts").exists()
-    make_pairs(scene, 40, 7, resumed, workers=2)
+    make_pairs(scene, 40, 7, resumed, place=lambda folder: Local(folder, 2))
     assert resumed.read_bytes() == made.read_bytes()
     assert not resumed.with_name("resumed.h5.parts").exists()
 
@@ -92,7 +91,7 @@ def test_parts_of_an_array_make_the_same_bytes(made, scene, tmp_path):
     """Two runners share the job of a plan, and a third puts together what they made."""
     out = tmp_path / "pairs.h5"
     job, _, _ = plan(scene, 40, 7, out)
-    with result_parts.begun(out, job) as folder:
+    with runs.begun(out, job) as folder:
         pass
     shards = []
     for part in ((1, 2), (0, 2)):
@@ -199,9 +198,9 @@ def test_an_impossible_indenter_is_refused_before_anything_is_written_also_by_wo
     text = (scene / "scene.toml").read_text(encoding="utf-8").replace("radius_mm = 3.5", "radius_mm = 1e9")
     bad = tmp_path / "scene.toml"
     bad.write_text(text, encoding="utf-8")
-    for workers in (1, 2):
+    for place in (InProcess, lambda folder: Local(folder, 2)):
         with pytest.raises(TactileError, match="radius"):
-            make_pairs(bad, 5, 0, tmp_path / "x.h5", workers=workers)
+            make_pairs(bad, 5, 0, tmp_path / "x.h5", place=place)
     assert list(tmp_path.iterdir()) == [bad]
 
 

@@ -279,12 +279,18 @@ def test_files_of_other_programs_are_read(name, tmp_path):
 
 def test_a_live_view_knows_a_finger_that_does_not_answer(press):
     from tactile_core.jobs.live.live_signals import LiveSignals
+    from tactile_core.recordings.assemble import assemble
+
+    def rows(electrodes):
+        return assemble("touch.csv", "CSV", electrodes=electrodes, stamps=np.arange(len(electrodes)) / 100)
 
     live = LiveSignals()
     zeros = np.zeros((120, 19))
-    assert not live.learn(zeros) and live.silent
-    assert live.learn(press.electrodes[:150]) and not live.silent
-    np.testing.assert_allclose(live.rest, press.electrodes[:150].mean(axis=0), atol=2)  # nothing was learnt from zeros
+    assert not live.learn(rows(zeros)) and live.silent
+    assert live.learn(rows(press.electrodes[:150])) and not live.silent
+    np.testing.assert_allclose(
+        live.known.rest, press.electrodes[:150].mean(axis=0), atol=2
+    )  # nothing was learnt from zeros
     signals = live.signals(np.stack([press.electrodes[350], zeros[0]]))
     assert signals.change[0].any() and not signals.change[1].any()
     assert (signals.flags & Flag.DEAD_CHANNEL > 0).tolist() == [False, True]

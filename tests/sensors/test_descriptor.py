@@ -79,7 +79,7 @@ def test_a_name_that_is_no_sensor_is_refused_with_those_that_are():
     with pytest.raises(TactileError, match="biotac, biotac_sp, digit"):
         descriptor.describe("biotak")
     with pytest.raises(TactileError, match="kind fluid"):
-        descriptor.of_kind("biotac", descriptor.Gel)
+        descriptor.of_kind("biotac", descriptor.GelSensor)
 
 
 def test_a_second_fluid_sensor_has_a_skin_of_its_own(tmp_path, monkeypatch):

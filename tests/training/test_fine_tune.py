@@ -12,8 +12,7 @@ h5py = pytest.importorskip("h5py")
 from tactile_core.cli.main import main  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs  # noqa: E402
-from tactile_core.training.fine_tune import fine_tune  # noqa: E402
-from tactile_core.training.labelled_recording import read_labelled  # noqa: E402
+from tactile_core.training.fine_tune import fine_tune, read_labelled  # noqa: E402
 from tactile_core.translation import networks  # noqa: E402
 from tactile_core.translation.gel_place import on_gel  # noqa: E402
 

@@ -15,9 +15,14 @@ from tactile_core.sensors import electrodes, sensor_surface  # noqa: E402
 from tactile_core.simulation.pair_sampling import pair_row  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs, split_presses  # noqa: E402
 from tactile_core.training.data import Contacts  # noqa: E402
-from tactile_core.training.mirror_augmentation import across, image_of_electrodes, image_of_nodes  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
-from tactile_core.training.surface_codec import SILENT, SurfaceCodec  # noqa: E402
+from tactile_core.training.surface_codec import (  # noqa: E402
+    SILENT,
+    SurfaceCodec,
+    across,
+    image_of_electrodes,
+    image_of_nodes,
+)
 from tactile_core.translation.contact_frame import frame_of  # noqa: E402
 
 

@@ -61,7 +61,7 @@ def test_networks_are_as_wide_as_the_sensor_has_electrodes(pairs, tmp_path):
     assert nets.source == NAME and nets.electrodes == COUNT
     latent = nets.encode_signal(np.zeros((3, COUNT), np.float32))
     biotac, _ = nets.likely_latents(latent)
-    assert nets.decode_biotac(biotac).shape == (3, np.prod(SHAPES["biotac"]), 3)
+    assert nets.decode_source(biotac).shape == (3, np.prod(SHAPES["biotac"]), 3)
     assert reference_signals.read(out / "weights").typical.shape[1] == COUNT
     with pytest.raises(TactileError, match=r"encode_signal: array of shape \(3, 19\); expected \(T, 17\)"):
         nets.encode_signal(np.zeros((3, 19), np.float32))

@@ -13,9 +13,9 @@ from tactile_core.training.export_weights import net_sizes, net_tensors  # noqa:
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import Model  # noqa: E402
 from tactile_core.training.surface_codec import SurfaceCodec  # noqa: E402
+from tactile_core.translation.card import NETS, SURFACES  # noqa: E402
 from tactile_core.translation.contact_frame import ContactFrame  # noqa: E402
 from tactile_core.translation.layers import compress  # noqa: E402
-from tactile_core.translation.network_sizes import NETS, SURFACES  # noqa: E402
 from tactile_core.translation.networks import Networks  # noqa: E402
 from tactile_core.translation.posterior import FORCE_SCALE  # noqa: E402
 
@@ -96,10 +96,11 @@ def test_svb(model, nets):
 
 @pytest.mark.parametrize("name", SURFACES)
 def test_mesh_autoencoders(model, nets, contacts, name):
-    net, surface = {"biotac": "MVB", "digit": "MVD"}[name], getattr(contacts, name)
+    net, role = {"biotac": ("MVB", "source"), "digit": ("MVD", "target")}[name]
+    surface = getattr(contacts, name)
     vae, frame = getattr(model, net), surface.frame
     z = latent(nets.sizes[net]["latent"])
-    displacement = getattr(nets, f"decode_{name}")(z)
+    displacement = getattr(nets, f"decode_{role}")(z)
     same(frame.to_local(displacement), vae.field(torch.from_numpy(z)))
     local = frame.to_local(displacement)
     place = frame.place(local)
@@ -109,7 +110,7 @@ def test_mesh_autoencoders(model, nets, contacts, name):
     windows = torch.from_numpy(frame.windows(rest.view(local.shape).numpy(), cells)).flatten(1)
     seen = torch.cat([wide, windows @ surface.near.T], -1) / surface.scale
     x = torch.cat([seen, torch.from_numpy(np.concatenate([place, left], -1))], -1)
-    same(getattr(nets, f"encode_{name}")(displacement), vae.mean(x))
+    same(getattr(nets, f"encode_{role}")(displacement), vae.mean(x))
 
 
 def test_maps(model, nets):
@@ -123,7 +124,7 @@ def test_maps(model, nets):
     same(nets.m2m(biotac.numpy()), model.across(biotac))
     state = latent(4)[:40]
     both = torch.from_numpy(state), biotac[:40]
-    same(nets.to_digit(*(each.numpy() for each in both)), model.to_digit(*both))
+    same(nets.to_target(*(each.numpy() for each in both)), model.to_target(*both))
     same(nets.m2m_back(digit.numpy()), model.back(digit))
     same(compress(nets.decode_signal(nets.m2s(biotac.numpy()))), model.to_signal(biotac))
     state = np.abs(latent(4))

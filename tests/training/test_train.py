@@ -25,7 +25,8 @@ from tactile_core.training.checkpoint import read  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.stages import STAGES  # noqa: E402
 from tactile_core.training.train import deterministic, train  # noqa: E402
-from tactile_core.translation import error_bounds, network_sizes, networks, weights  # noqa: E402
+from tactile_core.translation import card as cards  # noqa: E402
+from tactile_core.translation import networks, weights  # noqa: E402
 from tactile_core.translation.layers import DISTANCES  # noqa: E402
 
 BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
@@ -65,7 +66,7 @@ def test_it_learns(pairs, tmp_path):
 
 
 def test_result_is_complete_and_loads(quick, pairs):
-    nets = {f"weights/{net}.safetensors" for net in (*network_sizes.NETS, "signals")}
+    nets = {f"weights/{net}.safetensors" for net in (*cards.NETS, "signals")}
     assert set(files(quick)) == {"log.csv", "loss.png", "weights/card.json", *nets}
     loaded = networks.load(quick / "weights")
     card = loaded.card
@@ -73,7 +74,7 @@ def test_result_is_complete_and_loads(quick, pairs):
     assert len(card["pairs"]["sha256"]) == 64
     assert card["pairs"]["contacts"] == {"train": 256, "validation": 32, "test": 32}
     assert all(row["baseline"] is not None for row in card["errors"] if row["name"].endswith(("um", "counts", "_N")))
-    error_bounds.check(card, "card.json")
+    card.check_bounds(card, "card.json")
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}
         assert shapes == entry["shapes"]

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.translation import layers, network_sizes, networks, weights
+from tactile_core.translation import card as cards
+from tactile_core.translation import layers, networks, weights
 
 NODES = {"biotac": 30, "digit": 24}
 MLP = {"width": 16, "blocks": 2}
@@ -32,9 +33,9 @@ def random_tensors(sizes):
     """Weights of the size of trained ones, float16 as they ship."""
     rng = np.random.default_rng(0)
     tensors = {}
-    for net in network_sizes.NETS:
+    for net in cards.NETS:
         tensors[net] = {}
-        for name, shape in network_sizes.tensor_shapes(net, sizes[net]).items():
+        for name, shape in cards.tensor_shapes(net, sizes[net]).items():
             values = rng.standard_normal(shape) / np.sqrt(shape[-1])
             if name in ("scale", "distance.residual"):
                 values = np.full(shape, 1e-3 if name == "scale" else 0.1)
@@ -79,10 +80,10 @@ def calls(nets, count):
         "likely_latents": (lambda z: nets.likely_latents(z)[0], latents[8], (6,)),
         "contact": (nets.contact, latents[8], (4,)),
         "m2m": (nets.m2m, latents[6], (7,)),
-        "decode_biotac": (nets.decode_biotac, latents[6], (NODES["biotac"], 3)),
-        "decode_digit": (nets.decode_digit, latents[7], (NODES["digit"], 3)),
-        "encode_biotac": (nets.encode_biotac, meshes["biotac"], (6,)),
-        "encode_digit": (nets.encode_digit, meshes["digit"], (7,)),
+        "decode_source": (nets.decode_source, latents[6], (NODES["biotac"], 3)),
+        "decode_target": (nets.decode_target, latents[7], (NODES["digit"], 3)),
+        "encode_source": (nets.encode_source, meshes["biotac"], (6,)),
+        "encode_target": (nets.encode_target, meshes["digit"], (7,)),
         "m2m_back": (nets.m2m_back, latents[7], (6,)),
         "m2s": (nets.m2s, latents[6], (8,)),
         "force": (nets.force, latents[6], (3,)),
@@ -125,7 +126,7 @@ def test_wrong_input_says_what_is_expected(nets):
     with pytest.raises(TactileError, match=r"encode_signal: array of shape \(5, 24\); expected \(T, 19\)"):
         nets.encode_signal(np.zeros((5, 24)))
     with pytest.raises(TactileError, match=r"MVB encoder.*\(T, 30, 3\)"):
-        nets.encode_biotac(np.zeros((5, 24, 3)))
+        nets.encode_source(np.zeros((5, 24, 3)))
 
 
 def test_compress_and_expand_are_inverse():

@@ -60,7 +60,7 @@ def test_signals_of_some_frames_are_those_of_the_whole(kind, shipped):
 
 def test_a_part_of_a_long_recording_is_as_in_the_whole(shipped, tmp_path):
     np.savez(tmp_path / "long.npz", electrodes=np.tile(shipped.electrodes, (5, 1)), pdc=np.tile(shipped.pdc, 5))
-    tools, held = convert.load_tools(), {}
+    tools, held = convert.load_tools(convert.ToolOptions()), {}
     for name, frames in (("whole", slice(None)), ("part", slice(700, 900, 60))):
         options = convert.Options(frames, keep=("displacement", "latent"))
         convert.convert(tmp_path / "long.npz", tmp_path / name, options, tools)
@@ -109,7 +109,7 @@ def test_a_part_of_a_long_recording_takes_little_beside_it(shipped):
 def test_the_renderer_is_made_with_the_first_picture(monkeypatch):
     made = []
     monkeypatch.setattr(renderer, "Renderer", lambda unit, preset: made.append(unit) or (lambda height: height))
-    tools = convert.load_tools()
+    tools = convert.load_tools(convert.ToolOptions())
     assert not made
     tools.drawer.warm_up()
     tools.drawer.warm_up()

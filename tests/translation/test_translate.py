@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.jobs.convert import Options, convert, load_tools
+from tactile_core.jobs.convert import Options, ToolOptions, convert, load_tools
 from tactile_core.recordings import electrode_gains, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
 from tactile_core.translation.answer import Answer
@@ -29,7 +29,7 @@ def whole(recording):
 
 
 def test_the_arrays_are_those_of_the_command(recording, whole, tmp_path):
-    convert(recording.path, tmp_path / "out", Options(keep=("displacement",)), load_tools())
+    convert(recording.path, tmp_path / "out", Options(keep=("displacement",)), load_tools(ToolOptions()))
     with h5py.File(tmp_path / "out" / "frames.h5") as file:
         for name in NAMES:
             np.testing.assert_array_equal(getattr(whole, name), file[name][:], err_msg=name)

@@ -10,7 +10,8 @@ import pytest
 from tactile_core import accuracy, recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
-from tactile_core.translation import contact_frame, network_sizes, networks, translate
+from tactile_core.translation import card as cards
+from tactile_core.translation import contact_frame, networks, translate
 from tactile_core.translation.posterior import Posterior
 from tactile_core.translation.translator import UNTRAINED_CONFIDENCE, Translator, elsewhere
 
@@ -127,7 +128,7 @@ def test_rectified_signals_are_read_as_such(translator, shipped, signals, transl
 
 def test_errors_are_expected_where_they_are(shipped, translation):
     here = touched(shipped)
-    for name in network_sizes.SURFACES:
+    for name in cards.SURFACES:
         found, true = (getattr(each, f"displacement_{name}")[here] for each in (translation, shipped.truth))
         error = accuracy.max_error(found, true)
         bound, expected = (getattr(translation, f"{what}_{name}")[here] for what in ("error_bound", "expected_error"))
@@ -148,10 +149,10 @@ def test_a_contact_beyond_the_gel_is_flagged(translator):
 def test_a_place_is_undecided_by_what_lies_elsewhere(translator):
     frame = translator.nets.frames["MVD"]
     rows = frame.rows - 1
-    mean = np.zeros((3, 2, network_sizes.STATE), np.float32)
-    mean[..., network_sizes.PLACE] = 3.0  # in contact
+    mean = np.zeros((3, 2, cards.STATE), np.float32)
+    mean[..., cards.PLACE] = 3.0  # in contact
     mean[1:, 1, 0] = 0.25 * rows / contact_frame.PLACE_UNIT  # a quarter of the gel's length away
-    mean[2, 1, network_sizes.PLACE] = 0.0  # no contact at all lies nowhere else
+    mean[2, 1, cards.PLACE] = 0.0  # no contact at all lies nowhere else
     weight = np.tile(np.float32([0.6, 0.4]), (3, 1))
     posterior = Posterior(weight, mean, np.full_like(mean, 0.1))
     np.testing.assert_allclose(elsewhere(posterior, posterior.likely, frame), [0.0, 0.4, 0.0])

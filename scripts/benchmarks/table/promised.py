@@ -23,7 +23,7 @@ from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
 from tactile_core.simulation.scene_recording import simulate_recording
 from tactile_core.training.step_errors import error_columns, joined, our_bodies, parts
-from tactile_core.translation.network_sizes import SURFACES
+from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translate import load_translator
 from tactile_core.translation.translator import Translator
 

@@ -14,8 +14,7 @@ from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
-from tactile_core.training.error_summary import metric_rows
-from tactile_core.training.step_errors import joined, mesh_columns, parts, true_displacement
+from tactile_core.training.step_errors import joined, mesh_columns, metric_rows, parts, true_displacement
 from tactile_core.translation.translate import load_translator
 
 from .method import TEST_SET, Method, best_ms, peak_mb
@@ -58,7 +57,7 @@ def _numpy() -> Surfaces:
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
         biotac, digit = nets.likely_latents(nets.encode_signal(change))
-        return nets.decode_biotac(biotac), nets.decode_digit(digit)
+        return nets.decode_source(biotac), nets.decode_target(digit)
 
     return surfaces
 

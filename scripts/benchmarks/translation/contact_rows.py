@@ -15,8 +15,8 @@ from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
+from tactile_core.translation.card import PLACE
 from tactile_core.translation.gel_place import on_gel
-from tactile_core.translation.network_sizes import PLACE
 from tactile_core.translation.networks import Networks
 from tactile_core.translation.posterior import FORCE_SCALE, Posterior, touches
 from tactile_core.translation.simulated_likeness import recovered
@@ -70,7 +70,7 @@ def gel_force_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
     for part in parts(len(change)):
         read = nets.encode_signal(change[part])
         state = nets.posterior(read).likely
-        gel = nets.decode_digit(nets.latents(read, state)[1])
+        gel = nets.decode_target(nets.latents(read, state)[1])
         known = (gel, FORCE_SCALE * np.sinh(state[:, PLACE])), (true_displacement(pairs, "digit", part), None)
         for name, (surface, force) in zip(ratios, known, strict=True):
             size = accuracy.lengths(pairs.force[part]) if force is None else force
@@ -97,7 +97,7 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     for part in parts(len(change)):
         read = nets.encode_signal(folded[part], unsigned[part])
         state = nets.posterior(read, unsigned[part]).likely
-        gel = nets.decode_digit(nets.latents(read, state, unsigned[part])[1])
+        gel = nets.decode_target(nets.latents(read, state, unsigned[part])[1])
         true = true_displacement(pairs, "digit", part)
         columns["peak"].append(1e6 * accuracy.height(gel).max(1))
         columns["true"].append(1e6 * accuracy.height(true).max(1))
@@ -170,7 +170,7 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     found = {}
     for name, state in (("likely", posterior.likely), ("mean", mean)):
         skin, latent = nets.latents(read, state)
-        gel, force = nets.decode_digit(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
+        gel, force = nets.decode_target(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
         found |= _metrics(name, gel, force, pairs, part, bodies)
         if name == "likely":
             found |= _metrics("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)

@@ -113,7 +113,7 @@ def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
     """Locate simulated contacts, read with the noise of real ones; baseline: always their middle place."""
     nets = network.nets
     deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > shape_of("digit").tip_x)
-    gel = nets.decode_digit(nets.likely_latents(nets.encode_signal(as_read(pairs.signal[deep], SEED)))[1])
+    gel = nets.decode_target(nets.likely_latents(nets.encode_signal(as_read(pairs.signal[deep], SEED)))[1])
     found = contact_center(gel, digit_surface().rest, network.silent("digit_m"))
     scale = np.float32(pairs.scale_digit)
     true = contact_center(pairs.displacement_digit[deep] * scale, digit_surface().rest, 0.0)

@@ -19,8 +19,16 @@ from tactile_core.mechanics.skin_contact import BodyContact, likely_contacts
 from tactile_core.simulation.full_pairs import REGION_X
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.simulation.scene import load_scene
-from tactile_core.training.error_summary import in_bins, metric_rows
-from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, mesh_columns, true_displacement
+from tactile_core.training.step_errors import (
+    Bodies,
+    Columns,
+    digit_columns,
+    in_bins,
+    joined,
+    mesh_columns,
+    metric_rows,
+    true_displacement,
+)
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training"
 SHARE = 2 / 3  # of the baseline, at most, in a part of the pad never trained on (docs/sources.md, Targets)

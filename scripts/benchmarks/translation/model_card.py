@@ -157,7 +157,7 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
 
     nets, gel = translator.nets, sensors.digit_surface()
     change = as_read(pairs.signal, SEED)
-    found = nets.decode_digit(nets.likely_latents(nets.encode_signal(change))[1])
+    found = nets.decode_target(nets.likely_latents(nets.encode_signal(change))[1])
     true = true_displacement(pairs, "digit", np.arange(len(change)))
     metrics = mesh_columns("chain", found, true) | mesh_columns("baseline", 0 * true, true)
     share = np.where(true[..., 1].max(1) >= 1e-4, metrics["chain_rms_um"] / metrics["baseline_rms_um"], np.nan)

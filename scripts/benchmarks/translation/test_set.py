@@ -7,9 +7,17 @@ import numpy as np
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.training.error_summary import metric_row, metric_rows, slices
-from tactile_core.training.step_errors import Bodies, error_columns, joined, parts, translation_metrics
-from tactile_core.translation.network_sizes import SURFACES
+from tactile_core.training.step_errors import (
+    Bodies,
+    error_columns,
+    joined,
+    metric_row,
+    metric_rows,
+    parts,
+    slices,
+    translation_metrics,
+)
+from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows

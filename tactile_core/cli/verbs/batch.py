@@ -13,7 +13,6 @@ from . import engine
 from .common import (
     PRESETS,
     RESUMES,
-    TARGET,
     answer_arguments,
     prepare_arguments,
     prepare_words,
@@ -45,13 +44,10 @@ examples:
   tactile batch day1 --out job --plan                          write job.json alone, as arrays need it"""
 LEAVES = RESUMES
 MOST_WARNINGS = 5  # that are printed
-RECIPE = (  # option, its value where it is not given
-    *((name, None) for name in ("keep", "shard_frames", "weights", "sensor", "calibration", "preset")),
-    *((name, None) for name in ("kind", "counts_per_unit", "smooth", "columns")),
-    *(("tare", "auto"), ("no_drift", False), ("polarity", "auto")),
-    *(("frames_apart", False), ("answer", "likely"), ("mount_shift", None), ("samples", 0)),
-    *(("gel", "translated"), ("target", TARGET)),
-)
+RECIPE = (  # options that decide what is made, which goes on as it was begun
+    "keep", "shard_frames", "weights", "sensor", "calibration", "preset", "kind", "counts_per_unit", "smooth",
+    "columns", "tare", "no_drift", "polarity", "frames_apart", "answer", "mount_shift", "samples", "gel", "target",
+)  # fmt: skip
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -90,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
             raise TactileError("--status and --verify", "given with INPUTS", "--out DIR alone")
         job = jobs.read(folder)
         return _status(folder, job) if options.status else _verify(folder, job, options.progress)
-    engine.check_counts(options, "workers", "restart", "shard_frames")
+    engine.check_counts(options, "workers", "shard_frames")
     if part is not None and not jobs.exists(folder):
         raise TactileError(folder, "no job yet", "a job that all parts share", "Make it once with --plan")
     with runs.opened(folder, part):
@@ -155,7 +151,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     if not options.inputs:
         if there is None:
             raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")
-        given = [name for name, usual in RECIPE if getattr(options, name) != usual]
+        given = [name for name in RECIPE if getattr(options, name) != options.parser.get_default(name)]
         if given:
             raise TactileError("--" + given[0].replace("_", "-"), "given without INPUTS", "the job as it was begun")
         return there
@@ -189,7 +185,8 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     prepare.options().check()
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
-    network, solves = convert.load_networks(options.weights, None, options.gel, options.target, source)
+    asked = convert.ToolOptions(options.weights, gel=options.gel, target=options.target, source=source)
+    network, solves = asked.load_networks()
     frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
     if frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")

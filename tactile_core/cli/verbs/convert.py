@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import functools
+from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ...files.threads import one_thread
@@ -17,6 +19,9 @@ from .common import (
     progress_argument,
     unit_arguments,
 )
+
+if TYPE_CHECKING:
+    from ...jobs.convert import Options, ToolOptions
 
 BRIEF = "translate recordings to deformations, forces and DIGIT pictures"
 TEXT = """\
@@ -81,8 +86,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument(
         "--reverse",
-        action="store_true",
-        help="the other way: from the DIGIT's gel in frames.h5, or in a simulated recording or scene, to the BioTac's"
+        dest="run",
+        action="store_const",
+        const=reverse,
+        help="the other way: from the DIGIT's gel in frames.h5, or in a simulated recording, to the BioTac's"
         " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights and --overwrite",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
@@ -97,54 +104,29 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Convert each recording, going on after a bad one; returns the exit status."""
     one_thread()  # before numpy is imported
-    if options.reverse:
-        return _reverse(options)
-    from ...jobs import convert, results
-    from ...jobs.sampling_error import parse_budget
-    from ...pictures import presets
-    from ...pictures.mitsuba import variant
-    from ...recordings import PrepareOptions, electrode_gains, readers
+    show = functools.partial(bar, unit="frame", forced=options.progress)
+    from ...jobs import convert, plan, results
+    from ...pictures.presets import describe_choice
+    from ...recordings import readers
     from ...sensors import SOURCE
-    from ...translation.answer import parse_answer
 
-    prepare = PrepareOptions(**prepare_words(options))
-    keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
-    budget = None if options.error is None else parse_budget(options.error)
-    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
-    sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    paths, failed = readers.list_fingers(options.recordings, prepare.columns), 0
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
-    levels = None if budget is None else budget.levels
-    preset = presets.FAST if levels is None else variant.fitting(levels)
-    source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
+    job, asked, paths = _read(options)
     if options.plan:
-        from ...jobs import plan
-
-        counts = [len(readers.read(path, prepare.columns, source or SOURCE, lean=True)) for path in paths]
-        chosen = sum(len(results.select(frames, count)) for count in counts)
-        tell("\n".join(plan.of_frames(chosen, keep, preset).lines()))
+        counts = [len(readers.read(path, job.columns, asked.source or SOURCE, lean=True)) for path in paths]
+        chosen = sum(len(results.select(job.frames, count)) for count in counts)
+        tell("\n".join(plan.of_frames(chosen, job.keep, asked.preset).lines()))
         return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
+    tools = convert.load_tools(asked)
+    if job.error is not None and job.error.levels is not None:
+        say(describe_choice(asked.preset, job.error.levels))
     converted = []
-    tools = convert.load_tools(
-        options.weights,
-        options.calibration,
-        preset,
-        answer=answer,
-        gel=options.gel,
-        target=options.target,
-        source=source,
-    )
-    if levels is not None:
-        why = presets.describe_choice(preset, levels)
-        say(why)
     for path, folder in zip(paths, folders, strict=True):
         try:
-            with bar(folder.name, "frame", options.progress) as shown:
+            with show(folder.name) as shown:
                 done = convert.convert(path, folder, job, tools, shown)
         except TactileError as error:
             complain(str(error))
-            failed += 1
             continue
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
@@ -152,6 +134,7 @@ def run(options: argparse.Namespace) -> int:
             say(f"{folder.name}: {remark}")
         tell(str(done.folder))
         converted.append(done.folder)
+    failed = len(folders) - len(converted)
     if converted:
         sheet = converted[0] / results.SHEET
         next_step(f"open {sheet}; the numbers of every frame are in {results.FRAMES} beside it")
@@ -160,9 +143,34 @@ def run(options: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
-def _reverse(options: argparse.Namespace) -> int:
-    """Translate one gel's frames back; returns the exit status."""
-    from ...jobs import results, reverse
+def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]:
+    """Return what is done with each recording, what translates and draws them all, and the recordings."""
+    from ...jobs import convert, results
+    from ...jobs.sampling_error import parse_budget
+    from ...pictures import presets
+    from ...pictures.mitsuba import variant
+    from ...recordings import PrepareOptions, electrode_gains, readers
+    from ...translation.answer import parse_answer
+
+    prepare = PrepareOptions(**prepare_words(options))
+    keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
+    budget = None if options.error is None else parse_budget(options.error)
+    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
+    sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
+    paths = readers.list_fingers(options.recordings, prepare.columns)
+    source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
+    preset = presets.FAST if budget is None or budget.levels is None else variant.fitting(budget.levels)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
+    pictures = options.calibration, preset, None
+    asked = convert.ToolOptions(options.weights, *pictures, answer, options.gel, options.target, source)
+    return job, asked, paths
+
+
+def reverse(options: argparse.Namespace) -> int:
+    """Translate one gel's frames back, as --reverse asks for; returns the exit status."""
+    one_thread()  # before numpy is imported
+    from ...jobs import results
+    from ...jobs.reverse import reverse as translate_back
     from ...translation.translate import load_translator
 
     if len(options.recordings) > 1:
@@ -170,6 +178,6 @@ def _reverse(options: argparse.Namespace) -> int:
     frames = results.parse_frames(options.frames)
     translator = load_translator(options.weights, None, options.target if options.weights is None else None, None)
     with bar("reverse", "frame", options.progress) as shown:
-        reverse.reverse(options.recordings[0], options.out, translator, frames, shown, overwrite=options.overwrite)
+        translate_back(options.recordings[0], options.out, translator, frames, shown, overwrite=options.overwrite)
     tell(options.out)
     return 0

@@ -13,14 +13,14 @@ from ...errors import TactileError
 from ..terminal import complain, next_step, say, tell
 
 if TYPE_CHECKING:
-    from ...jobs.engine.run import Done, Place
+    from ...jobs.engine.run import Outcome, Place
 
 
 ASSEMBLES = "the command that planned it, without --plan, which makes the result"
 
 
 def place_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add ``--workers``, ``--cluster``, ``--restart``, ``--plan``."""
+    """Add ``--workers``, ``--cluster``."""
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes stay the same")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
@@ -29,7 +29,6 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
         action="store_true",
         help="with --cluster: no TLS; only in a network that is yours alone, as Dask's messages can run code",
     )
-    verb.add_argument("--restart", type=int, metavar="N", help="replace a worker after N tasks (default: 200)")
 
 
 def parts_arguments(verb: argparse.ArgumentParser) -> None:
@@ -68,15 +67,17 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
         from ...jobs.engine.dask_cluster import Cluster
 
         return Cluster(folder, options.cluster, say, options.insecure)
-    from ...jobs.engine.local import RESTART, Local
+    from ...jobs.engine.local import Local
 
-    return Local(folder.resolve(), options.workers or 1, options.restart or RESTART)
+    return Local(folder.resolve(), options.workers or 1)
 
 
-def place_or_none(options: argparse.Namespace) -> Callable[[Path], Place] | None:
-    """Return a function from the job's folder to its executor; None where this process does the work alone."""
+def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
+    """Return a function from the job's folder to its executor: this process where no others are asked for."""
     if options.cluster is None and (options.workers or 1) == 1:
-        return None
+        from ...jobs.engine.local import InProcess
+
+        return InProcess
     return lambda folder: place(folder, options)
 
 
@@ -92,7 +93,7 @@ def tell_planned_parts(folder: Path) -> None:
     tell_plan(folder, folder, ASSEMBLES)
 
 
-def report_failures(done: Done) -> int:
+def report_failures(done: Outcome) -> int:
     """Print an error for each task that could not be done; returns the exit status."""
     for name, why in done.aside.items():
         complain(f"{name}: {why}")

@@ -58,10 +58,10 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Simulate the paired contacts of a scene; returns the exit status."""
     one_thread()  # before numpy is imported
-    engine.check_counts(options, "workers", "restart")
+    engine.check_counts(options, "workers")
     check_seed(options.seed)
     from ...jobs import pairs, plan, results
-    from ...jobs.engine import result_parts
+    from ...jobs.engine import run as runs
     from ...simulation.pairs_file import KEEPABLE
 
     pair = options.source, options.target
@@ -70,9 +70,9 @@ def run(options: argparse.Namespace) -> int:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
         for line in plan.of_pairs(options.count, pair).lines():
             say(line)
-        engine.tell_planned_parts(result_parts.write(options.out, job))
+        engine.tell_planned_parts(runs.write(options.out, job))
         return 0
-    place = engine.place_or_none(options)
+    place = engine.place_of(options)
     with bar("pairs", "block", options.progress) as shown:
         pairs.make_pairs(
             options.scene, options.count, options.seed, options.out, progress=shown, place=place,

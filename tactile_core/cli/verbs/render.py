@@ -80,7 +80,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Render the pictures; returns the exit status."""
     one_thread()  # before numpy is imported
-    engine.check_counts(options, "workers", "restart")
+    engine.check_counts(options, "workers")
     size = _size(options.size)
     from ...jobs import render, results
     from ...jobs.sampling_error import parse_budget
@@ -111,11 +111,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
     """Render in other processes, or write the plan of that."""
-    from ...jobs.engine import result_parts
+    from ...jobs.engine import run as runs
     from ...jobs.render_shards import plan, render_in_parts
 
     if options.plan:
-        engine.tell_planned_parts(result_parts.write(options.out, plan(options.input, options.out, asked)))
+        engine.tell_planned_parts(runs.write(options.out, plan(options.input, options.out, asked)))
         return 0
     with bar("render", "task", options.progress) as shown:
         done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)

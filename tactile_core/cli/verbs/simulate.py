@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
     keep = _keep(options.keep)
     if options.grid:
         return _run_grid(options, keep)
-    for name in ("workers", "cluster", "restart"):
+    for name in ("workers", "cluster"):
         if getattr(options, name):
             raise TactileError(f"--{name}", "given without --grid", "--grid NAME=A:B:N", "One recording is one task")
     if options.plan:
@@ -139,18 +139,18 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier
 
 def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
     """Simulate many."""
-    engine.check_counts(options, "workers", "restart")
+    engine.check_counts(options, "workers")
     if options.error:
         raise TactileError("--grid", "given with --error", "one of the two")
     from ...jobs import simulate
-    from ...jobs.engine import result_parts
+    from ...jobs.engine import run as runs
 
     job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
     if options.plan:
-        engine.tell_planned_parts(result_parts.write(options.out, job))
+        engine.tell_planned_parts(runs.write(options.out, job))
         return 0
     with bar("simulate", "task", options.progress) as shown:
-        simulate.simulate_grid(job, options.out, shown, engine.place_or_none(options))
+        simulate.simulate_grid(job, options.out, shown, engine.place_of(options))
     tell(options.out)
     next_step(f"{Path(options.out) / 'grid.json'} lists the values of each recording")
     return 0

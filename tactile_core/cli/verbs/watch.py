@@ -79,8 +79,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Show the newest frames until the recording ends, the window is closed, or Ctrl-C."""
     one_thread()  # before numpy is imported
-    from ...jobs import live
-    from ...jobs.convert import load_tools
+    from ...jobs import convert, live
+    from ...recordings import PrepareOptions
     from ...recordings.readers import container_of, sensor_of_first
     from ...recordings.tables.column_map import refuse_other
 
@@ -96,15 +96,15 @@ def run(options: argparse.Namespace) -> int:
     refuse_other(path, container, columns)
     speed = 1.0 if options.speed is None else options.speed
     sensor = None if options.weights else sensor_of_first([path], columns)
-    tools = load_tools(options.weights, options.calibration, target=options.target, source=sensor)
+    asked = convert.ToolOptions(options.weights, options.calibration, target=options.target, source=sensor)
+    tools = convert.load_tools(asked)
     sensor = tools.translator.source
     if playing:
         source = live.played(path, speed, say, columns, sensor)
     else:
         source = live.followed(path, options.idle, say, columns, sensor)
-    tare = None if options.tare == "auto" else options.tare
-    unit = _unit(options.sensor, path, sensor)
-    view = live.View(tools, options.rate, options.polarity, tare, unit)
+    prepare = PrepareOptions(tare=None if options.tare == "auto" else options.tare, polarity=options.polarity)
+    view = live.View(tools, options.rate, prepare, _unit(options.sensor, path, sensor))
     for sentence in tools.drawer.describe_gel():
         say(sentence)
     with contextlib.ExitStack() as opened:

@@ -25,7 +25,7 @@ from ...errors import TactileError
 from ...files.outside import read_toml_text
 from . import tasks
 from .local import KILLS
-from .tasks import Reply, Task
+from .tasks import Failure, Reply, Task
 
 SCHEMES = ("tcp://", "tls://", "ucx://")
 PATIENCE, AGAIN = 10.0, 60.0  # s without a reply, after which the lack of workers is reported, and reported again
@@ -95,7 +95,9 @@ class Cluster:
         with self._answering():
             error = future.exception() if future.status in ("error", "lost", "cancelled") else None
             if isinstance(error, KilledWorker):
-                return Reply(error=f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
+                return Reply(
+                    failure=Failure(f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
+                )
             if future.status != "finished":
                 raise error or RuntimeError(future.status)
             return msgspec.convert(future.result(), Reply)

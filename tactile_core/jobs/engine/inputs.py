@@ -1,4 +1,4 @@
-"""Expand what the user names (files, folders, globs, ``@list``) to recordings with names and hashes."""
+"""Inputs of a job with names and hashes: recordings that the user names (files, folders, globs, ``@list``), scenes."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -20,6 +21,9 @@ from ...recordings.bags.bag import MARK
 from ...recordings.fingers import name_of, split
 from ...recordings.readers import list_fingers
 from ...sensors.calibration_file import load_calibration
+
+if TYPE_CHECKING:
+    from ...simulation.scene import Scene
 
 log = logging.getLogger(__name__)
 SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # what is taken from a folder
@@ -161,3 +165,38 @@ def content_hash(path: Path) -> tuple[str, int]:
         return provenance.sha256(path), sum(file.stat().st_size for file in files)
     except OSError as error:
         raise TactileError(path, f"cannot be read ({error.strerror or error})", "a recording") from error
+
+
+def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
+    """Read a scene; return it, its text, an input for each of some names, and the hashes of its meshes in order.
+
+    Raises TactileError for a bad scene.
+    """
+    from ...simulation.scene import load_scene
+
+    scene, text = load_scene(scene_path)
+    file = Path(scene_path).resolve()
+    file = file / "scene.toml" if file.is_dir() else file
+    digest, size = content_hash(file)
+    inputs = [Input(f"{index:05d}_{name}", str(file), digest, size) for index, name in enumerate(names)]
+    return scene, text, inputs, _hashes(scene)
+
+
+def load_scene_of(one: Input, files: tuple[str, ...]) -> tuple[Scene, str]:
+    """Load an input's scene and its text. Raises TactileError where it or a mesh changed since the job was made."""
+    from ...simulation.scene import load_scene
+
+    scene, text = load_scene(one.path)
+    if content_hash(Path(one.path))[0] != one.sha256 or tuple(_hashes(scene)) != files:
+        found = "another content than when the job was made"
+        raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}... and the same meshes", "Start a new job")
+    return scene, text
+
+
+def _hashes(scene: Scene) -> list[str]:
+    from ...simulation.indenter_specs import MeshSpec, SeveralSpec
+
+    bodies = []
+    for spec in scene.indenters:
+        bodies += [part.body for part in spec.parts] if isinstance(spec, SeveralSpec) else [spec]
+    return [provenance.sha256(body.file) for body in bodies if isinstance(body, MeshSpec)]

@@ -18,7 +18,7 @@ import msgspec
 
 from ...files.threads import ONE
 from . import tasks
-from .tasks import Reply, Task
+from .tasks import Failure, Reply, Task
 
 RESTART = 200  # tasks after which a worker is replaced, so that what libraries leak is given back (assumed)
 KILLS = 3  # times that a task may take its worker with it
@@ -89,7 +89,7 @@ class Local:
                 return msgspec.convert(reply, Reply)
             if self._stopped:
                 break
-        return Reply(error=f"killed its worker {KILLS} times ({worker.cause}); set aside")
+        return Reply(failure=Failure(f"killed its worker {KILLS} times ({worker.cause}); set aside"))
 
     def _start(self) -> subprocess.Popen[str]:
         process = subprocess.Popen(

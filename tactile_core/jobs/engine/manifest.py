@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import json
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,7 @@ from ...errors import TactileError
 from ...files import atomic, checksummed
 from ...files.outside import read_small
 from . import job as jobs
-from . import kinds
+from . import recipes
 from .job import Job
 
 FORMAT = "tactile-batch-1"
@@ -49,7 +51,7 @@ def status(folder: Path, job: Job) -> Status:
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):
-        seen = kinds.module_for(job).inspect_input(folder, job, index)
+        seen = recipes.module_for(job.recipe).inspect_input(folder, job, index)
         if seen is None:
             continue
         names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
@@ -134,11 +136,11 @@ def write(folder: Path, job: Job) -> None:
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
-    seen = kinds.module_for(job).inspect_input(folder, job, index) or kinds.InputFacts(0)
+    seen = recipes.module_for(job.recipe).inspect_input(folder, job, index) or recipes.InputFacts(0)
     try:
         warnings = list(seen.warnings())
     except TactileError:  # its prepared file is damaged: the next run makes it again
-        seen, warnings = kinds.InputFacts(0), []
+        seen, warnings = recipes.InputFacts(0), []
     listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)
@@ -146,3 +148,37 @@ def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
         if digest is not None:
             listed["shards"].append({"file": path.name, "sha256": digest})
     return listed | {"warnings": warnings}
+
+
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # disk, quota, the system's limit on a file
+
+
+def refused(folder: Path, job: Job, error: OSError) -> TactileError:
+    """Return the error for what the system refused to write in a job's folder.
+
+    A full disk is the folder's affair, not that of the file which happened to be the next, and so is its removal.
+    """
+    if not jobs.exists(folder):
+        return TactileError(folder, "was removed while the job ran", "the job's folder", "Begin it again")
+    reason = error.strerror or str(error)
+    if error.errno not in FULL:
+        where = error.filename2 or error.filename or folder
+        return TactileError(where, f"cannot be written ({reason})", "a job folder of ours that can be written")
+    found = f"cannot be written ({reason}; {_megabytes(shutil.disk_usage(folder).free)} free)"
+    return TactileError(f"--out {folder}", found, _needed(folder, job), "Make room and give the same command again")
+
+
+def _needed(folder: Path, job: Job) -> str:
+    """Say how much space is still needed: by the size of the shards made so far, or as their kind of job expects."""
+    state = status(folder, job)
+    sizes = [file.stat().st_size for file in (folder / jobs.SHARDS).glob("*.h5")]
+    left, unseen = state.shards - state.there, state.recordings - state.prepared
+    one = sum(sizes) / len(sizes) if sizes else state.bytes / max(state.shards, 1)
+    parts = [f"some {_megabytes(left * one)} for the {left} shards that are left"] if left and one else []
+    if unseen:
+        parts.append(f"room for {unseen} of {state.recordings} inputs that were not begun, and their shards")
+    return " and ".join(parts) or "room for what is left"
+
+
+def _megabytes(count: float) -> str:
+    return f"{count / 1e6:.1f} MB"

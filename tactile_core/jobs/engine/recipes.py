@@ -1,8 +1,22 @@
-"""Recipes, one struct a kind of job: everything that decides a shard's bytes besides the input itself."""
+"""Recipes, one struct a kind of job: everything that decides a shard's bytes besides the input itself.
+
+Each kind is done by a module of ``jobs``, `MODULES`, which has
+``prepare_input(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as
+    far as is known, and whether anything was made
+``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
+``inspect_input(folder, job, index)``  what the files tell of an input, None before its first task was done
+``GROWS``  whether `prepare_input` is to be asked again when all its shards are there
+
+Both doing functions raise TactileError for what cannot be done, OSError where the disk cannot be written.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import dataclasses
+import importlib
+from collections.abc import Callable
+from types import ModuleType
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -111,3 +125,26 @@ class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fiel
 
 
 Recipe = Translate | Pairs | Simulate | Render
+MODULES: dict[Any, str] = {
+    Translate: "translate_shards", Pairs: "pairs",
+    Simulate: "simulate", Render: "render_shards",
+}  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True)
+class InputFacts:
+    """Facts known of an input. shards : their number; frames : of a recording
+
+    warnings : reads those to report, which takes longer than the rest; TactileError where the input is damaged
+    bytes : about, of all its shards; 0 where that is not known before they are there
+    """
+
+    shards: int
+    frames: int = 0
+    warnings: Callable[[], tuple[str, ...]] = tuple
+    bytes: int = 0
+
+
+def module_for(recipe: Recipe) -> ModuleType:
+    """Return the module that does jobs of this kind."""
+    return importlib.import_module(f"...{MODULES[type(recipe)]}", __name__)

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import os
+import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Protocol, Self
 
 from ...errors import TactileError
 from ...files import atomic, lock
-from . import disk_room, kinds, manifest, tasks
 from . import job as jobs
+from . import manifest, recipes, tasks
 from .job import Job
-from .tasks import Reply, Task
+from .tasks import Failure, Reply, Task
 
 Progress = Callable[[int, int], None]
 
@@ -34,12 +37,12 @@ class Place(Protocol):
 
 
 @dataclasses.dataclass
-class Done:
-    """Outcome of a run. made, kept : shards; aside : sentence on each task that could not be done."""
+class Outcome:
+    """Outcome of a run. made, kept : shards; aside : why, for each task that could not be done."""
 
     made: int = 0
     kept: int = 0
-    aside: dict[str, str] = dataclasses.field(default_factory=dict)
+    aside: dict[str, Failure] = dataclasses.field(default_factory=dict)
 
 
 @contextlib.contextmanager
@@ -70,7 +73,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 def _unmake(folder: Path) -> None:
     """Remove a folder that holds nothing but our locks and a job that never began, after that was refused."""
-    with contextlib.suppress(OSError):  # others have removed it already
+    with suppress(OSError):  # others have removed it already
         files = list(folder.iterdir())
         if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in files):
             for path in files:
@@ -86,7 +89,7 @@ def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
                 atomic.sweep_files(folder / place)
 
 
-def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
+def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
     """Do the tasks of a job that are not done yet, or part i of n of them; call inside `opened`.
 
     progress : called with (tasks done, tasks known so far)
@@ -95,10 +98,10 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
     try:
         return _run(folder, job, place, part, progress)
     except OSError as error:
-        raise disk_room.refused(folder, job, error) from error
+        raise manifest.refused(folder, job, error) from error
 
 
-def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Done:
+def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
     """Run like `run`; raises OSError."""
     work = _Work(folder, job, part)
     with place:  # which may be refused: the folders say that the job has begun
@@ -121,8 +124,8 @@ class _Work:
     def __init__(self, folder: Path, job: Job, part: tuple[int, int] | None) -> None:
         self._folder, self._job = folder, job
         self._part, self._parts = part or (0, 1)
-        self.done, self.known, self.finished = Done(), 0, 0
-        self._grows = kinds.module_for(job).GROWS
+        self.done, self.known, self.finished = Outcome(), 0, 0
+        self._grows = recipes.module_for(job.recipe).GROWS
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
@@ -140,10 +143,10 @@ class _Work:
     def take(self, task: Task, reply: Reply) -> list[Task]:
         """Record a worker's reply; returns the tasks that can be started now."""
         self.finished += 1
-        if reply.stop:
-            raise TactileError(*_parts_of(reply.error))
-        if reply.error:
-            self._set_aside(task, reply.error)
+        if reply.failure is not None:
+            if reply.stop:
+                raise reply.failure.error(tasks.name(self._job, task))
+            self._set_aside(task, reply.failure)
             return []
         self._clear(task)
         if task.shard is None:
@@ -170,15 +173,67 @@ class _Work:
     def _file(self, task: Task) -> Path:
         return self._folder / jobs.ASIDE / f"{tasks.name(self._job, task)}.json"
 
-    def _set_aside(self, task: Task, why: str) -> None:
+    def _set_aside(self, task: Task, why: Failure) -> None:
         name = tasks.name(self._job, task)
         self.done.aside[name] = why
-        atomic.write_json(self._file(task), {"task": name, "why": why}, shared=True)
+        atomic.write_json(self._file(task), {"task": name, "why": str(why)}, shared=True)
 
     def _clear(self, task: Task) -> None:
         self._file(task).unlink(missing_ok=True)
 
 
-def _parts_of(sentence: str) -> tuple[str, str]:
-    where, _, found = sentence.partition(": ")
-    return where, found
+def folder_of(out: Path) -> Path:
+    """Return the folder of the job whose shards are put together into the one result `out`: <out>.parts."""
+    return out.with_name(out.name + ".parts")
+
+
+@contextlib.contextmanager
+def begun(out: Path, job: Job) -> Iterator[Path]:
+    """Lock the folder of a new job, or of the same one begun before; yields it.
+
+    Raises TactileError where it holds another job, and what `opened` raises.
+    """
+    folder = folder_of(out)
+    with opened(folder, None):
+        if not jobs.exists(folder):
+            jobs.check_empty(folder, "Move it away, or choose another name for the result")
+            jobs.write(folder, job)
+        elif jobs.read(folder).id != job.id:
+            found = "holds parts of another scene, seed, count, option or version"
+            raise TactileError(folder, found, "none or the same", "Remove the folder to start again")
+        yield folder
+
+
+def write(out: str | os.PathLike, job: Job) -> Path:
+    """Write the job alone, for runners of `tactile batch --array`; its folder. Raises what `begun` raises."""
+    with begun(Path(out), job) as folder:
+        return folder
+
+
+@contextlib.contextmanager
+def completed(
+    out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
+) -> Iterator[Path]:
+    """Do a whole job, yield its folder to be put together into `out`, and remove it once that is done.
+
+    place : where the tasks are done, from the folder. Raises TactileError for the first task that could not be done,
+    and what `begun` and `run` raise.
+    """
+    with begun(out, job) as folder:
+        done = run(folder, job, place(folder), None, progress)
+        for name, why in sorted(done.aside.items()):
+            raise why.error(name)
+        yield folder
+    _remove(folder)
+
+
+def _remove(folder: Path) -> None:
+    """Remove the job's own files, the job last, and the folder where it is empty then."""
+    for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+        shutil.rmtree(folder / name, ignore_errors=True)
+    for file in (jobs.MANIFEST, jobs.FILE, lock.FILE):
+        (folder / file).unlink(missing_ok=True)
+    for reader in folder.glob(f"{lock.FILE}-*"):
+        reader.unlink()
+    with suppress(OSError):
+        folder.rmdir()

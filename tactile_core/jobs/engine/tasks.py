@@ -10,27 +10,48 @@ import msgspec
 
 from ...errors import TactileError
 from ...files.threads import one_thread
-from . import disk_room, kinds
 from . import job as jobs
+from . import manifest, recipes
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """First step for input `recording` of the job (shard None), or one of its shards; see ``kinds``."""
+    """First step for input `recording` of the job (shard None), or one of its shards; see ``recipes``."""
 
     recording: int
     shard: int | None = None
+
+
+class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Why a task cannot be done: the fields of a TactileError; `where` is empty if its input is not to blame."""
+
+    found: str
+    where: str = ""
+    expected: str = ""
+    advice: str = ""
+
+    @classmethod
+    def from_error(cls, error: TactileError) -> Failure:
+        """Return what an error says."""
+        return cls(error.found, error.where, error.expected, error.advice)
+
+    def error(self, task: str) -> TactileError:
+        """Return it as an error; task : its name, where nothing else is to blame."""
+        return TactileError(self.where or task, self.found, self.expected, self.advice)
+
+    def __str__(self) -> str:
+        return str(self.error("")).removeprefix(": ")
 
 
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Outcome of a task.
 
     made : False where it was there already; shards : that follow, of an input's first task
-    error : why it cannot be done, as the user reads it; stop : no other task can be done either
+    failure : why it cannot be done; stop : no other task can be done either
     """
 
     made: bool = False
     shards: int = 0
-    error: str = ""
+    failure: Failure | None = None
     stop: bool = False
 
 
@@ -59,22 +80,21 @@ def _one_thread_once() -> None:
 def _run(folder: Path, task: Task) -> Reply:
     try:
         job = _job(str(folder), _stamp(folder))
-    except (TactileError, OSError) as error:
-        return Reply(error=str(error), stop=isinstance(error, OSError))
+    except TactileError as error:
+        return Reply(failure=Failure.from_error(error))
     try:
-        kind = kinds.module_for(job)
+        kind = recipes.module_for(job.recipe)
         if task.shard is None:
             shards, made = kind.prepare_input(folder, job, task.recording)
             return Reply(made=made, shards=shards)
         return Reply(made=kind.make(folder, job, task.recording, task.shard))
     except TactileError as error:
-        return Reply(error=str(error))
+        return Reply(failure=Failure.from_error(error))
     except OSError as error:
-        return Reply(error=str(disk_room.refused(folder, job, error)), stop=True)
+        return Reply(failure=Failure.from_error(manifest.refused(folder, job, error)), stop=True)
     except MemoryError as error:
-        return Reply(
-            error=f"{name(job, task)}: {str(error) or 'no memory left'}. Give the same command with fewer workers"
-        )
+        advice = "Give the same command with fewer workers"
+        return Reply(failure=Failure(str(error) or "no memory left", advice=advice))
 
 
 def _stamp(folder: Path) -> tuple[int, int]:

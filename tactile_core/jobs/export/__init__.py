@@ -1,9 +1,39 @@
-"""Export a finished job to third-party layouts.
+"""Export a finished job to third-party layouts; a new one is one new file in ``formats/``, see there."""
 
-A new layout is one new file in ``formats/``, with ``BRIEF`` and ``write``; see there.
-"""
+from __future__ import annotations
 
-from .finished_job import Finished, Recorded
-from .writers import export, layouts
+import os
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
 
-__all__ = ["Finished", "Recorded", "export", "layouts"]
+from ...errors import TactileError
+from ...files import atomic, provenance
+from ...files.registry import modules_of
+from . import finished_job, formats
+
+NOTE = "note.json"
+
+
+def layouts() -> dict[str, ModuleType]:
+    """Name -> module of ``formats/``."""
+    return modules_of(formats.__name__)
+
+
+def export(
+    job: str | os.PathLike, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None]
+) -> finished_job.Finished:
+    """Write the finished job in a folder as `layout` into the new folder `out`, whole or not at all.
+
+    progress : called with (frames done, frames in all)
+    Raises TactileError: a job that is not finished, an unknown layout, an existing folder, a full disk.
+    """
+    if layout not in layouts():
+        raise TactileError("--to", repr(layout), " or ".join(layouts()))
+    source = finished_job.load(Path(job))
+    with atomic.writing(out), atomic.new_folder(out) as partial:
+        layouts()[layout].write(source, partial, progress)
+        note = {"layout": layout, "job": source.id, "left_out": source.aside, "warnings": source.warnings}
+        note["versions"] = provenance.versions()
+        atomic.write_json(partial / NOTE, note)
+    return source

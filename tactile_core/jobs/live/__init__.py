@@ -2,9 +2,8 @@
 
 from .digit_camera import DigitCamera
 from .frame_server import FrameServer
-from .growing_file import Growing
 from .live_signals import LiveSignals
 from .live_view import Shown, View
-from .playback import followed, played, watch
+from .playback import Growing, followed, played, watch
 
 __all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View", "followed", "played", "watch"]

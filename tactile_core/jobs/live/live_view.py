@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...pictures.height_map import folds_counted
-from ...recordings.polarity import AUTO, Polarity
 from ...recordings.recording import Recording
-from ...recordings.signals import Signals
+from ...recordings.signals import PrepareOptions, Signals
 from ...translation.contact_track import ForwardTracker
 from ...translation.translator import Translation
 from ..frame_pass import Tools
-from .growing_file import newest
 from .live_signals import LiveSignals
 
 if TYPE_CHECKING:
@@ -48,47 +46,30 @@ class Shown:
 
 
 class View:
-    """Translation of arriving rows to pictures: always of the newest; older ones that came meanwhile are skipped."""
+    """Translation of arriving rows to pictures: always of the newest; older ones that came meanwhile are skipped.
+
+    signals : what is known of rest and polarity; frames, passed : that came, and of them passed over
+    """
 
     def __init__(
-        self,
-        tools: Tools,
-        rate: float,
-        polarity: str = AUTO,
-        tare: str | None = None,
-        unit: ElectrodeGains | None = None,
+        self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None
     ) -> None:
         """Take the recording's rate, Hz, and what `LiveSignals` takes."""
-        self._signals = LiveSignals(rate, polarity, tare, unit, tools.translator.source)
+        self.signals = LiveSignals(rate, options, unit, tools.translator.source)
         self._tools, self._rate = tools, rate
         self._track = ForwardTracker()
         tools.drawer.warm_up()  # else the first row would wait a second for it
         self.frames, self.passed = 0, 0
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
-    @property
-    def polarity(self) -> Polarity:
-        """Direction of counts where a film thins, as far as the frames have shown."""
-        return self._signals.polarity
-
-    @property
-    def rest_source(self) -> str:
-        """Source of the rest level; empty while it is not known."""
-        return self._signals.found
-
-    @property
-    def silent(self) -> bool:
-        """Return true while the finger does not answer: its electrodes all read the same."""
-        return self._signals.silent
-
     def show(self, rows: Recording, came: float) -> Shown | None:
         """Translate and draw the last row that came at `came` (time.perf_counter); None before rest is known."""
         began = time.thread_time()
         self.frames += len(rows)
-        if not self._signals.learn(rows.electrodes, rows.pdc, rows.about.get("polarity", AUTO)):
+        if not self.signals.learn(rows):
             return None
         self.passed += len(rows) - 1
-        signals = self._signals.signals(newest(rows)[None])
+        signals = self.signals.signals(_newest(rows)[None])
         translation = self._translation(signals)
         drawer = self._tools.drawer
         gel = drawer.gel(vars(translation))["displacement_digit"]
@@ -118,3 +99,13 @@ class View:
             f"{middle:.1f} ms from frame to picture (99 of 100 below {late:.1f} ms; {work:.1f} ms of them computing),"
             f" {self.passed} frames passed over"
         )
+
+
+def _newest(recording: Recording) -> np.ndarray:
+    """Return the counts (19,) of the last whole row; NaN cells are filled from rows before, with 0 where none are."""
+    found = np.full(recording.electrodes.shape[1], np.nan)
+    for row in recording.electrodes[::-1]:
+        found = np.where(np.isfinite(found), found, row)
+        if np.isfinite(found).all():
+            break
+    return np.nan_to_num(found)

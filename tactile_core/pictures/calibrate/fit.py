@@ -192,6 +192,7 @@ class _Search:
         self._done += steps
 
     def calibration(self) -> Calibration:
+        """Return the unit that the parameters found so far describe."""
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:

@@ -15,7 +15,7 @@ from small_pairs import bodies, write_pairs
 from tactile_core import sensors
 from tactile_core.accuracy import COSTS
 from tactile_core.simulation.pairs_file import read_pairs
-from tactile_core.training import error_summary
+from tactile_core.training import step_errors
 from tactile_core.training.step_errors import error_columns, translation_metrics, true_displacement
 from tactile_core.translation.gel_place import contact_patch
 
@@ -34,7 +34,7 @@ class Answers:
     def encode_signal(self, change, rectified=False):
         return self.rows[: len(change)]
 
-    encode_biotac = encode_digit = encode_signal
+    encode_source = encode_target = encode_signal
 
     def contact(self, rows, rectified=False):
         return rows
@@ -50,10 +50,10 @@ class Answers:
     def force_in(self, state, rows):
         return self.force(rows)
 
-    def decode_biotac(self, rows):
+    def decode_source(self, rows):
         return self.share * true_displacement(self.pairs, "biotac", rows)
 
-    def decode_digit(self, rows):
+    def decode_target(self, rows):
         return self.share * true_displacement(self.pairs, "digit", rows)
 
     def decode_signal(self, rows):
@@ -89,7 +89,7 @@ def test_the_truth_has_no_error(pairs):
 def test_nothing_has_the_error_of_the_baseline(pairs):
     found = metrics(pairs, 0.0)
     for step in STEPS:
-        baseline = error_summary.BASELINES.get(step, "baseline_digit")
+        baseline = step_errors.BASELINES.get(step, "baseline_digit")
         np.testing.assert_array_equal(found[f"{step}_rms_um"], found[f"{baseline}_rms_um"])
     loaded = np.isfinite(found["force_percent"])
     np.testing.assert_allclose(found["force_percent"][loaded], 100)
@@ -111,19 +111,19 @@ def test_bins_and_indenters_count_alike():
     depth = np.array([0.2e-3] * 100 + [0.5e-3] * 2 + [5e-3])
     indenter = np.array([0] * 99 + [1] + [0, 0] + [0])
     values = np.array([1.0] * 99 + [3.0] + [10.0, np.nan] + [1e9])
-    assert error_summary.in_bins(values, depth, indenter) == pytest.approx(((1 + 3) / 2 + 10) / 2)
-    assert error_summary.in_bins(values, depth + 1, indenter) is None
+    assert step_errors.in_bins(values, depth, indenter) == pytest.approx(((1 + 3) / 2 + 10) / 2)
+    assert step_errors.in_bins(values, depth + 1, indenter) is None
 
 
 def test_rows_say_what_they_met():
-    assert error_summary.metric_row("a_rms_um", 3.0, 9.0, 4.0, "s")["ok"] is True
-    patch = error_summary.metric_row("a_iou", 0.8, None, 0.85, "s")
+    assert step_errors.metric_row("a_rms_um", 3.0, 9.0, 4.0, "s")["ok"] is True
+    patch = step_errors.metric_row("a_iou", 0.8, None, 0.85, "s")
     assert (patch["unit"], patch["ok"], patch["baseline"], patch["set"]) == ("1", False, None, "s")
-    assert error_summary.metric_row("a_rms_um", 3.0, None, None, "s")["ok"] is None
+    assert step_errors.metric_row("a_rms_um", 3.0, None, None, "s")["ok"] is None
 
 
 def test_slices_cover_each_contact_once(pairs):
-    masks = np.array([mask for _, mask in error_summary.slices(pairs, np.arange(len(pairs.press)))])
+    masks = np.array([mask for _, mask in step_errors.slices(pairs, np.arange(len(pairs.press)))])
     np.testing.assert_array_equal(masks.sum(0), 1)
 
 

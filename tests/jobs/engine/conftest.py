@@ -61,7 +61,7 @@ def do():
     return run_job
 
 
-def run_job(folder: Path, job: jobs.Job, workers=1, part=None, restart=200) -> runs.Done:
+def run_job(folder: Path, job: jobs.Job, workers=1, part=None, restart=200) -> runs.Outcome:
     with runs.opened(folder, part):
         place = local.Local(folder, workers, restart, COMMAND)
         return runs.run(folder, job, place, part, lambda done, total: None)

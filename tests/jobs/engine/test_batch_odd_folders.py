@@ -10,7 +10,7 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.jobs import pairs
-from tactile_core.jobs.engine import inputs, local, manifest, recipes, result_parts
+from tactile_core.jobs.engine import inputs, local, manifest, recipes
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.tasks import Task
@@ -34,25 +34,23 @@ def test_a_worker_takes_no_modules_from_the_folder_it_is_started_in(new_job, tmp
 def test_the_folder_of_parts_keeps_what_others_put_there(new_job, do, tmp_path):
     _, job = new_job()
     out = tmp_path / "result"
-    folder = result_parts.folder_of(out)
+    folder = runs.folder_of(out)
     folder.mkdir()
     (folder / "thesis.txt").write_text("mine")
-    with pytest.raises(TactileError, match=r"holds thesis\.txt, and no job"), result_parts.begun(out, job):
+    with pytest.raises(TactileError, match=r"holds thesis\.txt, and no job"), runs.begun(out, job):
         pass
     (folder / "thesis.txt").rename(tmp_path / "thesis.txt")
-    with result_parts.begun(out, job):
-        runs.run(folder, job, local.Local(folder, 1, command=do.__globals__["COMMAND"]), None, none)
+    with runs.completed(out, job, lambda at: local.Local(at, 1, command=do.__globals__["COMMAND"])):
         (tmp_path / "thesis.txt").rename(folder / "thesis.txt")
-        result_parts.finished(folder)
     assert [path.name for path in folder.iterdir()] == ["thesis.txt"]
 
 
-def test_parts_behind_a_link_are_removed(new_job, tmp_path):
+def test_parts_behind_a_link_are_removed(new_job, do, tmp_path):
     _, job = new_job()
     (tmp_path / "scratch").mkdir()
-    result_parts.folder_of(tmp_path / "result").symlink_to(tmp_path / "scratch")
-    with result_parts.begun(tmp_path / "result", job) as folder:
-        result_parts.finished(folder)
+    runs.folder_of(tmp_path / "result").symlink_to(tmp_path / "scratch")
+    with runs.completed(tmp_path / "result", job, lambda at: local.Local(at, 1, command=do.__globals__["COMMAND"])):
+        pass
     assert not list((tmp_path / "scratch").iterdir())
 
 
@@ -92,7 +90,7 @@ def test_a_damaged_prepared_recording_is_no_end_of_the_job(new_job, do, recordin
     file.write_bytes(file.read_bytes()[:2000])
     recordings[0].unlink()
     done = do(folder, job)
-    assert list(done.aside) == ["00000_a"] and "cannot be read" in done.aside["00000_a"]
+    assert list(done.aside) == ["00000_a"] and "cannot be read" in str(done.aside["00000_a"])
     assert json.loads((folder / jobs.MANIFEST).read_text())["recordings"][0]["shards"] == []
 
 

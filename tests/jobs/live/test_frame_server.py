@@ -70,7 +70,7 @@ def test_the_page_s_reader_reads_what_is_served_on_this_machine_alone(zmq):
 CODE = """
 import resource
 import numpy as np
-from tactile_core.cli.stop_signals import stopping
+from tactile_core.cli.main import stopping
 from tactile_core.jobs.live.frame_server import FrameServer
 from tactile_core.jobs.live.live_view import Shown
 import time

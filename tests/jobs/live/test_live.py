@@ -15,8 +15,14 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, live
 from tactile_core.jobs.live import playback
-from tactile_core.recordings import electrode_gains, polarity
+from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
+from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
+
+
+def rows_of(electrodes: np.ndarray, pdc: np.ndarray | None = None) -> recordings.Recording:
+    """Rows as they come from a file at 100 Hz."""
+    return assemble("touch.csv", "CSV", electrodes=electrodes, stamps=np.arange(len(electrodes)) / 100, pdc=pdc)
 
 
 class Clock:
@@ -107,7 +113,7 @@ def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
 def test_live_signals_are_those_of_the_whole_recording(slide_csv):
     recording = recordings.read(slide_csv(frames=150))
     signals = live.LiveSignals()
-    known = [signals.learn(recording.electrodes[i : i + 10]) for i in range(0, 150, 10)]
+    known = [signals.learn(recording.at(np.arange(i, i + 10))) for i in range(0, 150, 10)]
     assert known.index(True) == 2  # 30 frames are the tare's window
     change = signals.signals(recording.electrodes).change
     # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
@@ -117,8 +123,8 @@ def test_live_signals_are_those_of_the_whole_recording(slide_csv):
 def test_without_a_quiet_part_rest_is_guessed_in_the_end():
     signals = live.LiveSignals()
     frames = 3000 + 500 * np.sin(np.arange(1200)[:, None] / 3) * np.ones(19)
-    assert not signals.learn(frames[:900])
-    assert signals.learn(frames[900:]) and "guess" in signals.found
+    assert not signals.learn(rows_of(frames[:900]))
+    assert signals.learn(rows_of(frames[900:])) and "guess" in signals.found
 
 
 def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
@@ -139,13 +145,19 @@ def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path,
 
 def test_rest_is_from_the_frames_given_or_the_file_s_own_zero():
     frames = np.where(np.arange(100)[:, None] < 40, 3100.0, 3000.0) * np.ones(19)  # begins in contact
-    signals = live.LiveSignals(tare="50:80")
-    assert not signals.learn(frames[:79]) and signals.learn(frames[79:])
-    np.testing.assert_array_equal(signals.rest, np.full(19, 3000.0))
-    zero = live.LiveSignals(tare="none")
-    assert zero.learn(frames) and not zero.rest.any()
+    signals = live.LiveSignals(options=PrepareOptions(tare="50:80"))
+    assert not signals.learn(rows_of(frames[:79])) and signals.learn(rows_of(frames[79:]))
+    np.testing.assert_array_equal(signals.known.rest, np.full(19, 3000.0))
+    zero = live.LiveSignals(options=PrepareOptions(tare="none"))
+    assert (
+        zero.learn(rows_of(frames - 3000 + np.random.default_rng(1).normal(0, 1, (100, 19))))
+        and not zero.known.rest.any()
+        and "own zero" in zero.found
+    )
+    with pytest.raises(TactileError, match="has no zero of its own"):
+        live.LiveSignals(options=PrepareOptions(tare="none")).learn(rows_of(frames))
     with pytest.raises(TactileError, match="tare"):
-        live.LiveSignals(tare="50:2000")
+        live.LiveSignals(options=PrepareOptions(tare="50:2000"))
 
 
 def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
@@ -153,9 +165,9 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
     unit = ElectrodeGains("a unit", gain, [0.0] * 19, [3200.0] * 19, [5.0] * 19)
     noise = np.random.default_rng(3).normal(0, 0.5, (40, 19))
     held, free = (live.LiveSignals(unit=unit) for _ in range(2))
-    assert held.learn(2900 + noise) and "unit's own" in held.found  # 300 counts away, however calm
-    np.testing.assert_array_equal(held.rest, np.full(19, 3200.0))
-    assert free.learn(3210 + noise) and free.found.startswith("frames")
+    assert held.learn(rows_of(2900 + noise)) and "unit's own" in held.found  # 300 counts away, however calm
+    np.testing.assert_array_equal(held.known.rest, np.full(19, 3200.0))
+    assert free.learn(rows_of(3210 + noise)) and free.found.startswith("frames")
     change = free.signals(3110 + noise).change
     np.testing.assert_allclose(
         change, np.tile(-100 / np.array(gain), (40, 1)), atol=3.0
@@ -266,10 +278,10 @@ def test_the_polarity_is_found_by_pressure_and_assumed_until_then(sign):
     electrodes, pdc = 3300 + sign * strength[:, None] * contact + noise, 1000 + 100 * strength
     signals = live.LiveSignals()
     for start in range(0, 260, 10):
-        signals.learn(electrodes[start : start + 10], pdc[start : start + 10])
+        signals.learn(rows_of(electrodes[start : start + 10], pdc[start : start + 10]))
         if start == 40:
-            assert signals.polarity.name == "falls" and not signals.polarity.sure
-    assert signals.polarity.sure and signals.polarity.sign == sign
+            assert signals.polarity == "falls" and not signals.sure
+    assert signals.sure and signals.polarity == {1: "falls", -1: "rises"}[sign]
     change = signals.signals(electrodes).change
     np.testing.assert_allclose(change[60:], strength[60:, None] * contact, atol=8)
-    assert live.LiveSignals(polarity="rises").polarity.sign == -1
+    assert live.LiveSignals(options=PrepareOptions(polarity="rises")).sure

@@ -98,7 +98,7 @@ def test_messages_become_pictures_and_wrenches_and_a_bad_one_is_passed_over(scri
     messages.insert(80, SimpleNamespace(header=None, tactiles=[]))
     node = Node(messages)
     install(monkeypatch, node)
-    monkeypatch.setattr(script, "load_tools", lambda weights: fake_tools.tools())
+    monkeypatch.setattr(script, "load_tools", lambda options: fake_tools.tools())
     words = ["ros_node.py", "--topic", "/hand", "--type", "sr_robot_msgs/msg/BiotacAll", "--finger", "2"]
     monkeypatch.setattr(sys, "argv", words)
     script.main()
@@ -117,7 +117,7 @@ def test_the_hand_s_messages_are_read_as_its_bag_is(script, tmp_path):
     finger = script.Finger("biotac_sensors/msg/BioTacHand", 1, fake_tools.tools())
     for message in messages_of(press, tmp_path, "hand", 1):
         finger(message)
-    assert finger.view.frames == 60 and finger.view.rest_source.startswith("frames")
-    np.testing.assert_allclose(finger.view._signals.rest, press.electrodes[:30].mean(axis=0), atol=1.0)  # counts
+    assert finger.view.frames == 60 and finger.view.signals.found.startswith("frames")
+    np.testing.assert_allclose(finger.view.signals.known.rest, press.electrodes[:30].mean(axis=0), atol=1.0)  # counts
     with pytest.raises(TactileError, match="2 fingers; expected finger 5"):
         script.Finger("biotac_sensors/msg/BioTacHand", 5, fake_tools.tools())(message)
