@@ -175,7 +175,7 @@ def test_version_2_1_has_a_file_and_a_video_an_episode_and_what_gr00t_asks_for(j
 
 
 def test_lerobot_loads_it_as_its_training_does(labelled, tmp_path):
-    pytest.importorskip("lerobot", reason="LeRobot is absent: pip install lerobot[dataset], some GB")
+    pytest.importorskip("lerobot", reason="LeRobot is absent: scripts/check_lerobot.py installs it")
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     export.export(labelled, "lerobot", tmp_path / "out", silent)
