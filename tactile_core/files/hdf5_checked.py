@@ -6,6 +6,8 @@ import contextlib
 import functools
 import math
 import os
+import sys
+import threading
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,10 +17,10 @@ import numpy as np
 
 from ..errors import TactileError
 from . import outside
-from .memory_bound import bounded_memory
 
 if TYPE_CHECKING:
     import h5py
+
 
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk (assumed enough: HDF5 advises 1 MB, and keeps one in memory)
 MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf at most 88
@@ -29,6 +31,30 @@ MAX_DEPTH = 32  # groups within groups, whose names the library looks up again a
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enough: the library keeps at most 32 MB)
+LOCK = threading.Lock()  # one bound at a time: each restores what it found
+
+
+@contextmanager
+def bounded_memory(more: int) -> Iterator[None]:
+    """Let the process take at most ``more`` bytes beyond its present data; allocations beyond fail.
+
+    On Linux alone: macOS and Windows have no such bound within a process.
+    """
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    import resource
+
+    with LOCK:
+        before = resource.getrlimit(resource.RLIMIT_DATA)
+        with open("/proc/self/statm") as file:
+            present = int(file.read().split()[5]) * resource.getpagesize()
+        limits = [present + more, *(limit for limit in before if limit != resource.RLIM_INFINITY)]
+        resource.setrlimit(resource.RLIMIT_DATA, (min(limits), before[1]))
+        try:
+            yield
+        finally:
+            resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 @contextmanager

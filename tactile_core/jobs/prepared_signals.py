@@ -21,9 +21,9 @@ from ..files.hdf5_checked import check_plain, declared, open_plain
 from ..files.hdf5_writer import Disk
 from ..recordings import Recording, Signals
 from ..recordings.chunks import read_parts
-from ..recordings.fingers import split
 from ..recordings.labels import Runs, extend
 from ..recordings.preparer import Preparer
+from ..recordings.recording import split
 from ..sensors import SOURCE
 from ..sensors.fluid_sensor import MOST_ELECTRODES
 from .convert import check_order

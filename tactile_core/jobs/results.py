@@ -21,7 +21,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic
 from ..files.outside import read_small
-from ..recordings.fingers import name_of
+from ..recordings.recording import name_of
 
 FORMAT = "tactile-result-1"
 FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png", "note.json", "timings.json"

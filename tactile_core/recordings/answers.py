@@ -12,9 +12,10 @@ from ..sensors import SOURCE, electrode_count, typical_rest
 from .assemble import check_electrodes
 from .electrode_faults import silent as silent_frames
 from .flags import Flag
+from .preparation import prepare_all
 from .quiet import tare_frames
 from .recording import Recording
-from .signals import EVERY, PrepareOptions, Signals, prepare_all
+from .signals import EVERY, FRAMEWISE, PrepareOptions, Signals
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
@@ -51,10 +52,10 @@ def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.n
         found = prepare_all(still, replace(options, kind="raw", tare=None))
         found = replace(found, change=np.zeros_like(found.change), warnings=recording.warnings)
         heard = np.arange(len(silent))
-    spread: dict[str, Any] = {
-        name: np.zeros((len(silent), *values.shape[1:]), values.dtype) for name, values in _rows(found).items()
-    }
-    for name, values in _rows(found).items():
+    spread: dict[str, Any] = {}
+    for name in FRAMEWISE:
+        values = getattr(found, name)
+        spread[name] = np.zeros((len(silent), *values.shape[1:]), values.dtype)
         spread[name][heard] = values
     spread["electrodes"][silent] = recording.electrodes[silent]
     common = np.bitwise_and.reduce(found.flags)
@@ -67,10 +68,6 @@ def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.n
 def unanswered(signals: Signals) -> np.ndarray:
     """Return which frames (T,) bool of prepared signals are those in which the finger did not answer."""
     return (signals.flags & Flag.DEAD_CHANNEL > 0) & ~signals.change.any(axis=1)
-
-
-def _rows(signals: Signals) -> dict[str, np.ndarray]:
-    return {name: getattr(signals, name) for name in ("change", "electrodes", "quiet", "flags", "pdc")}
 
 
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:

@@ -18,8 +18,9 @@ from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typica
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
 from .answers import unanswered
-from .fingers import FINGERS, short_of
-from .signals import Rest, Signals, doubt_law
+from .preparation import doubt_law
+from .recording import FINGERS, short_of
+from .signals import Rest, Signals
 from .unit import film
 
 FORMAT = "tactile-sensor-2"
@@ -81,7 +82,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     ) -> ElectrodeGains:
         """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it.
 
-        section : of `fingers.split`, or of the Recording
+        section : of `recording.split`, or of the Recording
         """
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"

@@ -8,29 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sensors import electrode_count, title, typical_rest
-from .answers import prepare
+from ..sensors import SAMPLE_RATE, electrode_count, title, typical_rest
 from .flags import Flag, names
+from .formats import HAND
 from .labels import summary
 from .preparer import Preparer
 from .readers import pac_columns, read, sensor_of
 from .recording import Recording
+from .signal_kind import detect
 from .signals import PrepareOptions, Signals
 from .tables.truncated_cell import listed
 
 if TYPE_CHECKING:
-    from .electrode_gains import SensorFile
-from typing import TYPE_CHECKING
-
-from ..sensors import SAMPLE_RATE
-from .formats import HAND
-from .signal_kind import detect
-
-if TYPE_CHECKING:
-    from .electrode_gains import ElectrodeGains
+    from .electrode_gains import ElectrodeGains, SensorFile
 
 MOST_NOT_TAKEN = 40  # names that are spelled out; a file may have a thousand
 SHOWN = 5  # texts of a label
+TRANSLATED_BY = "`tactile convert RECORDING --sensor FILE`, with the unit's rest by `tactile adapt` (docs/extend.md)"
+ADVICE = (
+    "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
+)
 
 
 def describe(
@@ -47,16 +44,17 @@ def describe(
     gains = None if unit is None else unit.gains_for(path, recording.section, "--sensor", sensor)
     pac = pac_columns(path, columns) if recording.pac is None else recording.pac.shape[1]
     if typical_rest(sensor) is None:
-        return describe_sp(os.fspath(path), recording, gains, _channels(recording, pac), _not_taken(recording))
-    signals = prepare(recording, options)
-    if gains is not None:
+        rows, table, warnings = _of_counts(recording, gains, pac), _counts(recording, gains), recording.warnings
+    else:
         signals = Preparer(options, gains)(recording)
-    lines = [os.fspath(path)]
-    lines += [f"  {label:<11}{text}" for label, text in _rows(recording, signals, pac)]
-    lines.append("")
-    lines += _electrode_table(signals)
-    if signals.warnings:
-        lines += ["", "warnings"] + [f"  - {warning}" for warning in signals.warnings]
+        least, largest = signals.change.min(axis=0), signals.change.max(axis=0)
+        table = [("rest", signals.rest), ("least", least), ("largest", largest)]
+        rows, warnings = _rows(recording, signals, pac), signals.warnings
+    lines = [os.fspath(path), *(f"  {label:<11}{text}" for label, text in rows), ""]
+    head = ("electrode", np.arange(1, recording.electrodes.shape[1] + 1))
+    lines += [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in (head, *table)]
+    if warnings:
+        lines += ["", "warnings"] + [f"  - {warning}" for warning in warnings]
     return "\n".join(lines)
 
 
@@ -161,47 +159,24 @@ def _flags(flags: np.ndarray) -> str:
     return ", ".join(counted) + f" of {len(flags)} frames" if counted else "none"
 
 
-def _electrode_table(signals: Signals) -> list[str]:
-    """Rest, least and largest change of each electrode, in counts."""
-    head = "  electrode " + "".join(f"{j + 1:>6}" for j in range(len(signals.rest)))
-    rows = [("rest", signals.rest), ("least", signals.change.min(axis=0)), ("largest", signals.change.max(axis=0))]
-    return [head] + [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in rows]
-
-
-TRANSLATED_BY = "`tactile convert RECORDING --sensor FILE`, with the unit's rest by `tactile adapt` (docs/extend.md)"
-ADVICE = (
-    "not known: a recording that begins in contact does not tell it; `tactile adapt RECORDINGS` finds it in several"
-)
-
-
-def describe_sp(
-    path: str, recording: Recording, unit: ElectrodeGains | None, channels: str, not_taken: list[tuple[str, str]]
-) -> str:
-    """Describe sensor, channels, frames, rest and counts as a short table.
-
-    unit : with the rest against which changes are taken; channels, not_taken : rows of the table, in words
-    """
-    count, electrodes = len(recording), recording.electrodes
+def _of_counts(recording: Recording, unit: ElectrodeGains | None, pac: int) -> list[tuple[str, str]]:
+    """Return the rows on a recording whose changes are not known without its unit's rest."""
+    electrodes = recording.electrodes
     finger = recording.about.get("finger")
     name = f", {HAND[finger]} ({finger})" if finger else ""
     whole = electrodes[np.isfinite(electrodes).all(axis=1)]
     kind, evidence = detect(whole) if len(whole) else ("unknown", "no line has a reading of every electrode")
-    rows = [
+    return [
         ("layout", recording.layout),
-        ("sensor", f"BioTac SP, {electrodes.shape[1]} electrodes{name}"),
-        ("channels", ", ".join([channels, *recording.about.get("labels", ())])),
-        ("frames", f"{count} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
+        ("sensor", f"{title(recording.sensor)}, {electrodes.shape[1]} electrodes{name}"),
+        ("channels", ", ".join([_channels(recording, pac), *recording.about.get("labels", ())])),
+        ("frames", f"{len(electrodes)} in {recording.row_word}s {recording.rows[0]} to {recording.rows[-1]}"),
         ("time", _time_of_sp(recording)),
         ("kind", f"{kind}: {evidence}"),
         ("rest", ADVICE if unit is None else unit.note),
         ("use", TRANSLATED_BY),
-        *not_taken,
+        *_not_taken(recording),
     ]
-    lines = [path, *(f"  {label:<11}{text}" for label, text in rows), ""]
-    lines += _counts(electrodes) if unit is None else _changes(electrodes, np.array(unit.rest_counts))
-    if recording.warnings:
-        lines += ["", "warnings"] + [f"  - {warning}" for warning in recording.warnings]
-    return "\n".join(lines)
 
 
 def _time_of_sp(recording: Recording) -> str:
@@ -212,20 +187,11 @@ def _time_of_sp(recording: Recording) -> str:
     return f"no time stamps; {len(recording) / SAMPLE_RATE:.2f} s at the sensor's {SAMPLE_RATE:g} Hz (assumed)"
 
 
-def _counts(counts: np.ndarray) -> list[str]:
-    """Lines on counts (T, 24): each electrode's median, least and largest."""
-    of = ("median", np.nanmedian(counts, axis=0)), ("least", np.nanmin(counts, axis=0)), (
-        "largest", np.nanmax(counts, axis=0),
-    )  # fmt: skip
-    return _table(counts.shape[1], of)
-
-
-def _changes(counts: np.ndarray, rest: np.ndarray) -> list[str]:
-    """Lines on counts (T, 24) against counts at rest (24,)."""
-    of = ("rest", rest), ("least", np.nanmin(counts - rest, axis=0)), ("largest", np.nanmax(counts - rest, axis=0))
-    return _table(counts.shape[1], of)
-
-
-def _table(count: int, rows: tuple[tuple[str, np.ndarray], ...]) -> list[str]:
-    head = ("electrode", np.arange(1, count + 1))
-    return [f"  {label:<10}" + "".join(f"{value:>6.0f}" for value in values) for label, values in (head, *rows)]
+def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
+    """Return each electrode's median or its unit's rest, and the least and largest count, against it if known."""
+    if unit is None:
+        counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
+    else:
+        rest = np.array(unit.rest_counts)
+        counts, middle = recording.electrodes - rest, ("rest", rest)
+    return [middle, ("least", np.nanmin(counts, axis=0)), ("largest", np.nanmax(counts, axis=0))]

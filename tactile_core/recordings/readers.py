@@ -22,8 +22,7 @@ from .array_store import NPY, Store, open_hdf5, open_npz
 from .assemble import check_electrodes
 from .bags.bag import START_BYTES, is_bag_folder, kind_of, open_bag
 from .bags.bag_recordings import names_of, read_bag, streams_of
-from .fingers import Chosen, named, split
-from .recording import Recording
+from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
 from .tables.column_map import ColumnMap, refuse_other
 from .tables.json_table import is_json, read_json

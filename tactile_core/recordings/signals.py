@@ -1,4 +1,4 @@
-"""Prepare a Recording's signals for the networks: repaired, tared, drift removed, everything reported."""
+"""Signals that are ready for the networks, and the options of their preparation."""
 
 from __future__ import annotations
 
@@ -8,30 +8,20 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import COUNT_MAX, SOURCE, contacts_of, divider, typical_rest
-from ..sensors.descriptor import of_kind
-from ..sensors.fluid_sensor import FALLS, POLARITIES, Fluid
-from .doubt import LAW, Doubt, Reason, without
-from .electrode_faults import dead, saturated
-from .flags import Flag
-from .polarity import AUTO, Polarity, choose, polarity_of, polarity_of_sensor
-from .quiet import TARED_PDC, Quiet, calmest, find_quiet, tare_frames, window_frames
-from .recording import BLOCK, Recording
-from .repair import fill, find_glitches, is_time_series, smooth
-from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
-from .signal_kind import KINDS, detect, full_scale
+from ..sensors import SOURCE, divider, typical_rest
+from ..sensors.fluid_sensor import POLARITIES
+from .polarity import AUTO
+from .quiet import TARED_PDC
+from .rest_level import Changes
+from .signal_kind import KINDS
 from .tables.column_map import ColumnMap
-from .unit import contact_law, film
+from .unit import film
 
+EVERY = slice(None)  # of a recording's frames
 LONGEST = 101  # frames, a second, to smooth over: beyond, touch itself is smoothed away (assumed)
-# Frames where the user gives none. Rectified signals need it: folded noise does not average out in the networks.
-RECTIFIED, SIGNED = 3, 1
-# Counts that the 95th percentile of a scaled recording's largest changes is stretched to (docs/sources.md, Networks).
-SCALED_PEAK = 150.0
 FRAMEWISE = ("change", "electrodes", "quiet", "flags", "pdc")  # arrays of `Signals` with a row for each frame
 UNIT_DRIFT = 60.0  # counts that a unit's rest may drift between recordings (the slide set's: 40 to 51 in two days)
 SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/sources.md, BioTac read-out)
-SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
 @dataclass(frozen=True)
@@ -135,12 +125,9 @@ class Signals:
         Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
         which no unit has been seen at rest: see `relative_to`.
         """
-        if _typical_rest(self.kind, self.sensor) is None:
+        if self.kind != "raw" or typical_rest(self.sensor) is None:
             return self.change
-        found = np.empty(self.change.shape)
-        for start in range(0, len(found), BLOCK):
-            found[start : start + BLOCK] = self.typical_of(slice(start, start + BLOCK))
-        return found
+        return Changes(len(self.change), self.typical_of)[EVERY]
 
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
         """Change (T, e) counts, converted to a unit that rests at counts (e,); of raw readings alone."""
@@ -148,292 +135,10 @@ class Signals:
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
-        return _typical(self.change[rows], self.kind, self.rest, self.sensor)
+        return typical(self.change[rows], self.kind, self.rest, self.sensor)
 
 
-EVERY = slice(None)  # of a recording's frames
-
-
-def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Prepare a recording of a finger that answers in all frames; see ``answers.prepare``."""
-    flags, warnings = recording.flags.copy(), list(recording.warnings)
-    readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
-    kind, evidence = _kind(recording, readings, options)
-    unit = _counts_per_unit(recording, readings, kind, options, warnings)
-    if unit != 1:
-        readings = np.multiply(readings, unit, dtype=float)
-        if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
-            kind, evidence = detect(readings)
-        if kind == "raw" and recording.pdc is not None and np.nanmax(recording.pdc) <= 1.01 * COUNT_MAX / unit:
-            recording = replace(recording, pdc=unit * recording.pdc)
-    readings, flags, repaired = _repaired(recording, readings, flags, options, warnings)
-    if kind == "rectified":
-        flags |= np.uint16(Flag.RECTIFIED)
-        warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
-    quiet = _quiet(recording, readings, kind, options)
-    unit_rest = _unit_rest(recording, readings, kind, quiet, options, warnings)
-    if unit_rest is None:
-        rest = _rest(recording, readings, kind, quiet, options, warnings)
-        if not quiet.parts:
-            flags |= np.uint16(Flag.NO_QUIET_PART)
-    else:
-        rest = Baseline.constant(np.array(unit_rest.counts))
-        quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
-    flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
-    at_start, at_end = rest.at(np.array([0, len(recording) - 1]))
-    slope = (at_end - at_start) / recording.duration if recording.duration > 0 else np.zeros(len(at_start))
-    window = _smoothed_over(options, kind)
-    change = _changes(readings, rest, window)
-    polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
-    flags |= np.uint16(polarity.doubt)
-    warnings += polarity.warnings
-    if polarity.sign < 0:
-        change = change.then(np.negative)
-    pdc = _pressure_change(recording, kind, quiet, unit_rest)
-    fluid = None
-    if kind == "raw" and polarity.name == FALLS and (unit_rest is not None or quiet.parts):
-        fluid = _film(recording, change, rest, pdc, options, own_rest=unit_rest is None)
-    if fluid is not None:
-        change = fluid.changes(change, rest)
-    if recording.pdc is not None and not np.isfinite(recording.pdc).all():
-        unread = int(np.sum(~np.isfinite(recording.pdc)))
-        warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
-    typical = change.then(lambda each: _typical(each, kind, at_start, recording.sensor))
-    flags, doubt = contact_law.flagged(typical, kind, quiet.mask, flags, pdc, recording.sensor)
-    report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired
-    report |= {
-        "smoothed_frames": window, "polarity": polarity.name, "polarity_evidence": polarity.evidence,
-        "film": None if fluid is None else fluid.report(),
-    }  # fmt: skip
-    return Signals(
-        change=change[frames], rest=at_start.copy(), drift=slope, electrodes=readings[frames], kind=kind,
-        quiet=quiet.mask[frames], flags=flags[frames], pdc=pdc[frames],
-        warnings=(*warnings, *filter(None, [doubt])), report=report, sensor=recording.sensor,
-    )  # fmt: skip
-
-
-def _film(
-    recording: Recording, change: Changes, rest: Baseline, pdc: np.ndarray, options: PrepareOptions, *, own_rest: bool
-) -> film.Film | None:
-    """Return the fluid film of a raw recording whose rest is known; None of a sensor without simulated contacts."""
-    if contacts_of(recording.sensor) is None:
-        return None
-    pressure = of_kind(recording.sensor, Fluid).readout.pressure * pdc if np.isfinite(pdc).any() else None
-    return film.find(
-        change, Changes(len(recording), rest.at), recording.time, pressure, recording.sensor,
-        thickness=options.film, own_rest=own_rest, drifts=options.drift,
-    )  # fmt: skip
-
-
-def doubt_law(signals: Signals) -> Signals:
-    """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt.
-
-    Simulated ones of a sensor whose descriptor has none come with its weights: their law is not judged.
-    """
-    typical = Changes(len(signals.change), signals.typical_of)
-    flags, doubt = contact_law.flagged(typical, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
-    others = without(signals.warnings, LAW)
-    return replace(signals, flags=flags, warnings=(*others, *filter(None, [doubt])))
-
-
-def _changes(readings: np.ndarray, rest: Baseline, window: int) -> Changes:
-    """Return the changes of readings (T, 19) against rest, smoothed over so many frames."""
-    change = Changes(len(readings), lambda frames: readings[frames] - rest.at(frames))
-    return change if window == 1 else Changes(len(readings), smooth(change[EVERY], window).__getitem__)
-
-
-def _typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
+def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
     """Convert changes (n, 19) counts of a unit at rest counts (19,) to a typical one's, where they are raw."""
-    to = _typical_rest(kind, sensor)
-    return change if to is None else divider.typical(change, rest, to)
-
-
-def _typical_rest(kind: str, sensor: str) -> np.ndarray | None:
-    """Return the counts at rest (e,) of the unit that changes are converted to; None where they are not."""
-    return typical_rest(sensor) if kind == "raw" else None
-
-
-def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -> tuple[str, str]:
-    if options.kind is None:
-        unit = full_scale(readings) if options.counts_per_unit is None else None
-        return ("raw", f"{unit[1]}, all far above any change") if unit else detect(readings)
-    return options.kind, f"given by the user (the samples look {detect(readings)[0]})"
-
-
-def _unit_rest(
-    recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
-) -> Rest | None:
-    """Return the unit's rest if it is known and no calm level lies near it: a steady grip is calm, too."""
-    if options.rest is None or kind != "raw" or options.tare is not None:
-        return None
-    reason = "no quiet part"
-    if quiet.parts:
-        still = level(readings[quiet.mask])
-        pdc = np.nan if recording.pdc is None else float(np.median(recording.pdc[quiet.mask]))
-        if options.rest.agrees(still, pdc):
-            return None
-        off = np.abs(still - np.array(options.rest.counts))
-        reason = f"what is calm lies up to {off.max():.0f} counts from it (E{off.argmax() + 1})"
-    warnings.append(Doubt(Reason.REST_OF_UNIT, found=reason))
-    return options.rest
-
-
-def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: Rest | None) -> np.ndarray:
-    """PDC (T,) counts over its level at rest; NaN where there is none."""
-    if recording.pdc is None:
-        return np.full(len(recording), np.nan)
-    if unit_rest is not None and unit_rest.pdc is not None and not _is_tared(recording.pdc, unit_rest.pdc):
-        return recording.pdc - unit_rest.pdc
-    return recording.pdc - pressure_rest(recording.pdc, kind, quiet)
-
-
-def _is_tared(pdc: np.ndarray, rest: float) -> bool:
-    """Return true if PDC has another zero than the unit's: far below its rest, where pressure cannot be."""
-    finite = pdc[np.isfinite(pdc)]
-    return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
-
-
-def _polarity(
-    recording: Recording, readings: np.ndarray, change: Framewise, kind: str, quiet: Quiet, options: PrepareOptions,
-    *, rest_known: bool,
-) -> Polarity:  # fmt: skip
-    if kind == "rectified":
-        return Polarity(FALLS, "the sign is lost")
-    if contacts_of(recording.sensor) is None:
-        return choose(polarity_of_sensor(recording.sensor, kind), options.polarity, recording.about.get("polarity", ""))
-    shown = polarity_of(change, quiet.mask, readings, recording.pdc, rest_known=rest_known, sensor=recording.sensor)
-    return choose(shown, options.polarity, recording.about.get("polarity", ""))
-
-
-def _smoothed_over(options: PrepareOptions, kind: str) -> int:
-    if options.smooth is None:
-        return RECTIFIED if kind == "rectified" else SIGNED
-    return options.smooth
-
-
-def _counts_per_unit(
-    recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
-) -> float:
-    """Return the factor to counts: 1, the user's, or one that gives scaled recordings a usual press (assumed)."""
-    if options.counts_per_unit is not None:
-        return float(options.counts_per_unit)
-    if kind == "raw" and (found := full_scale(readings)):
-        warnings.append(
-            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else)"
-        )
-        return found[0]
-    if kind != "scaled":
-        return 1.0
-    largest = np.zeros(len(readings))
-    for column in readings.T:
-        np.maximum(largest, np.abs(column - np.median(column)), out=largest)
-    peak = float(np.percentile(largest, 95))
-    factor = SCALED_PEAK / peak if peak > 1e-12 else 1.0
-    warnings.append(
-        f"the unit of this scaled recording is not known: stretched by {factor:.4g} to a press's usual {SCALED_PEAK:g}"
-        " counts, so depths and forces are only relative; counts_per_unit fixes it: 4095 for shares of the range, 1241"
-        " for volts of 3.3 V"
-    )
-    return factor
-
-
-def _repaired(
-    recording: Recording, readings: np.ndarray, flags: np.ndarray, options: PrepareOptions, warnings: list[str]
-) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Return the readings (T, 19) without glitches, the flags (T,), and what was repaired, for the report."""
-    glitches, unreadable = _glitches(recording, readings, options, warnings), ~np.isfinite(recording.electrodes)
-    flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
-    bad = glitches | unreadable
-    return fill(readings, bad), flags, {
-        "samples_interpolated": int(unreadable.sum()),
-        "samples_glitch": int(glitches.sum()),
-        "rows_repaired": recording.rows[bad.any(axis=1)].tolist(),
-    }  # fmt: skip
-
-
-def _glitches(recording: Recording, readings: np.ndarray, options: PrepareOptions, warnings: list[str]) -> np.ndarray:
-    """Mark samples (T, 19) bool to repair, and report them in the warnings."""
-    none = np.zeros(readings.shape, bool)
-    if not options.repair:
-        return none
-    found = find_glitches(readings)
-    if not is_time_series(found):
-        warnings.append(
-            f"{found.any(axis=1).mean():.0%} of the frames look like glitches: neighbouring rows seem not to belong"
-            " together, nothing was repaired"
-        )
-        return none
-    frames = np.flatnonzero(found.any(axis=1))
-    for frame in frames[:SHOWN]:
-        cells = [f"E{j + 1} {recording.electrodes[frame, j]:g}" for j in np.flatnonzero(found[frame])]
-        warnings.append(f"{recording.row_word} {recording.rows[frame]}: glitch in {', '.join(cells)}; interpolated")
-    if len(frames) > SHOWN:
-        warnings.append(
-            f"{len(frames) - SHOWN} more frames with glitches, the last in {recording.row_word}"
-            f" {recording.rows[frames[-1]]}"
-        )
-    return found
-
-
-def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions) -> Quiet:
-    if options.tare is None:
-        return find_quiet(readings, recording.pdc, recording.rate, kind)
-    if options.tare == "none":
-        if kind == "raw":
-            raise TactileError(
-                "option tare",
-                "'none' for a raw recording, which has no zero of its own",
-                "frames A:B",
-                "Name frames without contact, or leave the option out",
-            )
-        return Quiet(np.zeros(len(readings), bool), (), "the file's own zero, as asked for")
-    frames = tare_frames(options.tare, len(readings))
-    mask = np.zeros(len(readings), bool)
-    mask[frames] = True
-    return Quiet(mask, ((frames.start, frames.stop),), "given by the user")
-
-
-def _rest(
-    recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
-) -> Baseline:
-    """Rest to subtract."""
-    if quiet.parts:
-        return baseline(
-            readings, quiet, options.drift and kind != "rectified"
-        )  # drift of a rectified signal has no sign
-    if options.tare == "none":
-        warnings.append("no tare, as asked for: the file's own zero is taken for rest")
-        return Baseline.constant(np.zeros(readings.shape[1]))
-    if kind == "raw":
-        guess = calmest(readings, recording.pdc, recording.rate)
-        frames = {"frames": guess.stop - guess.start, "first": guess.start, "last": guess.stop}
-        warnings.append(Doubt(Reason.REST_GUESSED, found=quiet.evidence, **frames))
-        return Baseline.constant(level(readings[guess]))
-    warnings.append(Doubt(Reason.REST_OF_FILE, found=quiet.evidence))
-    return Baseline.constant(np.zeros(readings.shape[1]))
-
-
-def _report(
-    recording: Recording,
-    kind: str,
-    evidence: str,
-    options: PrepareOptions,
-    unit: float,
-    quiet: Quiet,
-    slope: np.ndarray,
-) -> dict[str, Any]:
-    return {
-        "layout": recording.layout,
-        "frames": len(recording),
-        "rate_hz": round(recording.rate, 3),
-        "duration_s": round(recording.duration, 3),
-        "kind": kind,
-        "kind_evidence": evidence,
-        "counts_per_unit": unit,
-        "tare": "none" if options.tare == "none" else "given" if options.tare is not None else "automatic",
-        "tare_window_frames": window_frames(recording.rate),
-        "quiet_parts": [list(part) for part in quiet.parts],
-        "quiet_evidence": quiet.evidence,
-        "drift_removed": bool(options.drift and len(quiet.parts) > 1 and kind != "rectified"),
-        "drift_counts_per_s": [round(float(value), 4) for value in slope],
-    }
+    to = typical_rest(sensor)
+    return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

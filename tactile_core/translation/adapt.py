@@ -14,9 +14,9 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, units_file
-from ..recordings.fingers import FINGERS, short_of, split
 from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
+from ..recordings.recording import FINGERS, short_of, split
 from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
 from ..recordings.unit.gain_matching import PRIOR, Match, match

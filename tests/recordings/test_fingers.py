@@ -12,8 +12,8 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert
 from tactile_core.recordings import assemble
-from tactile_core.recordings.fingers import name_of
 from tactile_core.recordings.readers import each_finger
+from tactile_core.recordings.recording import name_of
 from tactile_core.recordings.tables import matlab
 
 savemat = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]").savemat

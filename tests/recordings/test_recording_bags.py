@@ -19,8 +19,8 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.recordings import chunks, electrode_gains
 from tactile_core.recordings.bags import bag, ros_messages, ros_sensors
-from tactile_core.recordings.fingers import name_of
 from tactile_core.recordings.readers import each_finger, sensor_of
+from tactile_core.recordings.recording import name_of
 
 
 @pytest.mark.parametrize("container", ["ros1", "mcap", "sqlite3"])

@@ -11,9 +11,9 @@ from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, units_file
-from tactile_core.recordings.fingers import split
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.preparer import Preparer
+from tactile_core.recordings.recording import split
 from tactile_core.translation.unit_rest import find_rest
 
 REST = np.linspace(3100.0, 3500.0, 19)

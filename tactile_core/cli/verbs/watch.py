@@ -158,7 +158,7 @@ def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
     if sensor is None:
         return None
     from ...recordings import electrode_gains
-    from ...recordings.fingers import split
+    from ...recordings.recording import split
 
     return electrode_gains.read(sensor).gains_for(path, split(path).section, sensor, of)
 

@@ -18,8 +18,8 @@ from ...errors import TactileError
 from ...files import provenance
 from ...files.outside import read_small
 from ...recordings.bags.bag import MARK
-from ...recordings.fingers import name_of, split
 from ...recordings.readers import list_fingers
+from ...recordings.recording import name_of, split
 from ...sensors.calibration_file import load_calibration
 
 if TYPE_CHECKING:

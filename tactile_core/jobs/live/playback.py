@@ -14,9 +14,8 @@ from ...errors import TactileError
 from ...files import outside
 from ...recordings.assemble import MAX_BAD_SHARE, BadRows
 from ...recordings.chunks import read_parts
-from ...recordings.fingers import split
 from ...recordings.readers import table_reader
-from ...recordings.recording import Recording
+from ...recordings.recording import Recording, split
 from ...recordings.tables.column_map import ColumnMap
 from ...recordings.tables.table import read_lines, text_lines
 from ...recordings.tables.table_header import Header

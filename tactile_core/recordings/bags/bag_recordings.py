@@ -11,8 +11,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES, assemble, check_electrodes, sensor_with
-from ..fingers import Chosen, named
-from ..recording import Recording
+from ..recording import Chosen, Recording, named
 from ..tables.truncated_cell import listed
 from .bag import Bag, Topic, refused
 from .ros_messages import Decoder

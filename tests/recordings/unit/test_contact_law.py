@@ -13,7 +13,7 @@ from tactile_core.recordings import electrode_gains
 from tactile_core.recordings.doubt import LAW, Reason, reason_of
 from tactile_core.recordings.electrode_gains import ElectrodeGains
 from tactile_core.recordings.flags import Flag
-from tactile_core.recordings.signals import doubt_law
+from tactile_core.recordings.preparation import doubt_law
 from tactile_core.recordings.unit import contact_law
 from tactile_core.sensors import PRESSURE_PER_COUNT
 
