@@ -38,6 +38,7 @@ RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the m
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
 PAC = re.compile(r"pac\d+")
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
+PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
 
 
 class Opened(NamedTuple):
@@ -122,7 +123,9 @@ def _noted(recording: Recording, store: Store) -> Recording:
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:
     """Return true for a column that no translation needs."""
-    return name not in columns.names() if columns is not None else PAC.fullmatch(name) is not None
+    if columns is None:
+        return PAC.fullmatch(name) is not None
+    return name not in columns.names() and not columns.is_nanoseconds(name)
 
 
 def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> int:
@@ -252,7 +255,11 @@ def opened(path: str) -> Iterator[Opened]:
             return
         _check_file(file)
         with outside.open_file(file, "a recording") as stream, unpacked(file, stream) as plain:
-            container = _container(plain.read(START_BYTES))
+            start = plain.read(START_BYTES)
+            for packed, program in PACKED.items():
+                if start.startswith(packed):
+                    raise TactileError(file, "a packed file", "a recording, or a gzipped text", f"Unpack it: {program}")
+            container = _container(start)
             if plain is not stream and container not in ("csv", "json"):
                 raise TactileError(file, f"a gzipped file ({container})", "a gzipped text", "Unpack it: gunzip")
             if container in ("hdf5", "npz"):
@@ -285,9 +292,9 @@ def _container(start: bytes) -> str:
     """Return the container that begins with these bytes; anything but a known signature is a table of text."""
     if kind_of(start) is not None:
         return "bag"
-    if start.startswith((START, START_OF_HDF5)):
+    if start.startswith(START):
         return "mat"
-    if start.startswith(SIGNATURE):
+    if start.startswith((SIGNATURE, START_OF_HDF5)):
         return "hdf5"
     if start.startswith((*ZIP_STARTS, NPY)):
         return "npz"

@@ -79,7 +79,7 @@ def test_what_is_no_plain_hand_is_refused_in_words(hand, tmp_path, press):
     with pytest.raises(TactileError, match="no known recording: arrays 'x'"):
         recordings.read(tmp_path / "other.mat")
     (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(600, b" "))
-    with pytest.raises(TactileError, match=r"a MATLAB 7\.3 file.*-v7"):
+    with pytest.raises(TactileError, match=r"damaged HDF5|not an HDF5"):
         recordings.read(tmp_path / "new.mat")
 
 

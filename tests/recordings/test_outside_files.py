@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import bz2
 import gzip
 import json
 import os
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import pytest
 
 from tactile_core import recordings
 from tactile_core.cli.main import main
+from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.readers import opened
 from tactile_core.recordings.tables import column_map
@@ -77,6 +80,12 @@ def long(press, by_channel=False, stamped=True):
     return "\n".join(["time,channel,value", *(",".join(row) for row in rows), ""])
 
 
+def continued(press):
+    """Rows with a comment and the header again among them."""
+    head, *lines = table(press).splitlines()
+    return "\n".join([head, *lines[:9], "# on", head, *lines[9:]])
+
+
 TEXTS = {
     "plain.csv": table,
     "tabs.txt": lambda press: table(press, separator="\t"),
@@ -86,11 +95,17 @@ TEXTS = {
     "comments.csv": lambda press: table(press, top="# recorded 2012\n% by hand, in a hurry\n"),
     "title.csv": lambda press: table(press, top="Logger 3 of Bob\nrate,100\n"),
     "header_in_comment.csv": lambda press: table(press, top="# "),
+    "decimal_commas.csv": lambda press: table(press).replace(",", ";").replace(".", ","),
+    "continued.csv": continued,
     "windows.csv": lambda press: table(press, end="\r\n"),
     "quoted.csv": lambda press: table(press, extra=("object", ['"a, b"'] * len(press.time))),
     "iso.csv": clock("%Y-%m-%d %H:%M:%S.%f"),
     "iso_t.csv": clock("%Y-%m-%dT%H:%M:%S.%fZ"),
     "iso_zone.csv": clock("%Y/%m/%d %H:%M:%S.%f+00:00"),
+    "day_first.csv": clock("%d.%m.%Y %H:%M:%S.%f"),
+    "two_columns.csv": lambda press: re.sub(r"(?m)^(\d+)\.(\d+)", r"\1,\g<2>000000", table(press)).replace(
+        "time", "stamp.sec,stamp.nanosec", 1
+    ),
     "time_of_day.csv": clock("%H:%M:%S.%f"),
     "ms.csv": units(1e3, 0), "us.csv": units(1e6, 0), "ns.csv": units(1e9, 0),
     "unix_ms.csv": units(1e3, START), "unix_ns.csv": units(1e9, START),
@@ -121,6 +136,15 @@ def write_arrays(path: Path, press) -> None:
         np.savez(path, hand=np.stack([press.electrodes, press.electrodes + 1], axis=1), t_ns=stamps, pdc=press.pdc)
     elif path.suffix == ".npy":
         np.save(path, press.electrodes)
+    elif path.name == "own_73.mat":
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["hand/elec"], file["hand/time_s"], file["hand/pdc"] = (
+                press.electrodes.T,
+                press.time[None],
+                press.pdc[None],
+            )
+        with open(path, "r+b") as file:
+            file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
     else:
         scipy_io = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]")
         scipy_io.savemat(path, {"elec": press.electrodes.T, "time_s": press.time[None], "pdc": press.pdc[None]})
@@ -134,7 +158,7 @@ def read_by_guess(path):
     return recordings.read(path, column_map.read(map_file))
 
 
-@pytest.mark.parametrize("name", [*TEXTS, "plain.csv.gz", "two.h5", "hand.npz", "plain.npy", "own.mat"])
+@pytest.mark.parametrize("name", [*TEXTS, "plain.csv.gz", "two.h5", "hand.npz", "plain.npy", "own.mat", "own_73.mat"])
 def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     path = tmp_path / name
     if name.endswith(".gz"):
@@ -154,6 +178,30 @@ def test_a_guessed_map_reads_the_recording(name, press, tmp_path):
     else:
         np.testing.assert_allclose(found.time, press.time, atol=1e-5)
     assert not (found.flags & Flag.TIME_JUMP).any()
+
+
+def in_turns(press, by_value):
+    """Rows of two fingers, one after the other."""
+    head, *lines = (long(press) if by_value else table(press)).splitlines()
+    return "\n".join([f"{head},finger", *(f"{line},{finger}" for line in lines for finger in ("left", "right"))])
+
+
+@pytest.mark.parametrize("by_value", [False, True])
+def test_fingers_that_take_turns_are_not_mixed(by_value, press, tmp_path):
+    (tmp_path / "a.csv").write_text(in_turns(press, by_value), encoding="utf-8")
+    with pytest.raises(
+        TactileError, match=r"rows of 2 series take turns, told apart by column 'finger'.*Split the fil"
+    ):
+        read_by_guess(tmp_path / "a.csv")
+
+
+def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tmp_path):
+    (tmp_path / "a.csv").write_text(clock("%m/%d/%Y %I:%M:%S.%f %p")(press), encoding="utf-8")
+    with pytest.raises(TactileError, match=r"'11/08/2012 05:12:03.123000 PM' is not a number; expected .* or times as"):
+        read_by_guess(tmp_path / "a.csv")
+    (tmp_path / "a.csv.bz2").write_bytes(bz2.compress(table(press).encode()))
+    with pytest.raises(TactileError, match=r"a packed file; .*Unpack it: bunzip2"):
+        recordings.read(tmp_path / "a.csv.bz2")
 
 
 def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines):

@@ -12,10 +12,11 @@ LOOKED_AT = 50  # rows, by which it is decided what a column holds (assumed enou
 MOST_WORDS = 10_000  # different texts kept of a column; the others of more become one (assumed enough for labels)
 MORE = "..."
 CLOCK = re.compile(
-    r"(?:(\d{4})[-/.](\d\d?)[-/.](\d\d?)[T ]+)?(\d\d?):(\d\d):(\d\d(?:[.,]\d*)?) ?(?:(Z|UTC)|([+-]\d\d):?(\d\d))?"
+    r"(?:(?:(\d{4})[-/.](\d\d?)[-/.](\d\d?)|(\d\d?)\.(\d\d?)\.(\d{4}))[T ]+)?"
+    r"(\d\d?):(\d\d):(\d\d(?:[.,]\d*)?) ?(?:(Z|UTC)|([+-]\d\d):?(\d\d))?"
 )
 DAY, EPOCH = 86400.0, date(1970, 1, 1).toordinal()
-MISSING = {"", "nan", "none", "null", "na", "n/a"}
+MISSING = {"", "-", "--", "?", "nan", "none", "null", "na", "n/a", "#n/a", "<na>"}
 # Numbers under such names are kept as labels; other numbers that no layout knows are left out.
 LABEL = re.compile(
     r"(?:^|[^a-z])(?:label|object|material|texture|class|category|subject|session|trial|task|episode|condition|phase"
@@ -38,11 +39,15 @@ def number(cell: str) -> float | None:
 
 
 def seconds(cell: str) -> float:
-    """Parse an ISO time, with or without the day, to s since 1970 or midnight. Raises ValueError for anything else."""
+    """Parse a time, with the day (2012-11-08, 08.11.2012) or without, to s since 1970 or midnight.
+
+    Raises ValueError for anything else.
+    """
     found = CLOCK.fullmatch(cell.strip())
     if found is None:
         raise ValueError(cell)
-    year, month, day, hour, minute, second, _, zone, minutes = found.groups()
+    *day_first, hour, minute, second, _, zone, minutes = found.groups()
+    year, month, day = day_first[:3] if day_first[0] else day_first[:2:-1]
     days = date(int(year), int(month), int(day)).toordinal() - EPOCH if year else 0
     zoned = float(f"{zone[0]}1") * (60 * int(zone[1:]) + int(minutes)) if zone else 0.0
     return DAY * days + 3600 * int(hour) + 60 * (int(minute) - zoned) + float(second.replace(",", "."))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import tomllib
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -54,6 +55,11 @@ class ColumnMap:
         """Return the names of all mapped columns, in lower case."""
         values = (self.channel, self.value) if self.channel else (*self.electrodes, self.pdc, self.tac, self.tdc)
         return [name.lower() for name in (*values, self.time) if name]
+
+    def is_nanoseconds(self, name: str) -> bool:
+        """Return true for the column beside one of whole seconds, as ``stamp.nanosec`` beside ``stamp.sec`` of ROS."""
+        stem = re.sub(r"secs?$", "", self.time.lower())
+        return stem != self.time.lower() and re.fullmatch(re.escape(stem) + r"n(ano)?secs?", name) is not None
 
 
 def read(path: str | os.PathLike) -> ColumnMap:

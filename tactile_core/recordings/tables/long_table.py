@@ -13,6 +13,33 @@ from .table import Table
 STAMPED = 1.5  # stamps for each value of a channel, up to which rows of one stamp are a frame (assumed)
 
 
+MOST_SERIES = 5  # values of a column that tells fingers apart; more are places in a buffer (assumed)
+LOOKED_AT = 10_000  # rows
+TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers have 0.5 (assumed)
+
+
+def refuse_several(table: Table, columns: ColumnMap) -> None:
+    """Raise TactileError for a table of several fingers whose rows take turns: a column tells rows of one stamp apart.
+
+    Frames of one stamp, of a coarse clock or a buffer, have no such column.
+    """
+    if not columns.time or any(name not in table.header for name in columns.names()):
+        return
+    keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
+
+    def different(places: list[int]) -> int:
+        rows = np.column_stack([table.exact.get(place, table.values[:, place])[:LOOKED_AT] for place in places])
+        return len(np.unique(rows, axis=0))
+
+    every = min(len(table.lines), LOOKED_AT)
+    apart = [place for place, name in enumerate(table.header) if place not in keys and name not in columns.names()]
+    for place in apart if different(keys) < TURNS * every else ():
+        if 1 < different([place]) <= MOST_SERIES and different([*keys, place]) == every:
+            name = table.header[place]
+            found = f"rows of {different([place])} series take turns, told apart by column {name!r}"
+            raise TactileError(table.path, found, "one recording", f"Split the file by {name!r}: a file for each")
+
+
 def widen(table: Table, columns: ColumnMap) -> Table:
     """Return a table of a column for each mapped channel, and the time's.
 

@@ -16,7 +16,9 @@ from .table import Table
 
 NUMBERED = re.compile(r"(.*?)(\d+)(\D*)$", re.DOTALL)
 NUMBER = re.compile(r"\d+")
-TIME = re.compile(r"time|stamp|^t$|^t\W|sec")
+INDEXED = re.compile(r"\[\d+\]$")
+TIME = re.compile(r"time|stamp|clock|(?:^|[^a-z])ts?(?:[^a-z]|$)|sec")
+CLOCK_LIKE = re.compile(r"\d:\d\d")
 UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
 ELECTRODE = re.compile(r"electrode|(?:^|[^a-z])(?:elec|ele|el|e)[^a-z]*$")
 NOT_READ = re.compile(r"offset|time|stamp|pac|temp|force|joint")  # series of these are no electrodes
@@ -106,7 +108,7 @@ def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
 
 def _is_called(word: str, name: str) -> bool:
     """Return true for a column of that channel, and not of an array of them."""
-    return word in name.rpartition("/")[2] and not name.endswith("]")
+    return word in name.rpartition("/")[2] and not INDEXED.search(name)
 
 
 def _nearest(names: Iterable[str], like: str) -> str:
@@ -126,10 +128,10 @@ def _timed(columns: ColumnMap, names: Collection[str], table: Table | None) -> C
     taken = columns.names()
     timed = [name for name in names if TIME.search(name.rpartition("/")[2]) and name not in taken]
     if table is not None:
-        timed = [name for name in timed if name not in table.words]
+        timed = [name for name in timed if all(map(CLOCK_LIKE.search, table.words.get(name, ())))]  # the reader says it
         timed += [name for name in names if name.startswith("column") and name not in taken and _rises(table, name)]
     found = replace(columns, time=_nearest(timed, like))
-    return with_unit(found, table) if found.time and table is not None else found
+    return with_unit(found, table) if found.time and table is not None and found.time not in table.words else found
 
 
 def _rises(table: Table, name: str) -> bool:

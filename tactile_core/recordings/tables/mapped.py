@@ -12,7 +12,7 @@ from ..assemble import assemble, check_electrodes
 from ..recording import Recording
 from ..time_stamps import SECONDS
 from .column_map import CHANNELS, ColumnMap
-from .long_table import widen
+from .long_table import refuse_several, widen
 from .map_guess import NUMBERED
 from .table import Table
 
@@ -24,6 +24,7 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
 
     Raises TactileError for a column that is missing, and the errors of ``assemble``.
     """
+    refuse_several(table, columns)
     if columns.channel:
         table = widen(table, columns)
     electrodes = _electrodes(table, [name.lower() for name in columns.electrodes])
@@ -31,6 +32,8 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
     named = {name: column for name in CHANNELS if (column := getattr(columns, name).lower())}
     channels: dict[str, Any] = {name: table.column(column) for name, column in named.items()}
     stamps = SECONDS[columns.time_unit] * table.column(time) if time else None
+    for name in filter(columns.is_nanoseconds, table.header):
+        stamps = stamps + 1e-9 * table.column(name)
     if stamps is None and columns.rate != SAMPLE_RATE:
         stamps = np.arange(len(table.lines)) / columns.rate
     return assemble(

@@ -15,7 +15,7 @@ from ...errors import TactileError
 from ...files import installed
 from ..array_store import Store, damage_reported
 
-START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"
+START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"  # of MATLAB 7.3
 CLASSES = {
     "double": "f8", "single": "f4", "logical": "?", **{f"{sign}int{bits}": f"{code}{bits // 8}"
     for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)},
@@ -30,11 +30,8 @@ HEADER, PACKED, STEP = 128, 15, 2**20  # bytes; type of a packed element (MAT-fi
 def open_matlab(path: str, file: BinaryIO) -> Iterator[Store]:
     """Read an open MATLAB 5 file as named arrays.
 
-    Raises TactileError for MATLAB 7.3, for objects, for damage, and where scipy is missing.
+    Raises TactileError for objects, for damage, and where scipy is missing.
     """
-    if file.read(len(START_OF_HDF5)) == START_OF_HDF5:
-        advice = "Save it in MATLAB with save(..., '-v7'), or as CSV"
-        raise TactileError(path, "a MATLAB 7.3 file", "MATLAB 5 to 7", advice)
     with damage_reported(path, "MATLAB file"):
         _check_unpacked(path, file)
     try:

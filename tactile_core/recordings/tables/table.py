@@ -14,7 +14,7 @@ from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
 from .cells import LABEL, MISSING, Cells, Words, number, unquoted
-from .table_header import SPACE, Header, split
+from .table_header import COMMENTS, SPACE, Header, split
 from .truncated_cell import doubt_last_cell, shown
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
@@ -247,7 +247,7 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
     ended = not lines or not lines[-1]
     if ended:
         lines = lines[:-1]
-    kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if line.strip(" \t")]
+    kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if _is_row(line, header)]
     if not kept:
         raise TactileError(
             path, "a header without data rows", "at least one frame", "Check that the recording was written to its end"
@@ -284,8 +284,13 @@ def _clean(rows: list[str], header: Header) -> np.ndarray | None:
     return values if whole and bool((np.abs(values) < LARGEST).all()) else None  # false for NaN and infinity
 
 
+def _is_row(line: str, header: Header) -> bool:
+    """Return false for blank lines, comments, and the header again, as of a log that was continued."""
+    return line != header.line and bool(line.strip(" \t")) and not line.lstrip().startswith(COMMENTS)
+
+
 def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """Write a sentence on blank lines between the header and the last row: a frame may be missing there."""
+    """Write a sentence on lines without a row between the header and the last: a frame may be missing there."""
     count = int(rows[-1]) - header_line - len(rows)
     if count == 0:
         return ()
@@ -293,8 +298,8 @@ def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
     blank = (line for before, after in pairwise(lines) for line in range(before + 1, after))
     where = ", ".join(map(str, islice(blank, MAX_BLANK))) + " …" * (count > MAX_BLANK)
     if count == 1:
-        return (f"line {where}: blank; no frame is made of it",)
-    return (f"lines {where}: blank ({count} in all); no frames are made of them",)
+        return (f"line {where}: blank, a comment or the header again; no frame is made of it",)
+    return (f"lines {where}: blank, comments or the header again ({count} in all); no frames are made of them",)
 
 
 def text_lines(path: str, data: bytes) -> list[str]:

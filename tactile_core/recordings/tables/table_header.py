@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ...errors import TactileError
-from .cells import LOOKED_AT, OUTSIDE, Cells, number
+from .cells import INSIDE, LOOKED_AT, OUTSIDE, Cells, number
 from .truncated_cell import shown
 
 MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
 COMMENTS = "#", "%", "//"
 SPACE = " "  # stands for any white space between cells
 MANY = 10  # cells: a first line of less than half as many as one soon after it is a title, no header (assumed)
+DECIMAL_COMMA = re.compile(rf"(\s*[-+]?\d*)[,{INSIDE[ord(',')]}](\d+(?:[eE][-+]?\d+)?\s*)")  # a quoted one, too
 NUMBERED = "column{}"  # names of columns without a header, from 1
 
 
 @dataclass
 class Header:
-    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells."""
+    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells.
+
+    line : the text of the header, empty where the rows have none
+    """
 
     names: tuple[str, ...]
     lines: int
     separator: str
+    line: str = ""
     _cells: Cells | None = field(default=None, init=False)
 
     @classmethod
@@ -45,7 +51,7 @@ class Header:
             return cls(_names(path, above, comment), first, separator)
         if _is_data(cells):
             return cls(tuple(NUMBERED.format(place + 1) for place in range(len(cells))), first, separator)
-        return cls(_names(path, cells, first), first + 1, separator)
+        return cls(_names(path, cells, first), first + 1, separator, lines[first])
 
     def cells(self, rows: Sequence[str]) -> Cells:
         """Return what the columns hold, which the first rows decide for all."""
@@ -55,8 +61,11 @@ class Header:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Split a line into cells."""
-    return line.split() if separator == SPACE else line.split(separator)
+    """Split a line into cells; decimal commas become points, but where commas separate."""
+    cells = line.split() if separator == SPACE else line.split(separator)
+    if separator == "," or not ("," in line or INSIDE[ord(",")] in line):
+        return cells
+    return [f"{comma[1]}.{comma[2]}" if (comma := DECIMAL_COMMA.fullmatch(cell)) else cell for cell in cells]
 
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
@@ -77,8 +86,9 @@ def _width(line: str) -> int:
 
 
 def _separator(line: str) -> str:
-    found = max(",;\t", key=line.count)
-    return found if found in line else SPACE
+    """Return the separator of cells; commas, at most one a cell, are those of decimals beside semicolons or tabs."""
+    commas = line.count(",")
+    return next((mark for mark in ";\t" if mark in line and commas <= line.count(mark) + 1), "," if commas else SPACE)
 
 
 def _cells(line: str, separator: str) -> list[str]:
