@@ -342,3 +342,9 @@ def test_a_live_view_knows_a_finger_that_does_not_answer(press):
     signals = live.signals(np.stack([press.electrodes[350], zeros[0]]))
     assert signals.change[0].any() and not signals.change[1].any()
     assert (signals.flags & Flag.DEAD_CHANNEL > 0).tolist() == [False, True]
+
+
+def test_a_map_without_electrodes_is_written_and_said(tmp_path, capsys):
+    np.savez(tmp_path / "a.npz", sp=np.zeros((50, 24)))
+    assert main(["info", str(tmp_path / "a.npz"), "--columns", str(tmp_path / "map.toml")]) == 2
+    assert "written, no 19 electrodes found: name them there" in capsys.readouterr().err

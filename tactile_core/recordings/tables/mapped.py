@@ -31,9 +31,11 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
     time = columns.time.lower()
     named = {name: column for name in CHANNELS if (column := getattr(columns, name).lower())}
     channels: dict[str, Any] = {name: table.column(column) for name, column in named.items()}
-    stamps = SECONDS[columns.time_unit] * table.column(time) if time else None
-    for name in filter(columns.is_nanoseconds, table.header):
-        stamps = stamps + 1e-9 * table.column(name)
+    stamps = None
+    if time:
+        stamps = SECONDS[columns.time_unit] * table.column(time)
+        for name in filter(columns.is_nanoseconds, table.header):
+            stamps = stamps + 1e-9 * table.column(name)
     if stamps is None and columns.rate != SAMPLE_RATE:
         stamps = np.arange(len(table.lines)) / columns.rate
     return assemble(
