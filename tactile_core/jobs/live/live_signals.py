@@ -16,7 +16,7 @@ from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
 from ...recordings.signal_kind import full_scale
 from ...recordings.signals import PrepareOptions, Signals
-from ...sensors import SAMPLE_RATE, SOURCE
+from ...sensors import SAMPLE_RATE, SOURCE, divider
 from ...sensors.fluid_sensor import FALLS, POLARITIES
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ AGAIN = 25  # new frames after which they are looked at again
 class LiveSignals:
     """The change against rest, frame by frame, of frames that are like the first ones, which are prepared together.
 
-    Rest is that of the first quiet part; drift is not removed, nor glitches. The polarity is decided by the first
-    contacts, and as given, or "falls", until then.
+    Rest and film are those of the first quiet part; drift is not removed, nor glitches. The polarity is decided by the
+    first contacts, and as given, or "falls", until then.
 
     rate : Hz; options : polarity, and tare, of the first LONGEST s
     unit : gains and offsets to take off, and its rest, which is taken where the first window is not calm near it
@@ -56,8 +56,8 @@ class LiveSignals:
         if options.tare not in (None, "none"):
             tare = tare_frames(options.tare, self._most)
             options, self._least = dataclasses.replace(options, tare=tare), tare.stop
-        rest = None if unit is None else unit.rest()
-        self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1, rest=rest)
+        of_unit = {} if unit is None else {"rest": unit.rest(), "film": unit.film}
+        self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1, **of_unit)
         self._seen: Recording | None = None
         self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest
@@ -118,9 +118,11 @@ class LiveSignals:
         flags = np.full(count, Flag.RECTIFIED if kind == "rectified" else 0, np.uint16)
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
         electrodes = electrodes * self._factor
-        sign = 1.0 if self.polarity == FALLS else -1.0
+        change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
+        if (film := self.known.report["film"]) is not None:
+            change = divider.of_typical_film(change, rest, film["thickness"])
         signals = Signals(
-            change=np.where(unheard[:, None], 0.0, sign * (electrodes - rest)), rest=rest, drift=np.zeros_like(rest),
+            change=np.where(unheard[:, None], 0.0, change), rest=rest, drift=np.zeros_like(rest),
             electrodes=electrodes, kind=kind,
             quiet=np.zeros(count, bool), flags=flags, pdc=np.full(count, np.nan),
             warnings=(), report={}, sensor=self._sensor,

@@ -162,7 +162,7 @@ def test_rest_is_from_the_frames_given_or_the_file_s_own_zero():
 
 def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
     gain = [2.0] + [1.0] * 18
-    unit = ElectrodeGains("a unit", gain, [0.0] * 19, [3200.0] * 19, [5.0] * 19)
+    unit = ElectrodeGains("a unit", gain, [0.0] * 19, [3200.0] * 19, [5.0] * 19, film=1.0)
     noise = np.random.default_rng(3).normal(0, 0.5, (40, 19))
     held, free = (live.LiveSignals(unit=unit) for _ in range(2))
     assert held.learn(rows_of(2900 + noise)) and "unit's own" in held.found  # 300 counts away, however calm
