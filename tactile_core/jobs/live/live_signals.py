@@ -56,8 +56,9 @@ class LiveSignals:
         if options.tare not in (None, "none"):
             tare = tare_frames(options.tare, self._most)
             options, self._least = dataclasses.replace(options, tare=tare), tare.stop
-        of_unit = {} if unit is None else {"rest": unit.rest(), "film": unit.film}
-        self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1, **of_unit)
+        self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1)
+        if unit is not None:
+            self._options = dataclasses.replace(self._options, rest=unit.rest(), film=unit.film)
         self._seen: Recording | None = None
         self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest

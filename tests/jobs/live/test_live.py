@@ -117,7 +117,7 @@ def test_live_signals_are_those_of_the_whole_recording(slide_csv):
     assert known.index(True) == 2  # 30 frames are the tare's window
     change = signals.signals(recording.electrodes).change
     # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
-    np.testing.assert_allclose(change, recordings.prepare(recording, PrepareOptions(film=1.0)).change, atol=1.0)
+    np.testing.assert_allclose(change, recordings.prepare(recording).change, atol=1.0)
 
 
 def test_without_a_quiet_part_rest_is_guessed_in_the_end():
