@@ -41,8 +41,9 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         readings = np.multiply(readings, unit, dtype=float)
         if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
             kind, evidence = detect(readings)
-        if kind == "raw" and recording.pdc is not None and np.nanmax(recording.pdc) <= 1.01 * COUNT_MAX / unit:
-            recording = replace(recording, pdc=unit * recording.pdc)
+        pdc = recording.pdc if kind == "raw" else None
+        if pdc is not None and (COUNT_MAX if unit < 1 else 0) < np.nanmax(pdc) <= 1.01 * COUNT_MAX / unit:
+            recording = replace(recording, pdc=unit * pdc)
     readings, flags, repaired = _repaired(recording, readings, flags, options, warnings)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)

@@ -16,7 +16,7 @@ WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds count
 # Readings at the top of the range, of raw readings that are not counts of 12 bit (assumed: the usual exports).
 FULL_SCALES = {
     1.0: "shares of the range", 3.3: "volts of 3.3 V", 5.0: "volts of 5 V", 100.0: "percent of the range",
-    255.0: "counts of 8 bit", 1023.0: "counts of 10 bit",
+    255.0: "counts of 8 bit", 1023.0: "counts of 10 bit", 65535.0: "counts of 16 bit",
 }  # fmt: skip
 AT_REST = 0.55, 0.97  # shares of the range between which a unit's electrodes rest in the median (2,600 to 3,500 counts)
 BEYOND = 1.01  # times the range, that no reading exceeds but by noise (assumed)
@@ -60,8 +60,8 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 
     electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0
     """
-    beyond = (electrodes > BEYOND * max(FULL_SCALES)).mean(axis=0) > 0.5
-    if beyond.mean() > 1 - MOST_OF:  # counts, seen without sorting them
+    beyond, within = (((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX))
+    if beyond > 1 - MOST_OF and within < MOST_OF:  # counts, seen without sorting them
         return None
     low, levels, high = np.transpose([np.percentile(column, [1, 50, 99]) for column in electrodes.T])
     for full, words in FULL_SCALES.items():

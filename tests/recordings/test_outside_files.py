@@ -245,6 +245,7 @@ def test_an_electrode_that_is_not_there_is_a_dead_channel(absent, press, slide_l
         (100.0, "percent"),
         (255.0, "8 bit"),
         (1023.0, "10 bit"),
+        (65535.0, "16 bit"),
     ],
 )
 def test_readings_in_other_units_are_counts(top, words, press, tmp_path):
