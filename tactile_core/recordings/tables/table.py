@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from itertools import chain, islice, pairwise
+from itertools import chain
 from typing import BinaryIO
 
 import numpy as np
@@ -13,17 +13,16 @@ import numpy as np
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
-from .cells import LABEL, MISSING, Cells, Words, number, unquoted
-from .table_header import COMMENTS, SPACE, Header, split
-from .truncated_cell import doubt_last_cell, shown
+from .cells import LABEL, MISSING, Words, unquoted
+from .rows import clean, is_row, no_number, row, tell_blank_lines
+from .table_header import Header
+from .truncated_cell import doubt_last_cell
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
 WHOLE = 8 * 2**20  # bytes of text up to which a file is parsed at once; of a longer one BLOCK at a time
 BLOCK = 2 * 2**20
 OVERLAP = 200  # rows of the block before by which the last cell of a file is judged
-LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
-MAX_BLANK = 8  # blank lines that a message names
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,7 @@ class Table:
         if told and not np.isfinite(found).any():
             expected = "numbers, or times as 2012-11-08 17:12:03.45"
             advice = "Leave the column out in a map: tactile info FILE --columns map.toml writes one"
-            held = f"{shown(told[0])} is {_no_number(told[0])}"
+            held = no_number(told[0])
             raise TactileError(f"{self.path}, column {name!r}", held, expected, advice)
         return found
 
@@ -193,7 +192,7 @@ def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_o
         columns[column] = values[:, column].astype(float)
         for start, part in parts:
             columns[column][start : start + len(part)] = part
-    blank = _tell_blank_lines(first.start, lines)
+    blank = tell_blank_lines(first.start, lines)
     return Table(
         path, header, values, lines, tuple(problems), blank, columns,
         left_out=frozenset({*first.header} - {*header}), words=first.words,
@@ -247,7 +246,7 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
     ended = not lines or not lines[-1]
     if ended:
         lines = lines[:-1]
-    kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if _is_row(line, header)]
+    kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if is_row(line, header)]
     if not kept:
         raise TactileError(
             path, "a header without data rows", "at least one frame", "Check that the recording was written to its end"
@@ -257,49 +256,17 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
     problems: list[Problem] = []
     rows = [line for _, line in kept]
     cells = header.cells(rows)
-    values = _clean(rows, header) if cells.plain else None
+    values = clean(rows, header) if cells.plain else None
     if values is None:
         values = np.empty((len(kept), len(header.names)))
         for frame, (line_number, line) in enumerate(kept):
-            values[frame] = _row(line, header, cells, frame, line_number, problems)
+            values[frame] = row(line, header, cells, frame, line_number, problems)
             _check_problems(path, problems, line_number)
     if last and not ended and header.names[-1] not in cells.words:
         doubt_last_cell(kept, header.names, header.separator, values, problems)
     numbers = np.array([line_number for line_number, _ in kept])
-    blank = _tell_blank_lines(first, numbers)
+    blank = tell_blank_lines(first, numbers)
     return Table(path, header.names, values, numbers, tuple(problems), blank, start=first, words=cells.words)
-
-
-def _clean(rows: list[str], header: Header) -> np.ndarray | None:
-    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None where a cell is none."""
-    trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
-    if not all(map(str.strip, trimmed)):
-        return None
-    try:
-        delimiter = None if header.separator == SPACE else header.separator
-        values = np.loadtxt(trimmed, delimiter=delimiter, comments=None, ndmin=2)
-    except ValueError:
-        return None
-    whole = values.shape == (len(rows), len(header.names))
-    return values if whole and bool((np.abs(values) < LARGEST).all()) else None  # false for NaN and infinity
-
-
-def _is_row(line: str, header: Header) -> bool:
-    """Return false for blank lines, comments, and the header again, as of a log that was continued."""
-    return line != header.line and bool(line.strip(" \t")) and not line.lstrip().startswith(COMMENTS)
-
-
-def _tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """Write a sentence on lines without a row between the header and the last: a frame may be missing there."""
-    count = int(rows[-1]) - header_line - len(rows)
-    if count == 0:
-        return ()
-    lines = [header_line, *rows.tolist()]
-    blank = (line for before, after in pairwise(lines) for line in range(before + 1, after))
-    where = ", ".join(map(str, islice(blank, MAX_BLANK))) + " …" * (count > MAX_BLANK)
-    if count == 1:
-        return (f"line {where}: blank, a comment or the header again; no frame is made of it",)
-    return (f"lines {where}: blank, comments or the header again ({count} in all); no frames are made of them",)
 
 
 def text_lines(path: str, data: bytes) -> list[str]:
@@ -321,47 +288,3 @@ def text_lines(path: str, data: bytes) -> list[str]:
     if max(map(len, lines)) > MAX_LINE:
         raise TactileError(path, f"a line of over {MAX_LINE // 2**20} MB", "a line for each frame")
     return lines
-
-
-def _no_number(cell: str) -> str:
-    """Say what a cell is that is no number: one with a decimal comma is mended by another setting of the export."""
-    comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
-    return "a number with a decimal comma, where a point is expected" if comma else "not a number"
-
-
-def _row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]) -> list[float]:
-    """Parse the row's values; its errors are added to problems."""
-    width = len(header.names)
-    cells = split(line, header.separator)
-    if len(cells) > width and not "".join(cells[width:]).strip():
-        cells = cells[:width]  # a separator at the end of each row, as the slide set has
-    if len(cells) == width and (kinds.words or "_" not in line):
-        try:
-            values = kinds.values(cells)
-        except ValueError:
-            values = []
-        if values and all(-LARGEST < value < LARGEST for value in values):  # false for NaN and infinity
-            return values
-    return _bad_row(cells, header.names, kinds, frame, line_number, problems)
-
-
-def _bad_row(
-    cells: list[str], names: tuple[str, ...], kinds: Cells, frame: int, line_number: int, problems: list[Problem]
-) -> list[float]:
-    width = len(names)
-    if len(cells) > width:
-        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width}"))
-        return [np.nan] * width
-    if len(cells) < width:  # the last cell that is there may be cut in its middle
-        problems.append(Problem(frame, line_number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
-        cells = cells[:-1]
-    values = []
-    for place, (name, cell) in enumerate(zip(names, cells, strict=False)):
-        value = kinds.value(place, cell)
-        if value is None or not -LARGEST < value < LARGEST:
-            plain = cell.strip()
-            found = f"{shown(plain)} is {_no_number(plain)}" if plain else "an empty cell"
-            problems.append(Problem(frame, line_number, name, found))
-            value = np.nan
-        values.append(value)
-    return values + [np.nan] * (width - len(values))

@@ -1,0 +1,92 @@
+"""Parse the rows of a text table: clean ones together, others cell by cell, whose errors are told."""
+
+from __future__ import annotations
+
+from itertools import islice, pairwise
+
+import numpy as np
+
+from ..assemble import Problem
+from .cells import Cells, number
+from .table_header import COMMENTS, SPACE, Header, split
+from .truncated_cell import shown
+
+LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
+MAX_BLANK = 8  # blank lines that a message names
+
+
+def is_row(line: str, header: Header) -> bool:
+    """Return false for blank lines, comments, and the header again, as of a log that was continued."""
+    return line != header.line and bool(line.strip(" \t")) and not line.lstrip().startswith(COMMENTS)
+
+
+def clean(rows: list[str], header: Header) -> np.ndarray | None:
+    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None where a cell is none."""
+    trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
+    if not all(map(str.strip, trimmed)):
+        return None
+    try:
+        delimiter = None if header.separator == SPACE else header.separator
+        values = np.loadtxt(trimmed, delimiter=delimiter, comments=None, ndmin=2)
+    except ValueError:
+        return None
+    whole = values.shape == (len(rows), len(header.names))
+    return values if whole and bool((np.abs(values) < LARGEST).all()) else None  # false for NaN and infinity
+
+
+def row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]) -> list[float]:
+    """Parse the row's values; its errors are added to problems."""
+    width = len(header.names)
+    cells = split(line, header.separator)
+    if len(cells) > width and not "".join(cells[width:]).strip():
+        cells = cells[:width]  # a separator at the end of each row, as the slide set has
+    if len(cells) == width and (kinds.words or "_" not in line):
+        try:
+            values = kinds.values(cells)
+        except ValueError:
+            values = []
+        if values and all(-LARGEST < value < LARGEST for value in values):  # false for NaN and infinity
+            return values
+    return _bad_row(cells, header.names, kinds, frame, line_number, problems)
+
+
+def _bad_row(
+    cells: list[str], names: tuple[str, ...], kinds: Cells, frame: int, line_number: int, problems: list[Problem]
+) -> list[float]:
+    width = len(names)
+    if len(cells) > width:
+        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width}"))
+        return [np.nan] * width
+    if len(cells) < width:  # the last cell that is there may be cut in its middle
+        problems.append(Problem(frame, line_number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
+        cells = cells[:-1]
+    values = []
+    for place, (name, cell) in enumerate(zip(names, cells, strict=False)):
+        value = kinds.value(place, cell)
+        if value is None or not -LARGEST < value < LARGEST:
+            plain = cell.strip()
+            found = no_number(plain) if plain else "an empty cell"
+            problems.append(Problem(frame, line_number, name, found))
+            value = np.nan
+        values.append(value)
+    return values + [np.nan] * (width - len(values))
+
+
+def no_number(cell: str) -> str:
+    """Say what a cell is that is no number: one with a decimal comma is mended by another setting of the export."""
+    comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
+    is_what = "a number with a decimal comma, where a point is expected" if comma else "not a number"
+    return f"{shown(cell)} is {is_what}"
+
+
+def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
+    """Write a sentence on lines without a row between the header and the last: a frame may be missing there."""
+    count = int(rows[-1]) - header_line - len(rows)
+    if count == 0:
+        return ()
+    lines = [header_line, *rows.tolist()]
+    blank = (line for before, after in pairwise(lines) for line in range(before + 1, after))
+    where = ", ".join(map(str, islice(blank, MAX_BLANK))) + " …" * (count > MAX_BLANK)
+    if count == 1:
+        return (f"line {where}: blank, a comment or the header again; no frame is made of it",)
+    return (f"lines {where}: blank, comments or the header again ({count} in all); no frames are made of them",)
