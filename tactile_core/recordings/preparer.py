@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..sensors import SOURCE
 from ..sensors.fluid_sensor import FALLS
 from .answers import prepare, unanswered
 from .doubt import POLARITY, REST, Doubt, Reason, reason_of, without
 from .flags import Flag
 from .polarity import AUTO
 from .recording import Recording
+from .rest_level import Baseline, Changes
 from .signals import EVERY, PrepareOptions, Rest, Signals
+from .unit import film
 
 if TYPE_CHECKING:
     from .electrode_gains import ElectrodeGains
@@ -48,17 +51,17 @@ class Preparer:
         options, rest = self._options, self._rest
         first = rest is None
         if not first and options.tare not in (None, "none"):  # frames that the user named lie in the first part
-            options = dataclasses.replace(options, tare=slice(0, len(part)))
+            options = dataclasses.replace(options, tare=slice(0, len(part)), film=1.0, drift=False)
         rows = EVERY if self._unit is not None else frames
         signals = prepare(part, options, rows)
         if rest is None:
             if options.polarity == AUTO and signals.flags[0] & DOUBTS and self._look_for_polarity():
                 signals = prepare(part, self._options, rows)
             self._doubts = np.uint16(0) if self._polarity_found else signals.flags[0] & DOUBTS
-            factor, polarity, film = (signals.report[name] for name in ("counts_per_unit", "polarity", "film"))
+            factor, polarity, fluid = (signals.report[name] for name in ("counts_per_unit", "polarity", "film"))
             self._options = dataclasses.replace(
                 self._options, kind=signals.kind, counts_per_unit=factor, polarity=polarity,
-                film=self._options.film if film is None else film["thickness"],
+                film=self._options.film if fluid is None else fluid["thickness"],
             )  # fmt: skip
         elif options.tare is not None or (not signals.quiet.any() and signals.kind != "raw"):
             signals = self._carried(part, signals, rest, rows, given=options.tare is not None)
@@ -101,10 +104,23 @@ class Preparer:
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
-        change = np.where(unanswered(signals)[:, None], 0.0, signals.change + sign * (signals.rest - rest))
+        change = signals.change + sign * (signals.rest - rest)
+        if given and signals.report["film"] is not None:  # its rest was not known there
+            change = self._of_typical_film(change, rest, part.time[rows])
+        change = np.where(unanswered(signals)[:, None], 0.0, change)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
         return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
+
+    def _of_typical_film(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray) -> np.ndarray:
+        """Return changes (T, 19) counts from rest (19,) at times (T,) s as over a typical unit's films."""
+        level, options = Baseline.constant(rest), self._options
+        whole = Changes(len(change), change.__getitem__)
+        found = film.find(
+            whole, Changes(len(change), level.at), time, None, SOURCE,
+            thickness=options.film, own_rest=False, drifts=options.drift,
+        )  # fmt: skip
+        return found.changes(whole, level)[EVERY]
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
         """Keep the rest at the part's end: what is calm in the next is rest where it lies near it, as a grip may be."""

@@ -9,6 +9,7 @@ from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, prepare
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.polarity import contact_signals
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.rest_level import Baseline, Changes
 from tactile_core.recordings.unit import film
 from tactile_core.sensors import REST_COUNTS, divider
@@ -84,6 +85,23 @@ def test_a_unit_s_file_holds_its_film(tmp_path, press):
     (tmp_path / "unit.toml").write_text(text.replace("film = 0.5", "film = 9"))
     with pytest.raises(TactileError, match=r"unit\.film: 9; expected 0.2 to 3"):
         electrode_gains.read(tmp_path / "unit.toml")
+
+
+def test_later_parts_of_a_long_recording_have_the_film_of_the_first():
+    change, rest, _ = made_up(0.4, 1.0)
+    readings = np.concatenate([np.tile(rest, (200, 1)), rest + change])
+    parts = [
+        assemble("a.npz", "NPZ", electrodes=np.clip(one, 0, 4095), stamps=np.arange(len(one)) / 10)
+        for one in np.split(readings, [1400])
+    ]
+    whole = assemble("a.npz", "NPZ", electrodes=np.clip(readings, 0, 4095), stamps=np.arange(len(readings)) / 10)
+    options = PrepareOptions(tare=slice(0, 200), repair=False)
+    prepare_next = Preparer(options)
+    first, second = (prepare_next(part) for part in parts)
+    thickness = first.report["film"]["thickness"]
+    together = prepare(whole, PrepareOptions(tare=slice(0, 200), repair=False, film=thickness))
+    off = np.concatenate([first.change, second.change]) - together.change
+    assert thickness < 0.6 and np.abs(off).max() < 0.02 * np.abs(together.change).max()  # the fluid's course may differ
 
 
 @pytest.fixture(scope="module")
