@@ -13,9 +13,14 @@ from .signal_kind import median
 
 WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 counts of noise down to 0.3
 FEWEST = 8  # frames of a window, at slow rates
-# Counts within a window: noise is 0.7-1.5 (docs/sources.md), plus 4 deviations of its estimate from 30 samples.
-CALM_STD = 2.4
-CALM_TREND = 2.5  # counts from the first to the second half of a window: 4 deviations of that difference at 1.5 counts
+# Counts of noise: 0.7-1.5 (docs/sources.md); a driver that sends steps of 4 to 10 counts has 3 to 5. More is movement.
+NOISE, NOISIEST = 1.5, 7.0
+# Spread within a window over the noise, with 4 deviations of its estimate from 30 samples; and the trend from its first
+# to its second half, 4 deviations of that difference.
+CALM_STD, CALM_TREND = 1.6, 2.5 / 1.5
+# Windows by which noise is judged, and the share of them that is calm (assumed); frames between which noise is another,
+# as of a driver that repeats every reading once or twice.
+LOOKED_AT, CALMER, APART = 2000, 0.3, 3
 QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
 RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
@@ -115,10 +120,19 @@ def _spread(centred: np.ndarray, n: int) -> np.ndarray:
     return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
 
 
+def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
+    """Noise (19,) counts by what frames APART apart differ by in the calmer windows of n."""
+    starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
+    windows = (electrodes[start : start + n].astype(float) for start in starts)
+    steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])
+    return np.clip(np.sqrt(np.quantile(steps, CALMER, axis=0) / 2), NOISE, NOISIEST)
+
+
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
     medians = np.array([[median(column)] for column in electrodes.T])
+    noise = _noise(electrodes, n)[:, None]
     sums, calm = np.zeros((electrodes.shape[1], count), np.float32), np.ones(count, bool)
     for start in range(0, count, BLOCK):  # sums of all would take seven times the recording
         part = electrodes[start : start + BLOCK + n - 1].T.astype(float, order="C")
@@ -126,7 +140,8 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
         windows = slice(start, start + exact.shape[1])
         halves = _sums(part, half) / half
         trend = halves[:, n - half : n - half + exact.shape[1]] - halves[:, : exact.shape[1]]
-        calm[windows] = ((_spread(part - medians, n) <= CALM_STD) & (np.abs(trend) <= CALM_TREND)).all(axis=0)
+        still = (_spread(part - medians, n) <= CALM_STD * noise) & (np.abs(trend) <= CALM_TREND * noise)
+        calm[windows] = still.all(axis=0)
         sums[:, windows] = exact
         if (sums[:, windows] != exact).any():
             sums = sums.astype(float)
