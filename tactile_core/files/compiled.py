@@ -58,7 +58,7 @@ class Loop:
 
         _teach_numba()
         # What is kept on disk names this package's modules. In Blender they have other names: each keeps its own.
-        self._function.__qualname__ = f"{__package__}.{self.__qualname__}"
+        self._function.__qualname__ = f"{__package__}.{self._function.__qualname__}"
         # numpy's rules for a division by zero; no fast-math: the same numbers on every machine of a kind.
         # Without the wrapper for callers in C compiling takes a tenth less.
         run = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
