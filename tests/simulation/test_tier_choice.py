@@ -110,7 +110,7 @@ def test_a_long_simulation_tells_its_cost_first_and_waits_for_a_word(simulate, t
     status, err, asked = simulate("--error", bound, "--keep", "displacement_digit")
     assert status == 2 and asked == {} and "--yes" in err
     cost = next(line for line in err.splitlines() if "MB of memory" in line)
-    assert re.search(r"about \d+ (s|min|h) and \d+ MB", cost)
+    assert re.search(r"about [\d.]+ (s|min|h) and \d+ MB", cost)
     assert simulate("--error", bound, "--keep", "displacement_digit", "--yes")[2]["tiers"] == {"digit": tier}
 
 
