@@ -74,7 +74,7 @@ def test_result_is_complete_and_loads(quick, pairs):
     assert len(card["pairs"]["sha256"]) == 64
     assert card["pairs"]["contacts"] == {"train": 256, "validation": 32, "test": 32}
     assert all(row["baseline"] is not None for row in card["errors"] if row["name"].endswith(("um", "counts", "_N")))
-    card.check_bounds(card, "card.json")
+    cards.check_bounds(card, "card.json")
     for net, entry in card["nets"].items():
         shapes = {name: list(array.shape) for name, array in loaded.tensors[net].items()}
         assert shapes == entry["shapes"]
