@@ -23,6 +23,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
+from benchmarks.fault_bench import write_hdf5
 from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core.accuracy import Row, row
 from tactile_core.files.threads import ONE
@@ -51,19 +52,6 @@ def main(arguments: list[str] | None = None) -> int:
             lambda: pictures(folder, seen),
         )  # fmt: skip
         return finished(printed(one for part in parts for one in part()), options.json)
-
-
-def write_hdf5(path: Path, frames: int) -> None:
-    """Write presses that come and go every two seconds, in the HDF5 layout without time stamps."""
-    import h5py
-
-    random = np.random.default_rng(frames)
-    press = 100 * np.clip(np.sin(np.arange(frames) / 30), 0, 1)
-    with h5py.File(path, "w") as file:
-        data = file.create_dataset("electrode_vals/data", (frames, 19), "i2", chunks=(min(frames, 4096), 19))
-        for start in range(0, frames, 100_000):
-            part = press[start : start + 100_000, None] * np.linspace(-1, 1, 19)
-            data[start : start + len(part)] = np.rint(3000 + part + random.normal(0, 1, part.shape))
 
 
 def cost(*words: object) -> tuple[float, float, float]:

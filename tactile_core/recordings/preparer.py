@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..sensors import SOURCE
 from ..sensors.fluid_sensor import FALLS
 from .answers import prepare, unanswered
 from .doubt import POLARITY, REST, Doubt, Reason, reason_of, without
@@ -106,18 +105,18 @@ class Preparer:
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
         change = signals.change + sign * (signals.rest - rest)
         if given and signals.report["film"] is not None:  # its rest was not known there
-            change = self._of_typical_film(change, rest, part.time[rows])
+            change = self._of_typical_film(change, rest, part.time[rows], part.sensor)
         change = np.where(unanswered(signals)[:, None], 0.0, change)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
         return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
 
-    def _of_typical_film(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray) -> np.ndarray:
+    def _of_typical_film(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> np.ndarray:
         """Return changes (T, 19) counts from rest (19,) at times (T,) s as over a typical unit's films."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
-            whole, Changes(len(change), level.at), time, None, SOURCE,
+            whole, Changes(len(change), level.at), time, None, sensor,
             thickness=options.film, own_rest=False, drifts=options.drift,
         )  # fmt: skip
         return found.changes(whole, level)[EVERY]

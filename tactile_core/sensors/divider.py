@@ -62,7 +62,7 @@ def of_typical_film(
     thickness : of its films at rest, over a typical unit's; conductivity : its fluid's, over that at rest
     The same movement u of the skin over a film h makes the impedance grow by g = h / (h - u), so that over a typical
     film of h / thickness it grows by 1 / (1 - thickness (1 - 1 / g)): each electrode by itself. Against the conducting
-    sheet (640 simulated contacts) 7, 9, 12 and 14 % of the change are left at .8, .6, .45 and .33, where 28, 72, 136
+    sheet (111 simulated contacts) 7, 9, 12 and 14 % of the change are left at .8, .6, .45 and .33, where 28, 72, 136
     and 246 % are without.
     """
     rest = np.clip(rest, *_RESTS)

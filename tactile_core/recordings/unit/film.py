@@ -6,8 +6,8 @@ the networks would read contacts three times too firm. The counts at rest give t
 conductivity. How the two share in it is a belief, until contacts show it: simulated ones resemble a unit's only where
 its films are scaled as they are.
 
-The conductivity changes all electrodes alike, as no contact does: temperature alone moves it by a quarter in minutes.
-It is tracked as what makes each moment most alike to a simulated contact, or to none.
+The conductivity changes all electrodes alike, as no contact does: it moves by a quarter in minutes, probably with
+temperature. It is tracked as what makes each moment most alike to a simulated contact, or to none.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ WINDOW, MOST_WINDOWS = 5.0, 300  # s that say of the conductivity what one conta
 LEAST, MOST = 0.2, 3.0  # thickness that a unit may have over a typical one's (assumed)
 THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # over a typical unit's, that are tried: .33 to 1.52
 TYPICAL, CLEARLY, DRIFTS = 8, 2.0, 3.0  # which is 1; nats by which another, and a drift, must be likelier (assumed)
-CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 3 counts apart at rest
-# Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of six units, whose
-# films are .4 (three), 1 (two) and .8, and conductivities .6 to 1.1 of a typical one's.
+CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 4 counts apart at rest
+# Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of five units, whose
+# films are .4 (two) and 1 (three), and conductivities .5 to 1.1 of a typical one's.
 THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.3
 # The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
 # second (assumed: an idle finger drifted by .25 in 225 s, steadily).
