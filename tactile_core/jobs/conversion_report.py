@@ -48,6 +48,7 @@ class ConversionReport:
         self.share = 0.0
         self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
+        self._explained: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
         change, at = rows.signals.change, rows.at(frames)
         parts = [at[start : start + BLOCK] for start in range(0, len(at), BLOCK)]
@@ -61,6 +62,7 @@ class ConversionReport:
         touching = np.isfinite(arrays["contact_center"][:, 0])
         self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
         self._pressure.append(arrays["pressure"])
+        self._explained.append(arrays["explained"])
         self.share = max(self.share, depth_share(arrays["displacement_digit"], self._tools.drawer.target))
         if "traction_force" in arrays:
             self._forces.append(np.stack([arrays["traction_force"], arrays["force"]]))
@@ -88,6 +90,13 @@ class ConversionReport:
         if self._made.folded:
             found.append(f"{self._made.folded} frames: the translated gel folds over itself; heights there are guesses")
         return tuple(found)
+
+    @property
+    def explained(self) -> float | None:
+        """Mean share of the electrodes' change that the translation explains in contact; None where nothing touches."""
+        share = np.concatenate(self._explained)
+        touching = np.isfinite(share)
+        return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None
 
     def describe_expected_error(self) -> str:
         """Describe the translation's own error on the gel: the median of the frames in contact."""
@@ -129,6 +138,7 @@ class ConversionReport:
             simulated=recording.simulated,
             mount_shift=self._tools.translator.answer.mount_shift,
             pressure=np.concatenate(self._pressure),
+            explained=np.concatenate(self._explained),
             pressure_measured=PRESSURE_PER_COUNT * signals.pdc[rows],
             warnings=self.warnings(),
             source=self._tools.translator.source,
@@ -148,6 +158,7 @@ class Contents:
 
     name : of the recording; time : (T,) s, of snapshots their numbers; electrodes : (T, 19) counts, change from rest
     pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
+    explained : (T,), share of the electrodes' change that the translation explains; NaN without contact
     frames : (k,) which of the T frames are the columns
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
     force : (k, 3) N; confidence : (k,) 0..1; flags : (k,) uint16; expected_error_digit : (k,) m, of the largest node
@@ -170,6 +181,7 @@ class Contents:
     expected_error_digit: np.ndarray
     contact_center: np.ndarray | None = None
     pressure: np.ndarray | None = None
+    explained: np.ndarray | None = None
     pressure_measured: np.ndarray | None = None
     true_displacement_biotac: np.ndarray | None = None
     simulated: bool = False
@@ -223,11 +235,14 @@ def _drawn(shown: Contents) -> SheetFigure:
         _sentences(shown.warnings, shown.confidence),
         truth is not None,
         pressure=shown.pressure is not None,
+        explained=shown.explained is not None,
         snapshots=shown.snapshots,
     )
     # File names may hold what is no text at all.
     figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
     figure.electrodes(shown.time, shown.electrodes, shown.frames)
+    if shown.explained is not None:
+        figure.explained(shown.time, shown.explained)
     if shown.pressure is not None:
         figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
     figure.headings(shown.time[shown.frames])

@@ -234,6 +234,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         "prepared": rows.signals.report,
         "warnings": list(report.warnings()),
         "flagged_frames": report.flagged,
+        "explained": report.explained,
         "weights": weights_entry(tools.translator),
         **_unit_entry(options.calibration),
         "versions": provenance.versions("PIL", "matplotlib"),

@@ -37,6 +37,11 @@ ALWAYS = {
     "error_bound_biotac": ("m", "largest node error that 95 of 100 such frames stay below"),
     "error_bound_digit": ("m", "as much of the DIGIT's gel"),
     "pressure_measured": ("Pa", "the fluid's, by PDC, over its level at rest; NaN where the recording has no PDC"),
+    "explained": (
+        "1",
+        "share of the electrodes' change that the translated contact explains, below 0 worse than no change; NaN "
+        "without contact",
+    ),
     "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),
 }
 SAMPLES = "samples"  # what --samples asks for, no word of --keep

@@ -60,6 +60,7 @@ class About(TypedDict):
     sha256: str
     frames: int
     sensor: NotRequired[str]
+    film: NotRequired[float]
     labels: NotRequired[Runs]
 
 
@@ -144,7 +145,7 @@ class _Writer:
             self._about |= {
                 "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
                 "start_time": recording.start_time, "kind": signals.kind,
-                "sensor": recording.sensor,
+                "sensor": recording.sensor, "film": signals.film,
             }  # fmt: skip
         self._parts.append((self.count, signals.rest))
         self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
@@ -191,7 +192,7 @@ class Prepared:
             rest = file["rest"][int(np.searchsorted(file["part"][()], start, side="right")) - 1]
             return arrays.pop("time"), Signals(
                 rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={},
-                sensor=about.get("sensor", SOURCE), **arrays,
+                sensor=about.get("sensor", SOURCE), film=about.get("film", 1.0), **arrays,
             )  # fmt: skip
 
         return self._read(read)

@@ -25,7 +25,7 @@ FRAMES = 6  # columns of a sheet
 DPI = 100
 WIDTH, LEFT, RIGHT, GAP = 16.0, 0.95, 1.05, 0.12
 TITLE, WARNING_LINE, NUMBERS, ELECTRODES, TIME_AXIS, HEADING, Z_AXIS = 0.62, 0.21, 0.16, 1.4, 0.45, 0.26, 0.36
-PRESSURE = 0.75
+PRESSURE, EXPLAINED = 0.75, 0.5
 # Room for five lines: force, two reasons of which one is too long for a line, expected error; of 31 letters at most.
 CAPTION, CAPTION_LETTERS, FOOT = 1.045, 31, 0.25
 
@@ -43,8 +43,9 @@ class SheetFigure:
     """A figure that is filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
 
     def __init__(
-        self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool, snapshots: bool = False
-    ) -> None:
+        self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool, explained: bool,
+        snapshots: bool = False,
+    ) -> None:  # fmt: skip
         """Make an empty figure. snapshots : whether frames are shown over their numbers, having no time"""
         from matplotlib.figure import Figure
 
@@ -60,7 +61,7 @@ class SheetFigure:
         )
         rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
-        head += (PRESSURE + TIME_AXIS) * pressure
+        head += (PRESSURE + TIME_AXIS) * pressure + (EXPLAINED + GAP) * explained
         self.height = head + rows + CAPTION + FOOT
         self.figure: Figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
         self.top = 0.0  # inches from the upper edge to what is still free
@@ -109,7 +110,19 @@ class SheetFigure:
         axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), ncols=2, fontsize=6.5, frameon=False,
                     handlelength=0.9, columnspacing=0.7, handletextpad=0.4, labelspacing=0.25,
                     borderaxespad=0)  # fmt: skip
+        self._over_time = axes.get_xlim()
         self.top += ELECTRODES + TIME_AXIS
+
+    def explained(self, time: np.ndarray, explained: np.ndarray) -> None:
+        """Draw the share of the electrodes' change that the translation explains (T,) over (T,) s; below 0 as 0."""
+        axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, EXPLAINED)
+        axes.plot(time, np.clip(explained, 0, 1), color="black", linewidth=0.8)
+        axes.set_xlim(self._over_time)
+        axes.set_ylim(0, 1)
+        axes.set_yticks([0, 0.5, 1])
+        axes.tick_params(labelbottom=False)
+        axes.set_ylabel("explained", size=8)
+        self.top += EXPLAINED + GAP
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray | None) -> None:
         """Draw lines of the fluid's pressure (T,) Pa over (T,) s: as translated, and as measured where it was."""

@@ -87,6 +87,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         change=change[frames], rest=at_start.copy(), drift=slope, electrodes=readings[frames], kind=kind,
         quiet=quiet.mask[frames], flags=flags[frames], pdc=pdc[frames],
         warnings=(*warnings, *filter(None, [doubt])), report=report, sensor=recording.sensor,
+        film=1.0 if fluid is None else fluid.thickness,
     )  # fmt: skip
 
 

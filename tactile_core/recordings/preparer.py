@@ -103,23 +103,27 @@ class Preparer:
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
-        change = signals.change + sign * (signals.rest - rest)
+        change, thickness = signals.change + sign * (signals.rest - rest), signals.film
         if given and signals.report["film"] is not None:  # its rest was not known there
-            change = self._of_typical_film(change, rest, part.time[rows], part.sensor)
+            change, thickness = self._of_typical_film(change, rest, part.time[rows], part.sensor)
         change = np.where(unanswered(signals)[:, None], 0.0, change)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
-        return dataclasses.replace(signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings)
+        return dataclasses.replace(
+            signals, change=change, rest=rest, pdc=pdc, drift=drift, warnings=warnings, film=thickness
+        )
 
-    def _of_typical_film(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> np.ndarray:
-        """Return changes (T, 19) counts from rest (19,) at times (T,) s as over a typical unit's films."""
+    def _of_typical_film(
+        self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str
+    ) -> tuple[np.ndarray, float]:
+        """Return changes (T, 19) counts from rest (19,) at times (T,) s as of a typical unit, and the film."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
             whole, Changes(len(change), level.at), time, None, sensor,
             thickness=options.film, own_rest=False, drifts=options.drift,
         )  # fmt: skip
-        return found.changes(whole, level)[EVERY]
+        return found.changes(whole, level)[EVERY], found.thickness
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
         """Keep the rest at the part's end: what is calm in the next is rest where it lies near it, as a grip may be."""

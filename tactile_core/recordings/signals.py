@@ -100,6 +100,7 @@ class Signals:
     warnings : the recording's and those found here; doubts among them carry their reason, see `doubt`
     report : what was found and done, fit for JSON
     sensor : whose they are; 19 is of a BioTac
+    film : thickness of the unit's, over a typical unit's, that the changes were converted from
     """
 
     change: np.ndarray
@@ -113,6 +114,7 @@ class Signals:
     warnings: tuple[str, ...]
     report: dict[str, Any]
     sensor: str = SOURCE
+    film: float = 1.0
 
     def at(self, frames: np.ndarray | slice) -> Signals:
         """Return the signals of some frames alone; rest and drift stay those of the recording."""
@@ -132,6 +134,16 @@ class Signals:
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
         """Change (T, e) counts, converted to a unit that rests at counts (e,); of raw readings alone."""
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
+
+    def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
+        """Convert changes (T, e) counts of a typical unit at rest counts (e,) to those of raw readings of this one.
+
+        Gains and the fluid's drift stay taken off; other changes than raw ones are of no unit that is known.
+        """
+        if self.kind != "raw" or at is None:
+            return change
+        own = divider.of_unit(change, self.rest, at)
+        return own if self.film == 1 else divider.of_typical_film(own, self.rest, 1 / self.film)
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
         """Change (n, 19) counts of some frames alone, as ``typical`` has them."""

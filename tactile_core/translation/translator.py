@@ -32,6 +32,7 @@ UNTRAINED_CONFIDENCE = 0.2  # assumed
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
 # A place is undecided where more than this share of the posterior lies as far away, m, as two contacts must lie apart.
 UNDECIDED, APART = 0.3, 3e-3  # assumed
+LEAST_SQUARE = 1.0  # counts^2 of all electrodes' change, below any reading's noise: what no contact makes
 SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterior
 SEED = 0  # of them: the same recording, the same contacts
 
@@ -50,6 +51,9 @@ class Translation(Summary):
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
         BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
+    explained : (T,), share of the electrodes' change, 1 - |change - predicted|^2 / |change|^2, that a unit of this film
+        and rest shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without
+        contact
     """
 
     latent_signal: np.ndarray
@@ -66,6 +70,7 @@ class Translation(Summary):
     error_bound_biotac: np.ndarray
     error_bound_digit: np.ndarray
     flags: np.ndarray
+    explained: np.ndarray
 
     @classmethod
     def joined(cls, parts: Sequence[Translation]) -> Translation:
@@ -209,6 +214,7 @@ class Translator:
             pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
+            explained=np.where(silent, np.float32(np.nan), self._explained(signals, change, latent_source, rectified)),
         )  # fmt: skip
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
@@ -227,6 +233,20 @@ class Translator:
         for values in found.values():
             values[still] = 0
         return found
+
+    def _explained(
+        self, signals: Signals, change: np.ndarray, latent_source: np.ndarray, rectified: np.ndarray
+    ) -> np.ndarray:
+        """Share (T,) of typical changes (T, e) that latent_source (T, L) explains as the unit's own; see `Translation`.
+
+        Rectified ones (T,) bool are compared without signs.
+        """
+        at = self.card.get(REST, sensors.typical_rest(self.source))
+        predicted = self.nets.decode_signal(self.nets.m2s(latent_source))
+        own, told = (signals.of_typical(each, at) for each in (change, predicted))
+        own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
+        left, whole = (np.square(each).sum(axis=1) for each in (own - told, own))
+        return (1 - left / np.maximum(whole, LEAST_SQUARE)).astype(np.float32)
 
     def silent(self, quantity: str) -> float:
         """Return the `silent_level` of a quantity in this card."""

@@ -37,7 +37,9 @@ def translate(signals: Signals) -> Translation:
     center = np.where(depth[:, None] > 5, np.float32([-8e-3, 0]), np.float32(np.nan))
     flags = np.where(depth > 100, Flag.OUT_OF_RANGE, 0).astype(np.uint16)
     errors = [share * depth * np.float32(1e-6) for share in (0.1, 0.1, 0.2, 0.2)]
-    return Translation(*codes, skin, gel, force, 50 * depth, center, np.exp(-depth / 100), *errors, flags)
+    return Translation(
+        *codes, skin, gel, force, 50 * depth, center, np.exp(-depth / 100), *errors, flags, np.exp(-depth / 50)
+    )
 
 
 def hold() -> None:

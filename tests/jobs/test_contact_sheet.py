@@ -70,6 +70,8 @@ def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path, columns: dict) 
     assert with_truth > plain + 200
     contact_sheet(path, Contents(**columns, warnings=["rectified: the sign is lost", "no quiet part"]))
     assert plain + 30 < size(path)[1] < plain + 60
+    contact_sheet(path, Contents(**columns, explained=np.r_[np.full(10, np.nan), np.linspace(-3, 1, 40)]))
+    assert plain + 40 < size(path)[1] < plain + 80
     contact_sheet(path, Contents(**columns, warnings=["many words " * 40] * 30))  # cut off, with a line that says so
     assert size(path)[1] < plain + 120
 
@@ -105,7 +107,7 @@ def test_frames_are_the_strongest_that_lie_apart() -> None:
 def test_captions_touch_neither_each_other_nor_the_line_below_them() -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = SheetFigure(6, load_calibration().camera, [], False, pressure=False)
+    figure = SheetFigure(6, load_calibration().camera, [], False, pressure=False, explained=False)
     figure.top = figure.height - CAPTION - FOOT
     pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.BEYOND_PICTURE | Flag.POLARITY_ASSUMED, Flag.RECTIFIED]
     flags = np.array([int(flag) for flag in (*pairs, *pairs)], np.uint16)

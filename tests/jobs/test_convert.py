@@ -77,6 +77,8 @@ def test_a_result_is_complete_and_one_frame_a_row(whole):
         assert file["time"].attrs["start_time"] == pytest.approx(1.6e9)
         assert (file["electrodes"][:] == read[:, 26:]).all()
         depth = file["displacement_digit"][..., 1].max(axis=1)
+        told = json.loads((folder / "note.json").read_text())["explained"]
+        assert told == pytest.approx(np.nanmean(file["explained"]), abs=1e-4)
         assert {file[name].dtype for name in ("force", "confidence", "displacement_biotac")} == {np.dtype("float32")}
     for frame in (0, FRAMES // 2, FRAMES - 1):
         picture = np.asarray(Image.open(folder / "images" / f"{frame:05d}.png"))

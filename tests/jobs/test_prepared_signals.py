@@ -36,14 +36,14 @@ def write(tmp_path):
 
 
 def prepared(path, **words):
-    """Change (T, 19), PDC (T,) and flags (T,) of all parts, and how many there were."""
+    """Change (T, 19), PDC (T,) and flags (T,) of all parts, how many there were, and their films."""
     recipe = recipes.Translate(["latent"], "0" * 64, prepare=recipes.Prepare(**words))
     parts = list(prepared_signals._signals(str(path), SimpleNamespace(recipe=recipe)))
     arrays = [
         np.concatenate([getattr(signals, name)[repeated:] for _, signals, repeated in parts])
         for name in ("change", "pdc", "flags")
     ]
-    return *arrays, len(parts)
+    return *arrays, len(parts), {signals.film for _, signals, _ in parts}
 
 
 @pytest.mark.parametrize("words", [{}, {"polarity": "falls"}])
@@ -51,11 +51,12 @@ def prepared(path, **words):
 def test_parts_have_one_rest_one_pressure_and_one_polarity(sign, words, write, monkeypatch):
     path = write(sign)
     monkeypatch.setattr(chunks, "TEXT_BYTES", path.stat().st_size // 5)
-    change, pdc, flags, count = prepared(path, **words)
+    change, pdc, flags, count, films = prepared(path, **words)
     whole = recordings.prepare(recordings.read(path), PrepareOptions(**words))
     assert count > 3 and len(change) == 2000
     np.testing.assert_allclose(change, whole.change, atol=2)  # of rest, by the quiet frames of the first part alone
     np.testing.assert_allclose(pdc, whole.pdc, atol=1)
+    assert films == {whole.film}
     doubts = Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED
     assert len(np.unique(flags & doubts)) == 1
     if not words:  # the first part holds no contact: a later one shows the polarity

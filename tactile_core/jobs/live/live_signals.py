@@ -120,13 +120,13 @@ class LiveSignals:
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
         electrodes = electrodes * self._factor
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
-        if (film := self.known.report["film"]) is not None:
-            change = divider.of_typical_film(change, rest, film["thickness"])
+        if self.known.film != 1:
+            change = divider.of_typical_film(change, rest, self.known.film)
         signals = Signals(
             change=np.where(unheard[:, None], 0.0, change), rest=rest, drift=np.zeros_like(rest),
             electrodes=electrodes, kind=kind,
             quiet=np.zeros(count, bool), flags=flags, pdc=np.full(count, np.nan),
-            warnings=(), report={}, sensor=self._sensor,
+            warnings=(), report={}, sensor=self._sensor, film=self.known.film,
         )  # fmt: skip
         if self._unit is None:
             return signals

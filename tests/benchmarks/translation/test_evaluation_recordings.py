@@ -67,7 +67,8 @@ def network(signals: Signals) -> Translation:
     codes = np.repeat(strength[:, None], 4, axis=1)
     errors = [1e-6 * strength] * 4
     flags = np.zeros(count, np.uint16)
-    return Translation(codes, codes, codes, skin, moved, force, 50 * strength, center, np.ones(count), *errors, flags)
+    sure = np.ones(count)
+    return Translation(codes, codes, codes, skin, moved, force, 50 * strength, center, sure, *errors, flags, sure)
 
 
 def by_name(rows: list[dict]) -> dict[str, dict]:
