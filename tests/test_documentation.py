@@ -75,6 +75,7 @@ ELSEWHERE = {
     "python scenes/mujoco_grasp/grasp.py": ("tests/jobs/test_mujoco_gel.py", "--no-speed"),
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
+    "tactile adapt pressed.csv": ("tests/translation/test_force_scale.py", '"--force"'),
     "tactile adapt slips/": ("tests/recordings/test_biotac_sp.py", '["adapt"'),
     "tactile convert slips/": ("tests/translation/test_shipped_biotac_sp.py", '"convert"'),
     "tactile info slips/": ("tests/recordings/test_biotac_sp.py", '["info"'),

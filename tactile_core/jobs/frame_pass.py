@@ -102,7 +102,7 @@ class FramePass:
         found = self._decoded(frames)
         arrays, signals = dict(vars(found.translation)), found.signals
         if self._translator.answer.samples:
-            arrays |= self._translator.plausible(found.evidence, frames)
+            arrays |= self._translator.plausible(found.evidence, frames, signals.stiffness)
         arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
         arrays["flags"] = (
             arrays["flags"] | signals.flags | beyond_picture(arrays["contact_center"], self._drawer.camera)

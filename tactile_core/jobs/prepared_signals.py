@@ -61,6 +61,7 @@ class About(TypedDict):
     frames: int
     sensor: NotRequired[str]
     film: NotRequired[float]
+    stiffness: NotRequired[float]
     labels: NotRequired[Runs]
 
 
@@ -145,7 +146,7 @@ class _Writer:
             self._about |= {
                 "recording": recording.name, "layout": recording.layout, "simulated": recording.simulated,
                 "start_time": recording.start_time, "kind": signals.kind,
-                "sensor": recording.sensor, "film": signals.film,
+                "sensor": recording.sensor, "film": signals.film, "stiffness": signals.stiffness,
             }  # fmt: skip
         self._parts.append((self.count, signals.rest))
         self._about["warnings"] += [text for text in signals.warnings if text not in self._about["warnings"]]
@@ -192,7 +193,8 @@ class Prepared:
             rest = file["rest"][int(np.searchsorted(file["part"][()], start, side="right")) - 1]
             return arrays.pop("time"), Signals(
                 rest=rest, drift=np.zeros_like(rest), kind=about["kind"], warnings=(), report={},
-                sensor=about.get("sensor", SOURCE), film=about.get("film", 1.0), **arrays,
+                sensor=about.get("sensor", SOURCE), film=about.get("film", 1.0),
+                stiffness=about.get("stiffness", 1.0), **arrays,
             )  # fmt: skip
 
         return self._read(read)

@@ -38,6 +38,8 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
         single recordings; rest_pdc : counts
     film : thickness of its fluid film over a typical unit's, where known
+    stiffness : of its skin over a typical unit's, where a measured force showed it: force and pressure are that much
+        larger under the same signals; stiffness_error : relative
     """
 
     note: str
@@ -47,6 +49,8 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     rest_spread_counts: Row | None = None
     rest_pdc: float | None = None
     film: float | None = None
+    stiffness: float | None = None
+    stiffness_error: float | None = None
 
     def rest(self) -> Rest | None:
         """Return the unit's rest in the form that `prepare` takes."""
@@ -109,12 +113,16 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     """
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
+    stiffness = 1.0 if sensor.stiffness is None else sensor.stiffness
+    if sensor.stiffness is not None:
+        applied |= {"stiffness": stiffness, "stiffness_error": sensor.stiffness_error}
     change = (signals.typical - offset) / np.array(sensor.gain)
     rest = typical_rest(signals.sensor)
     if signals.kind == "raw" and rest is not None:
         change = divider.of_unit(change, signals.rest, rest)
     change[unanswered(signals)] = 0.0
-    return doubt_law(dataclasses.replace(signals, change=change, report={**signals.report, "sensor": applied}))
+    report = {**signals.report, "sensor": applied}
+    return doubt_law(dataclasses.replace(signals, change=change, report=report, stiffness=stiffness))
 
 
 def read(path: str | os.PathLike) -> SensorFile:
@@ -158,11 +166,14 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
                 if not least <= value <= most:  # false for nan
                     place = f"{where}, {name}.{field}, E{electrode}"
                     raise TactileError(place, f"{value:g}", f"{least:g} to {most:g}", ADVICE)
-        if section.film is not None and not film.LEAST <= section.film <= film.MOST:
-            found, expected = f"{section.film:g}", f"{film.LEAST:g} to {film.MOST:g} of a typical unit's"
-            raise TactileError(f"{where}, {name}.film", found, expected, ADVICE)
-        if section.rest_pdc is not None and not 0 <= section.rest_pdc <= COUNT_MAX:
-            raise TactileError(f"{where}, {name}.rest_pdc", f"{section.rest_pdc:g}", f"0 to {COUNT_MAX:g}", ADVICE)
+        for field, (least, most, unit) in {
+            "film": (film.LEAST, film.MOST, " of a typical unit's"), "rest_pdc": (0.0, COUNT_MAX, ""),
+            "stiffness": (LEAST, MOST, " of a typical unit's"), "stiffness_error": (0.0, MOST, ""),
+        }.items():  # fmt: skip
+            value = getattr(section, field)
+            if value is not None and not least <= value <= most:
+                expected = f"{least:g} to {most:g}{unit}"
+                raise TactileError(f"{where}, {name}.{field}", f"{value:g}", expected, ADVICE)
 
 
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:
@@ -170,8 +181,8 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
     name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
     head: tuple[str, ...] = (
         f"A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",
-        "gain in counts a count, film over a typical unit's, all else in counts. Used by: tactile convert RECORDING",
-        "--sensor THIS_FILE",
+        "gain in counts a count, film and stiffness over a typical unit's, all else in counts. Used by:",
+        "tactile convert RECORDING --sensor THIS_FILE",
     )
     if typical_rest(sensor.sensor) is None:
         head = (f"Rest of a {name}, E1 to {last}, in counts. Used by: tactile info RECORDING --sensor THIS_FILE",)

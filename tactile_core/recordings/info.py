@@ -75,6 +75,7 @@ def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, s
         ("tare", f"{report['quiet_evidence']}{_parts(recording, signals)}"),
         ("drift", _drift(signals)),
         *_film(signals),
+        *_stiffness(signals),
         (
             "suspicious",
             f"{report['samples_glitch']} glitch samples, {report['samples_interpolated']} unreadable samples"
@@ -147,6 +148,14 @@ def _film(signals: Signals) -> list[tuple[str, str]]:
     least, most = found["conductivity_since_rest"]
     thick = f"{found['thickness']:.2f} as thick as a typical unit's ({found['evidence']})"
     return [("fluid film", f"{thick}; conductivity {least:.2f} to {most:.2f} of that at rest")]
+
+
+def _stiffness(signals: Signals) -> list[tuple[str, str]]:
+    unit = signals.report.get("sensor", {})
+    if "stiffness" not in unit:
+        return []
+    known = "" if unit["stiffness_error"] is None else f" (to {unit['stiffness_error']:.0%})"
+    return [("stiffness", f"{signals.stiffness:.2f} of a typical unit's{known}: force and pressure times it")]
 
 
 def _places(recording: Recording, signals: Signals) -> str:

@@ -101,6 +101,7 @@ class Signals:
     report : what was found and done, fit for JSON
     sensor : whose they are; 19 is of a BioTac
     film : thickness of the unit's, over a typical unit's, that the changes were converted from
+    stiffness : of the unit's skin over a typical one's, by which its force and pressure are larger
     """
 
     change: np.ndarray
@@ -115,6 +116,7 @@ class Signals:
     report: dict[str, Any]
     sensor: str = SOURCE
     film: float = 1.0
+    stiffness: float = 1.0
 
     def at(self, frames: np.ndarray | slice) -> Signals:
         """Return the signals of some frames alone; rest and drift stay those of the recording."""

@@ -55,16 +55,18 @@ class Adapted:
 
 
 def adapt(
-    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None
-) -> Adapted:
+    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
+    rest: UnitRest | None = None,
+) -> Adapted:  # fmt: skip
     """Fit one sensor from its recordings, all together.
 
-    Recordings without a calm part near the rest estimated from all together use that estimate. Raises TactileError: a
-    recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames in contact.
+    Recordings without a calm part near the unit's rest, given or estimated from all together, use that.
+    Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
+    in contact.
     """
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
-    rest = _rest(recordings)
+    rest = _rest(recordings) if rest is None else rest
     bare = _bare(rest)
     if bare is not None:
         bare = msgspec.structs.replace(bare, film=_film(recordings, options, bare))
@@ -88,10 +90,12 @@ def adapt(
 
 
 def adapt_hand(
-    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None
-) -> tuple[SensorFile, tuple[str, ...]]:
+    paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
+    rest: UnitRest | None = None,
+) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
     """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; with warnings.
 
+    rest : of the unit, where there is one and it is known
     Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
     columns = None if options is None else options.columns
@@ -100,6 +104,8 @@ def adapt_hand(
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
     units, sensor = _units(every), found.pop()
+    if rest is not None and len(units) > 1:
+        raise TactileError("--rest", f"given for {len(units)} units", "one", "Adapt to each finger by itself: FILE#0")
     if typical_rest(sensor) is None:
         rests = {unit: _rest_of_files(files, sensor) for unit, files in units.items()}
         return units_file(rests, sensor), (
@@ -108,7 +114,7 @@ def adapt_hand(
     fitted: dict[str, ElectrodeGains] = {}
     warnings: list[str] = []
     for unit, files in units.items():
-        done = adapt(files, typical, options)
+        done = adapt(files, typical, options, rest)
         fitted[unit] = done.sensor
         warnings += [text if unit == "unit" else f"{unit}: {text}" for text in done.warnings]
     return units_file(fitted), tuple(warnings)
@@ -158,7 +164,8 @@ def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
     """Return a unit with a known rest alone."""
     if rest is None:
         return None
-    return _rest_alone(rest, f"rest from the {rest.recordings} least pressed recordings")
+    source = "its own recording" if rest.recordings == 1 else f"the {rest.recordings} least pressed recordings"
+    return _rest_alone(rest, f"rest from {source}")
 
 
 def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:

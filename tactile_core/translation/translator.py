@@ -141,17 +141,17 @@ class Translator:
         posterior = self.nets.posterior(latent, unsigned)
         return Evidence(**vars(posterior), size=size, rectified=_rectified(signals), latent=latent, unsigned=unsigned)
 
-    def plausible(self, evidence: Evidence, frames: np.ndarray) -> dict[str, np.ndarray]:
+    def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
 
-        frames : (T,) in the recording, whose numbers are the only seeds
+        frames : (T,) in the recording, whose numbers are the only seeds; stiffness : of `Signals`
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N
         """
         states = drawn(evidence, frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
         center = gel_place.on_gel(self.nets.frames["MVD"], flat[:, :PLACE]) + self.answer.mount_shift
         touched = touches(flat)
-        force = FORCE_SCALE * np.sinh(np.clip(flat[:, PLACE], 0, COMPRESSED_LIMIT))
+        force = stiffness * FORCE_SCALE * np.sinh(np.clip(flat[:, PLACE], 0, COMPRESSED_LIMIT))
         center = np.where(touched[:, None], center, np.nan).reshape(*shape, 2)
         return dict(zip(SAMPLES, (center, np.where(touched, force, 0).reshape(shape)), strict=True))
 
@@ -210,8 +210,8 @@ class Translator:
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel,
-            force=np.where(silent[:, None], np.float32(0), nets.force_in(state, latent_source)),
-            pressure=np.where(silent, np.float32(0), nets.pressure(change, rectified)),
+            force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
+            pressure=np.where(silent, np.float32(0), signals.stiffness * nets.pressure(change, rectified)),
             contact_center=center,
             confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
             explained=np.where(silent, np.float32(np.nan), self._explained(signals, change, latent_source, rectified)),

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import TactileError
-from ..recordings import Recording
+from ..recordings import Recording, read
 from ..recordings.quiet import TARED_PDC, window_frames
 from ..recordings.repair import fill
 from ..recordings.rest_level import level
 from ..recordings.signal_kind import detect
+from ..recordings.signals import UNIT_DRIFT
+from ..recordings.tables.column_map import ColumnMap
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
 LEAST_PRESSED = 0.25  # share of the recordings, those of the lowest pressure, whose mean is taken for rest
@@ -60,6 +62,21 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     tared = any(np.median(pdc) < TARED_PDC for pdc in pressures)  # each to a zero of its own
     pdc = None if tared else float(pressed[:few].mean())
     return UnitRest(levels[:few].mean(axis=0), np.ptp(half, axis=0) / 2, pdc, few)
+
+
+def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
+    """Read the rest of a unit from a recording of it untouched.
+
+    Raises TactileError for a recording that is not raw, or in which an electrode moves as no drift moves it.
+    """
+    recording = read(path, columns)
+    readings = _raw(recording)
+    spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)
+    if spread.max() > UNIT_DRIFT:
+        found = f"E{spread.argmax() + 1} moves by {spread.max():.0f} counts"
+        raise TactileError(path, found, f"an untouched finger, at most {UNIT_DRIFT:g}", "Record it without contact")
+    pdc = None if recording.pdc is None else float(np.nanmedian(recording.pdc))
+    return UnitRest(level(readings), spread / 2, pdc, 1)
 
 
 def find_rest_sp(recordings: Sequence[Recording]) -> UnitRest:

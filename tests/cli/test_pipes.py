@@ -48,6 +48,8 @@ CASES = {
     ("export", "job"): ["export {job} --to npz --out {out}", "export {x} --to npz --out {out}"],
     ("info", "recordings"): ["info {x.csv}", "info {x.mcap}"],
     ("adapt", "recordings"): ["adapt {x.csv} --out {out}"],
+    ("adapt", "--rest"): ["adapt {csv} --out {out} --rest {x.csv}"],
+    ("adapt", "--force"): ["adapt {csv} --out {out} --force {x.txt}"],
     ("adapt", "--weights"): ["adapt {csv} --out {out} --weights {weights}"],
     ("render", "input"): ["render {x.h5} --out {out}", "render {x.npz} --out {out}", "render {x.exr} --out {out}",
                           "render {scenefolder} --out {out}", "render {meshscene} --out {out}"],

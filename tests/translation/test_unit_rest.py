@@ -14,7 +14,7 @@ from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, Sens
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.recording import split
-from tactile_core.translation.unit_rest import find_rest
+from tactile_core.translation.unit_rest import find_rest, read_rest
 
 REST = np.linspace(3100.0, 3500.0, 19)
 
@@ -41,6 +41,19 @@ def test_it_is_that_of_the_least_pressed_recordings(pdc):
     # What a hundredth of a grip moves, and drift of 3 counts; without pressure, what half of the contacts move.
     assert np.abs(found.counts - REST).max() < (12 if pdc else 60)
     assert (found.spread > 1).all()
+
+
+def test_an_untouched_finger_s_recording_is_its_rest_and_a_pressed_one_s_is_not(tmp_path):
+    noise = np.random.default_rng(0).normal(0, 2, (300, 19))
+    np.savez(tmp_path / "still.npz", electrodes=np.rint(REST + noise))
+    np.savez(tmp_path / "pressed.npz", electrodes=np.rint(REST + noise - np.linspace(0, 150, 300)[:, None]))
+    np.savez(tmp_path / "tared.npz", electrodes=np.rint(noise))
+    found = read_rest(str(tmp_path / "still.npz"))
+    assert np.abs(found.counts - REST).max() < 1 and found.pdc is None and found.recordings == 1
+    assert ((found.spread > 2) & (found.spread < 8)).all()  # half of what 98 % of the frames span, 2.3 deviations
+    for name, said in (("pressed", "moves by 1[0-9]+ counts; expected an untouched finger"), ("tared", "raw counts")):
+        with pytest.raises(TactileError, match=said):
+            read_rest(str(tmp_path / f"{name}.npz"))
 
 
 def test_too_few_and_rectified_recordings_are_refused():

@@ -1,10 +1,11 @@
-"""``tactile adapt``: the gains of an unknown sensor, from its own recordings."""
+"""``tactile adapt``: rest, film, gains and stiffness of an unknown sensor, from its own recordings."""
 
 from __future__ import annotations
 
 import argparse
 from shlex import quote
 
+from ...errors import TactileError
 from ..terminal import next_step, say, tell
 from .common import NOTHING, columns_argument, columns_of, polarity_argument, weights_argument
 
@@ -19,12 +20,19 @@ five different contacts give none.
 Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed
 electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor` takes it for
 recordings that begin and end in contact. Files of several fingers give a section a finger: these are units of their
-own. Recordings of a BioTac SP, which all begin in contact and have no PDC, give their rest alone: each electrode's
-median over the tenth of all frames in which it is least loaded."""
+own. --rest takes it from a recording of the untouched finger. Recordings of a BioTac SP, which all begin in contact and
+have no PDC, give their rest alone: each electrode's median over the tenth of all frames in which it is least loaded.
+
+--force gives the unit a stiffness, by which its force and pressure are larger than those of the typical unit under the
+same signals: newtons in one column or three (x, y, z), in rows as the first recording's, or behind a column of time; or
+columns of the recordings' own files. The lag is found. The scale is fitted on the first half of the frames and judged
+on the second: where force is no better there with it than without, it is not written, and both errors are said."""
 EPILOG = """\
 example:
   tactile adapt day1/*.csv --out sensor.toml
-  tactile convert day2/touch.csv --out results --sensor sensor.toml"""
+  tactile convert day2/touch.csv --out results --sensor sensor.toml
+  tactile adapt pressed.csv --rest untouched.csv --force force.csv --out sensor.toml
+  tactile adapt day1/*.csv --force fx,fy,fz --out sensor.toml"""
 LEAVES = NOTHING
 
 
@@ -32,6 +40,12 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="+", metavar="RECORDING", help="recordings of one unit, in any known layout")
     verb.add_argument("--out", required=True, metavar="FILE", help="new TOML file to write")
+    verb.add_argument("--rest", metavar="FILE", help="recording of the untouched finger, whose rest is then known")
+    verb.add_argument(
+        "--force",
+        metavar="FILE|COLUMNS",
+        help="force measured beside the first RECORDING, N; or its columns in the recordings, as fx,fy,fz",
+    )
     polarity_argument(verb)
     columns_argument(verb)
     weights_argument(verb)
@@ -41,14 +55,24 @@ def run(options: argparse.Namespace) -> int:
     """Fit and write the gains; returns the exit status."""
     from ...files import atomic
     from ...recordings import PrepareOptions, electrode_gains
-    from ...translation import adapt, networks, reference_signals
+    from ...translation import adapt, force_scale, networks, reference_signals, unit_rest
+    from ...translation.translate import load_translator
 
     atomic.claim(options.out)
     typical = reference_signals.read(options.weights or networks.WEIGHTS_FOLDER)
     prepare = PrepareOptions(polarity=options.polarity, columns=columns_of(options))
-    sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare)
+    rest = None if options.rest is None else unit_rest.read_rest(options.rest, prepare.columns)
+    sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare, rest)
     for warning in warnings:
         say(f"warning: {warning}")
+    if options.force is not None:
+        (name, unit), *others = sensor.sections().items()
+        if others:
+            raise TactileError("--force", f"given for {len(others) + 1} units", "one", "Name one: FILE#0")
+        translator = load_translator(options.weights, None, None, sensor.sensor)
+        unit, said = force_scale.with_stiffness(unit, options.force, options.recordings, translator, prepare)
+        sensor = electrode_gains.units_file({name: unit}, sensor.sensor)
+        say(said)
     for name, section in sensor.sections().items():
         say(f"{name}: {section.note}")
     electrode_gains.check(sensor, options.out)

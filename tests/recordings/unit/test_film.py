@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
+from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, prepare
 from tactile_core.recordings.assemble import assemble
@@ -15,6 +18,7 @@ from tactile_core.recordings.unit import film
 from tactile_core.sensors import REST_COUNTS, divider
 from tactile_core.translation.translate import translate
 
+SAID = r"second half ([\d.]+) N with this scale, ([\d.]+) N without, ([\d.]+) N of a constant"
 CONTACTS, EACH = 60, 40  # different contacts of a made-up recording, and frames of each, at 10 Hz
 
 
@@ -132,6 +136,22 @@ def test_force_of_a_real_finger_is_of_the_right_size(forced):
     true = true[::50]  # which the counts follow by two rows, a fiftieth of a second
     assert 0.8 < np.median(found / true) < 1.25
     assert np.abs(found - true).mean() < 1.0
+
+
+def test_one_scale_by_half_of_a_measured_force_is_written_where_it_brings_the_other_half_nearer(
+    outside_data, tmp_path, capsys
+):
+    """`adapt --rest --force`, a constant force .63 N: which electrodes' gains fit, and the scale, the force decides."""
+    folder, unit = outside_data("biotac_force"), tmp_path / "unit.toml"
+    names = ", ".join(f'"column{k}"' for k in range(1, 20))
+    (tmp_path / "map.toml").write_text(f'format = "tactile-columns-1"\nelectrodes = [{names}]\n')
+    rest, force = (f"{folder}/finger1_{name}.txt" for name in ("rest", "force"))
+    words = ["--columns", str(tmp_path / "map.toml"), "--rest", rest, "--force", force, "--out", str(unit)]
+    assert main(["adapt", f"{folder}/finger1_counts.txt", *words]) == 0
+    scaled, without, constant = map(float, re.search(SAID, capsys.readouterr().err).groups())
+    assert min(scaled, without) < 0.8 * constant
+    known = electrode_gains.read(unit).sections()["unit"].stiffness
+    assert 0.5 < known < 2 if scaled < without else known is None  # weights may leave nothing to a scale
 
 
 def test_an_idle_finger_whose_fluid_warms_is_hardly_touched(forced):

@@ -1,0 +1,156 @@
+"""Find how stiff a unit is from a measured force: one scale of force and pressure, judged on what it was not fitted to.
+
+A stiffer skin gives the same electrodes for the same dent at a larger force and pressure, so that no signal shows it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Sequence
+
+import msgspec
+import numpy as np
+
+from .. import accuracy
+from ..errors import TactileError
+from ..recordings import PrepareOptions, Recording, read
+from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains
+from ..recordings.force_file import Force, read_force
+from ..recordings.polarity import spread_out
+from .translate import CHUNK, PreparedRows, RecordingPass
+from .translator import Translator
+
+MOST_FRAMES = 3_000  # translated of a recording, evenly spread
+FEWEST_FRAMES = 50  # beside a force, half a second (assumed)
+LAGS = np.round(np.arange(-1, 1.001, 0.01), 2)  # s, of the force behind the electrodes, that are tried (assumed)
+# Correlation of measured and translated force, at the lag where they agree best, below which they are not of one touch:
+# noise beside 180 frames reaches .24, time itself .33 (the shipped recording).
+TOGETHER = 0.4
+PARTS = 8  # of the frames, whose scales say by their scatter how far the scale is known
+
+
+@dataclasses.dataclass(frozen=True)
+class ForceScale:
+    """Scale of the translated force that fits the first half of the frames best, and what it does on the other half.
+
+    scale : measured over translated force; error : of it, relative: the scatter of an eighth of the frames
+    lag : s, of the force behind the electrodes; correlation : of the two, on the first half
+    without, scaled, constant : N, mean absolute error on the second half of the force as translated, of the scaled one,
+        and of the first half's median force
+    """
+
+    scale: float
+    error: float
+    lag: float
+    correlation: float
+    without: float
+    scaled: float
+    constant: float
+
+    @property
+    def better(self) -> bool:
+        """Return true if the scale is worth its number: force is nearer the measured one where it was not fitted."""
+        return self.scaled < self.without and self.correlation >= TOGETHER
+
+    def describe(self) -> str:
+        """Describe what was found, with the numbers that decide whether it is kept."""
+        said = (
+            f"measured over translated force {self.scale:.2f} (to {self.error:.0%}), lag {1e3 * self.lag:.0f} ms, "
+            f"correlation {self.correlation:.2f} on the first half; mean error on the second half {self.scaled:.2f} N "
+            f"with this scale, {self.without:.2f} N without, {self.constant:.2f} N of a constant force"
+        )
+        if self.better:
+            return f"stiffness: {said}"
+        together = self.correlation >= TOGETHER
+        why = "it makes the force no better where it was not fitted" if together else "the two do not go together"
+        return f"no stiffness is written, for {why}: {said}"
+
+
+def with_stiffness(
+    unit: ElectrodeGains, named: str, paths: Sequence[str], translator: Translator, options: PrepareOptions
+) -> tuple[ElectrodeGains, str]:
+    """Return a unit with the stiffness that a measured force shows, where it makes force better; and what was found.
+
+    Gains and offsets with which the scaled force is no nearer the measured one than without are given up as well.
+    named : file of the force beside the first recording, or columns of all recordings' own files
+    Raises TactileError for what `force_file.read_force` refuses, too few frames, and a scale that no unit has.
+    """
+    beside = paths[:1] if os.path.exists(named) else paths
+    recordings = [read(path, options.columns, translator.source) for path in beside]
+    forces = [read_force(named, recording) for recording in recordings]
+
+    def found_of(one: ElectrodeGains) -> ForceScale:
+        parts = [_translated(translator, recording, one, options) for recording in recordings]
+        translated = np.concatenate([size for _, size in parts])
+        times = [time for time, _ in parts]
+        return fit(translated, lambda lag: _measured(forces, times, lag), named)
+
+    found, count = found_of(unit), len(unit.gain)
+    plain = msgspec.structs.replace(unit, gain=[1.0] * count, offset_counts=[0.0] * count)
+    if plain != unit:
+        without = found_of(plain)
+        if without.scaled <= found.scaled:
+            off = f"force is off by {found.scaled:.2f} N with them, by {without.scaled:.2f} N without"
+            unit, found = msgspec.structs.replace(plain, note=f"{unit.note}; left at 1: {off}"), without
+    if found.better:
+        known = {"stiffness": round(found.scale, 4), "stiffness_error": round(found.error, 4)}
+        unit = msgspec.structs.replace(unit, **known)
+    return unit, found.describe()
+
+
+def _measured(forces: Sequence[Force], times: Sequence[np.ndarray], lag: float) -> np.ndarray:
+    """Measured force (n,) N at so many s, ``lag``, after the times (s) of each recording's frames."""
+    return np.concatenate([force.at(time + lag) for force, time in zip(forces, times, strict=True)])
+
+
+def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: str) -> ForceScale:
+    """Fit the scale of translated forces (n,) N to measured(lag) (n,) N; see `with_stiffness`."""
+    half = len(translated) // 2
+    correlations = {lag: _correlation(translated[:half], measured(lag)[:half]) for lag in map(float, LAGS)}
+    lag = max(correlations, key=lambda one: (correlations[one], -abs(one)))
+    force = measured(lag)
+    known = np.isfinite(force) & (translated > 0)
+    first, second = known.copy(), known.copy()
+    first[half:] = second[:half] = False
+    if min(first.sum(), second.sum()) < FEWEST_FRAMES:
+        found = f"{first.sum()} and {second.sum()} frames in contact in the two halves"
+        raise TactileError(where, found, f"at least {FEWEST_FRAMES} each", "Use a longer recording")
+    scale = _scale(translated[first], force[first])
+    if not LEAST <= scale <= MOST:
+        found = f"{scale:.3g} times the translated force: not newtons, or not of this finger"
+        raise TactileError(where, found, f"{LEAST:g} to {MOST:g}", "Convert the force to newtons")
+    parts = [_scale(translated[part], force[part]) for part in np.array_split(np.flatnonzero(known), PARTS)]
+
+    def off(guess: np.ndarray | float) -> float:
+        return float(np.abs(guess - force)[second].mean())
+
+    return ForceScale(
+        scale, float(np.log(parts).std()), lag, correlations[lag],
+        off(translated), off(scale * translated), off(float(np.median(force[first]))),
+    )  # fmt: skip
+
+
+def _translated(
+    translator: Translator, recording: Recording, unit: ElectrodeGains, options: PrepareOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n,) s and sizes (n,) N of the translated force, of frames spread evenly over a recording."""
+    frames = spread_out(len(recording), MOST_FRAMES)
+    rows = PreparedRows(recording, frames, translator.answer, options, unit)
+    whole = RecordingPass(translator, rows.read, rows.count)
+    parts = np.split(frames, np.arange(CHUNK, len(frames), CHUNK))
+    return recording.time[frames], np.concatenate([accuracy.lengths(whole(part).translation.force) for part in parts])
+
+
+def _scale(translated: np.ndarray, force: np.ndarray) -> float:
+    """Scale of the least mean absolute error: the median of the ratios, weighted by the translated force."""
+    order = np.argsort(force / translated)
+    reached = np.cumsum(translated[order])
+    return float((force / translated)[order][np.searchsorted(reached, reached[-1] / 2)])
+
+
+def _correlation(translated: np.ndarray, force: np.ndarray) -> float:
+    known = np.isfinite(force)
+    if known.sum() < FEWEST_FRAMES or translated[known].std() == 0 or force[known].std() == 0:
+        return 0.0
+    return float(np.corrcoef(translated[known], force[known])[0, 1])
