@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NotRequired, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 
 import msgspec
 import numpy as np
@@ -41,6 +41,7 @@ COLUMNS = {
     "time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16,
     "pdc": np.float64,
 }  # fmt: skip
+Positive = Annotated[float, msgspec.Meta(gt=0)]
 MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
@@ -60,8 +61,8 @@ class About(TypedDict):
     sha256: str
     frames: int
     sensor: NotRequired[str]
-    film: NotRequired[float]
-    stiffness: NotRequired[float]
+    film: NotRequired[Positive]
+    stiffness: NotRequired[Positive]
     labels: NotRequired[Runs]
 
 

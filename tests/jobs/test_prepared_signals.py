@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,8 +11,10 @@ from conftest import SLIDE_HEADER
 
 from tactile_core import recordings
 from tactile_core.jobs import prepared_signals
-from tactile_core.jobs.engine import recipes
+from tactile_core.jobs.engine import inputs, recipes
+from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, chunks, polarity
+from tactile_core.recordings.electrode_gains import ElectrodeGains, units_file
 from tactile_core.recordings.flags import Flag
 
 
@@ -61,3 +64,14 @@ def test_parts_have_one_rest_one_pressure_and_one_polarity(sign, words, write, m
     assert len(np.unique(flags & doubts)) == 1
     if not words:  # the first part holds no contact: a later one shows the polarity
         assert not (flags & doubts).any() and change[-1] @ (sign * whole.electrodes[-1] - sign * 3300) > 0
+
+
+def test_shards_know_the_unit_s_film_and_stiffness(write, tmp_path):
+    unit = ElectrodeGains("made up", [1.0] * 19, [0.0] * 19, [3300.0] * 19, film=0.5, stiffness=2.0)
+    recipe = recipes.Translate(["latent"], "0" * 64, sensor=units_file({"unit": unit}))
+    job = jobs.make(inputs.hashed([Path(write(1))], lambda done, total: None), recipe, None)
+    (tmp_path / "job" / jobs.PREPARED).mkdir(parents=True)
+    prepared_signals.make(tmp_path / "job", job, 0)
+    held = prepared_signals.Prepared(jobs.prepared_file(tmp_path / "job", job.inputs[0].name))
+    signals = held.read(np.arange(1000, 1010))[1]
+    assert (signals.film, signals.stiffness) == (0.5, 2.0)
