@@ -20,7 +20,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Indenter, Sphere
-from ..geometry.indenters.pose import tangents
+from ..geometry.indenters.indenter import tangents
 from ..sensors.unrolling import roll_up, unrolled_nodes
 from .fast.compliance import compliance_of
 from .fast.compliance_rows import ComplianceRows

@@ -119,16 +119,15 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Return the slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
     right, down = camera.pixel_size
-    if available() and height.dtype == np.float32:
-        return slope_maps(np.ascontiguousarray(height), np.float32(0.5 / right), np.float32(0.5 / down))
-    return _differences(height.T, right).T, _differences(height, down)
+    return _differences(height, 1, right), _differences(height, 0, down)
 
 
-def _differences(values: np.ndarray, step: float) -> np.ndarray:
-    found = np.empty_like(values)
-    np.subtract(values[2:], values[:-2], out=found[1:-1])
-    found[0] = 4 * values[1] - 3 * values[0] - values[2]
-    found[-1] = 3 * values[-1] - 4 * values[-2] + values[-3]
+def _differences(values: np.ndarray, axis: int, step: float) -> np.ndarray:
+    found = np.empty(values.shape, values.dtype)
+    along, slope = values.swapaxes(0, axis), found.swapaxes(0, axis)
+    np.subtract(along[2:], along[:-2], out=slope[1:-1])
+    slope[0] = 4 * along[1] - 3 * along[0] - along[2]
+    slope[-1] = 3 * along[-1] - 4 * along[-2] + along[-3]
     found *= np.float32(0.5 / step)
     return found
 
@@ -176,28 +175,6 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
     right *= share
     left += right
     return left
-
-
-@Loop
-def slope_maps(height, over_right, over_down):  # noqa: ANN001, ANN201
-    """See ``perspective.slopes``; over_right, over_down : float32, half of 1 over the pixels' sizes, 1/m."""
-    rows, columns = height.shape
-    right, down = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
-    three, four = np.float32(3), np.float32(4)
-    for a in range(rows):
-        line = height[a]
-        for b in range(1, columns - 1):
-            right[a, b] = (line[b + 1] - line[b - 1]) * over_right
-        right[a, 0] = (four * line[1] - three * line[0] - line[2]) * over_right
-        right[a, columns - 1] = (three * line[columns - 1] - four * line[columns - 2] + line[columns - 3]) * over_right
-        if 0 < a < rows - 1:
-            for b in range(columns):
-                down[a, b] = (height[a + 1, b] - height[a - 1, b]) * over_down
-    last = rows - 1
-    for b in range(columns):
-        down[0, b] = (four * height[1, b] - three * height[0, b] - height[2, b]) * over_down
-        down[last, b] = (three * height[last, b] - four * height[last - 1, b] + height[last - 2, b]) * over_down
-    return right, down
 
 
 @Loop

@@ -38,15 +38,12 @@ class SkinShape:
         self._poles = {"outer": self._skin.outer_poles, "inner": self._skin.inner_poles}
 
     @functools.cached_property
-    def _angles(self) -> np.ndarray:
+    def angles(self) -> np.ndarray:
+        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
         pad = np.linspace(-self.pad_angle, self.pad_angle, self._lattice.pad_intervals + 1)
         back = np.linspace(self.pad_angle, 2 * np.pi - self.pad_angle, self._lattice.back_intervals + 1)[1:-1]
         back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
         return np.sort(np.concatenate([pad, back]))
-
-    def angles(self) -> np.ndarray:
-        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
-        return self._angles
 
     @functools.cached_property
     def table(self) -> dict[str, np.ndarray]:
@@ -79,28 +76,23 @@ class SkinShape:
         ]
         return np.concatenate(pieces)
 
-    @functools.cached_property
-    def _meridians(self) -> dict[str, np.ndarray]:
-        return {
-            layer: np.stack([self._meridian(layer, column) for column in range(72)], -1)  # (stations, 2, 72)
-            for layer in self._poles
-        }
+    @functools.cache  # noqa: B019
+    def _meridians(self, layer: str) -> np.ndarray:
+        """All meridians (stations, 2, 72) of a layer."""
+        return np.stack([self._meridian(layer, column) for column in range(72)], -1)
 
-    @functools.cached_property
-    def _grids(self) -> dict[str, np.ndarray]:
-        return {layer: self.skin_points(layer, self._angles) for layer in self._poles}
-
+    @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
         """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin.
 
         Stations run from the tip pole to the base pole (both included, each one point repeated over the columns);
         outer and inner points of one station and column face each other through the skin.
         """
-        return self._grids[layer]
+        return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
         """The stations of ``skin_grid`` at any angles (columns,) rad: (stations, columns, 3) m."""
-        x, r = np.moveaxis(_around(self._meridians[layer], theta), 1, 0)
+        x, r = np.moveaxis(_around(self._meridians(layer), theta), 1, 0)
         x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
         r[[0, -1]] = 0
         return np.stack([x, self.axis_y - r * np.cos(theta), r * np.sin(theta)], -1)
@@ -141,18 +133,12 @@ class SkinShape:
             where = self.descriptor.folder / self.descriptor.electrodes.places
             raise TactileError(where, found, "places inside the inner skin, mm in the maker's frame of [frame]")
 
-    @functools.cached_property
-    def _surfaces(self) -> dict[str, Lattice]:
-        return {layer: self._surface(layer) for layer in self._poles}
-
+    @functools.cache  # noqa: B019
     def skin_surface(self, layer: str = "outer") -> Lattice:
         """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles.
 
         The inner skin's triangles point away from the solid too, into the fluid.
         """
-        return self._surfaces[layer]
-
-    def _surface(self, layer: str) -> Lattice:
         grid = self.skin_grid(layer)
         stations, columns = grid.shape[:2]
         rows = stations - 2

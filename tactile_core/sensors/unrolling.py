@@ -41,7 +41,7 @@ def rolled_x(sensor: str) -> np.ndarray:
     """Unrolled x (stations,) m of each station: arc length along the pad's lowest line from where x is shared."""
     skin = skin_of(sensor)
     origin = skin.descriptor.unrolling.origin_x
-    line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles()))]
+    line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles))]
     length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
     return origin + length - np.interp(origin, line[:, 0], length)
 
@@ -49,7 +49,7 @@ def rolled_x(sensor: str) -> np.ndarray:
 def rolled_grid(sensor: str) -> np.ndarray:
     """Unrolled places (rows, columns, 2) = (x, z) m of the skin's lattice, also of its back."""
     skin = skin_of(sensor)
-    across = skin.descriptor.unrolling.radius * skin.angles()
+    across = skin.descriptor.unrolling.radius * skin.angles
     return np.stack(np.broadcast_arrays(rolled_x(sensor)[1:-1, None], across), -1)
 
 
@@ -60,7 +60,7 @@ def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
     NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
     """
     skin = skin_of(sensor)
-    on_pad = np.abs(skin.angles())[None, :, None] <= skin.pad_angle + 1e-9
+    on_pad = np.abs(skin.angles)[None, :, None] <= skin.pad_angle + 1e-9
     rolled = np.where(on_pad, rolled_grid(sensor), np.nan)
     return np.concatenate([rolled.reshape(-1, 2), np.full((2, 2), np.nan)])
 
@@ -78,7 +78,7 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
     between the poles, angle within 90 degrees.
     """
     skin = skin_of(sensor)
-    stations, angles, radius = rolled_x(sensor), skin.angles(), skin.descriptor.unrolling.radius
+    stations, angles, radius = rolled_x(sensor), skin.angles, skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
     column = np.interp(point[1] / radius, angles, np.arange(len(angles)))
     places = np.array([[row], [column]]) + _STENCIL

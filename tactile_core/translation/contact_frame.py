@@ -129,7 +129,7 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):
         rows, columns = lattice.shape
-        turn[: rows * columns] = np.tile(sensors.skin_of(sensor).angles(), rows)
+        turn[: rows * columns] = np.tile(sensors.skin_of(sensor).angles, rows)
     return ContactFrame(*lattice.shape, half, turn, sensor)
 
 

@@ -20,8 +20,7 @@ from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.press import FastContact
 from tactile_core.mechanics.finite_strain.body import graded_body
 from tactile_core.mechanics.placement import DEPTH_LIMIT, pose_at, thickness_under
-from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, State
-from tactile_core.mechanics.solids.neo_hookean import NeoHookean, SplitBulkModulus
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, NeoHookean, SplitBulkModulus, State
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.sensors import Material

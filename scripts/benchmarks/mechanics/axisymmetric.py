@@ -18,8 +18,7 @@ from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
 from tactile_core.mechanics.finite_strain.solved_contact import ContactState, Tolerance
 from tactile_core.mechanics.solids.block_pattern import BlockPattern
 from tactile_core.mechanics.solids.elasticity import quadratic
-from tactile_core.mechanics.solids.finite_strain import Linearised, State
-from tactile_core.mechanics.solids.neo_hookean import Law, NeoHookean
+from tactile_core.mechanics.solids.finite_strain import Law, Linearised, NeoHookean, State
 from tactile_core.sensors import Material
 
 _POINT, _WEIGHT = np.polynomial.legendre.leggauss(3)

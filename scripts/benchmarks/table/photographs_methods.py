@@ -42,13 +42,13 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     if name == TABLE:
         table = fit_table(unit, chosen(photographs, fitted), BALL)
         change = TableBench(FastPictures(unit), table).change
-        ms = best_ms(lambda: change(tried[0].ball.numbers))
+        ms = best_ms(lambda: change(tried[0].ball))
         each = try_table(table, unit, test, BALL)
     else:
         pressed = FastPictures(unit)
         renderer = Renderer(unit, name, background=test.background, rest=pressed.rest)
         label = name if name == "fast" else f"{name}_{choose_variant().name}"
-        heights = [pressed.heights(each.ball.numbers) for each in tried]
+        heights = [pressed.heights(each.ball) for each in tried]
         ms = best_ms(lambda: renderer(heights[0]))
         each = [
             metrics(_drifted(renderer(height), one.press), one.press.picture, test.background, one.press.region)

@@ -53,7 +53,7 @@ def fit_table(calibration: Calibration, photographs: Photographs, radius: float)
     for press in photographs.presses:
         sight = Sight(press)
         ball, _ = fit_ball(bench, sight, radius)
-        size, direction = (values[sight.counts] for values in _bins(bench, ball.numbers))
+        size, direction = (values[sight.counts] for values in _bins(bench, ball))
         features, change = terms[sight.counts], sight.change[sight.counts]
         np.add.at(matrix, (size, direction), features[:, :, None] * features[:, None])
         np.add.at(right_side, (size, direction), features[:, :, None] * change[:, None])
@@ -70,7 +70,7 @@ def try_table(table: Table, calibration: Calibration, photographs: Photographs, 
     found = []
     for press in photographs.presses:
         ball, _ = fit_ball(working, Sight(press), radius)
-        picture = np.rint(photographs.background + press.drift + whole.change(ball.numbers)).clip(0, 255)
+        picture = np.rint(photographs.background + press.drift + whole.change(ball)).clip(0, 255)
         found.append(metrics(picture, press.picture, photographs.background, press.region))
     return found
 

@@ -135,7 +135,7 @@ def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
     for warning in done.warnings:
         say(f"warning: {warning}")
     for each in done.tried:
-        right, down, depth = (1e3 * value for value in each.ball.numbers[:3])
+        right, down, depth = (1e3 * value for value in each.ball[:3])
         place = f"{_way(right, 'left', 'right')} and {_way(down, 'above', 'below')} of the picture's middle"
         say(f"{each.press.name}: used; {depth:.2f} mm deep, {place}; {_error([each])}")
     check_worth(apart or done.tried)

@@ -7,10 +7,9 @@ from .box import Box
 from .bumpy_cube import BumpyCube
 from .cylinder import Cylinder
 from .edge import Edge
-from .indenter import Indenter
+from .indenter import Indenter, Pose, pose_on
 from .lying_cylinder import LyingCylinder
 from .mesh_indenter import MeshIndenter, as_indenter
-from .pose import Pose, pose_on
 from .ring import Ring
 from .several import Several
 from .sphere import Sphere

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...errors import TactileError
 from .box import Box
-from .indenter import NEAREST, Hull, Indenter, Surface, check_length
-from .pose import Pose
+from .indenter import NEAREST, Hull, Indenter, Pose, Surface, check_length
 from .ring import circle_curvature, circle_distance
 from .scene_form import SceneForm, Size
 from .several import Several, joined

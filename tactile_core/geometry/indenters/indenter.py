@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
+import math
 from collections.abc import Callable
 from typing import Protocol
 
@@ -78,3 +80,85 @@ def check_length(kind: str, name: str, value: float) -> None:
 def sign_of(component: np.ndarray | float) -> np.ndarray:
     """Return -1, 0 or 1; 0 for components of a direction that are zero up to rounding."""
     return np.where(np.abs(component) > SQUARE, np.sign(component), 0.0)
+
+
+_OWN_DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclasses.dataclass(frozen=True)
+class Pose:
+    """Position and orientation of an indenter: own origin at ``apex`` (3,) m, own axes as columns of ``axes`` (3, 3).
+
+    push : unit vector (3,) of the sensor's frame along which the indenter moves; None for its own -z
+    Raises TactileError for a number that is nan or infinite.
+    """
+
+    apex: np.ndarray
+    axes: np.ndarray
+    push: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(np.vdot(self.apex, self.apex) + np.vdot(self.axes, self.axes)):  # quicker than each
+            raise TactileError("pose", f"apex {self.apex} m, axes {self.axes.tolist()}", "finite numbers")
+
+    @property
+    def direction(self) -> np.ndarray:
+        """Unit vector (3,) into the sensor, along which the indenter moves."""
+        return -self.axes[:, 2] if self.push is None else self.push
+
+    @property
+    def own_direction(self) -> np.ndarray:
+        """Direction of motion in the indenter's own frame."""
+        return _OWN_DOWN if self.push is None else self.push @ self.axes
+
+    def moved(self, depth: float) -> Pose:
+        """Return the pose after moving ``depth`` m along ``direction``."""
+        return Pose(self.apex + depth * self.direction, self.axes, self.push)
+
+    def slid(self, along: float, across: float) -> Pose:
+        """Return the pose after sliding, m, along the indenter's own x and y."""
+        return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
+
+    def to_own(self, points: np.ndarray) -> np.ndarray:
+        """Transform sensor points (n, 3) m to the indenter's frame, in which sticking points stay put as it moves."""
+        return (points - self.apex) @ self.axes
+
+    def from_own(self, points: np.ndarray) -> np.ndarray:
+        """Transform points (n, 3) m from the indenter's frame to the sensor's: the inverse of ``to_own``."""
+        return points @ self.axes.T + self.apex
+
+    def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
+        distance, gradient = indenter.distance(self.to_own(points))
+        return distance, gradient @ self.axes.T
+
+    def curvature(self, indenter: Indenter, points: np.ndarray) -> np.ndarray:
+        """Return the second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
+        return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
+
+    def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
+        """Return the placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""
+        return self.apex + self.axes @ indenter.support(direction @ self.axes)
+
+
+def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the unit tangents (..., 3) of a surface with normals (..., 3): along +x, and aside (pad: toward -z)."""
+    along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
+    along /= np.linalg.norm(along, axis=-1, keepdims=True)
+    return along, np.cross(along, outward)
+
+
+def pose_on(
+    indenter: Indenter, point: np.ndarray, outward: np.ndarray, tilt: float = 0.0, tilt_heading: float = 0.0
+) -> Pose:
+    """Return the pose in which the indenter just touches ``point`` (3,) m of a surface, unit normal ``outward`` (3,).
+
+    tilt : rad, between its axis (the way it moves) and that normal
+    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
+    """
+    along, side = tangents(outward)
+    axis = np.cos(tilt) * outward + np.sin(tilt) * (np.cos(tilt_heading) * along + np.sin(tilt_heading) * side)
+    first = along - axis * (along @ axis)
+    first /= np.linalg.norm(first)
+    axes = np.column_stack([first, np.cross(axis, first), axis])
+    return Pose(point - axes @ indenter.support(-outward @ axes), axes)

@@ -8,8 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ...errors import TactileError
-from .indenter import SQUARE, Hull, Indenter, Surface
-from .pose import Pose
+from .indenter import SQUARE, Hull, Indenter, Pose, Surface
 
 _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 

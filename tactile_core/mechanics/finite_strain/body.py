@@ -11,11 +11,10 @@ from ... import sensors
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import BENDS, BLUNT, check_follows, penetration_between, sharpest
 from ..solids.biotac_core import Core, facing_core
-from ..solids.finite_strain import FiniteStrainSolid
+from ..solids.finite_strain import FiniteStrainSolid, NeoHookean, SplitBulkModulus
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.graded_mesh import Footprint, GradedMesh, graded
 from ..solids.hex_mesh import inner_faces, outer_faces
-from ..solids.neo_hookean import NeoHookean, SplitBulkModulus
 from ..solution import Sensor
 from .newton import FiniteStrainContact
 from .solved_contact import EXACT, ContactState, Tolerance

@@ -179,7 +179,7 @@ def _bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.nda
 def _skin_points(sensor: str, layer: str, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Points (i, j, 3) m of a skin's grid at real-valued stations and columns, by cubics along both."""
     skin = sensors.skin_of(sensor)
-    angles = np.r_[skin.angles(), np.pi]
+    angles = np.r_[skin.angles, np.pi]
     points = skin.skin_points(layer, np.interp(columns, np.arange(len(angles)), angles))
     cell = np.minimum(rows.astype(int), len(points) - 2)
     weights = catmull_rom(rows - cell)

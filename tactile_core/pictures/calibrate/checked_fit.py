@@ -2,14 +2,137 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
 
 from ...errors import TactileError
 from ...sensors.calibration import Calibration
-from .evaluate import Evaluation, evaluate_unit, mean_metrics
-from .fit import Calibrated, calibrate
-from .orientation import check_orientation
-from .photographs import Photographs, chosen
+from ...sensors.calibration_file import load_calibration
+from ..presets import FAST
+from ..renderer import Renderer
+from .ball_pictures import FastPictures, smaller, whole_factor
+from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
+from .fit import Calibrated, calibrate, unexplained_share
+from .photographs import Photographs, Press, chosen
+from .press_fit import Sight, fit_ball
+
+# Transposed, then rows, columns reversed: what that does to a picture.
+TURNS = {
+    (False, False, False): "",
+    (False, True, True): "turned by 180 degrees",
+    (False, False, True): "mirrored left to right",
+    (False, True, False): "mirrored top to bottom",
+    (True, False, True): "turned by 90 degrees clockwise",
+    (True, True, False): "turned by 90 degrees counter-clockwise",
+    (True, False, False): "turned by 90 degrees clockwise and mirrored left to right",
+    (True, True, True): "turned by 90 degrees clockwise and mirrored top to bottom",
+}
+COLOURS = "red and blue exchanged"
+LOOKED_AT = 4  # presses, the plainest, from which their orientation is found
+COARSE_SIDE = 60  # px: they are looked at made smaller by a whole factor, down to about this short side
+CLEARLY = 0.8  # of what one way leaves, that another may leave and be no better (assumed)
+
+
+class Way(NamedTuple):
+    """Change of a picture: transposed, then rows and columns reversed, and red exchanged with blue."""
+
+    transposed: bool
+    rows: bool
+    columns: bool
+    colours: bool
+
+    def applied_to(self, picture: np.ndarray) -> np.ndarray:
+        """Return a picture (h, w, 3) or mask (h, w) that is changed so."""
+        changed = picture.swapaxes(0, 1) if self.transposed else picture
+        changed = changed[:: -1 if self.rows else 1, :: -1 if self.columns else 1]
+        return changed[..., ::-1] if self.colours and changed.ndim == 3 else changed
+
+    def __str__(self) -> str:
+        words = [TURNS[self[:3]], COLOURS if self.colours else ""]
+        return " with ".join(filter(None, words)) or "as they are"
+
+
+GIVEN = Way(False, False, False, False)
+
+
+def check_orientation(
+    photographs: Photographs,
+    ball_diameter: float,
+    start: Calibration,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> None:
+    """Raise TactileError, with each way's share, for photographs that another way explains clearly better.
+
+    ball_diameter : m; progress : called with (ways tried, in all)
+    Of 8 orientations and 2 orders of colours those are tried that give pictures of the camera's shape. Ways that
+    explain the presses about as well, as where lights stand opposite, are told apart by the untouched gel, which is
+    compared with the start's and with that of the unit that ships, since a start of round numbers hardly knows it.
+    """
+    plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
+    height, width = photographs.shape
+    factor = whole_factor(width, height, COARSE_SIDE)
+    untouched = smaller(photographs.background, factor)
+    units = _units(photographs, start, untouched.shape[:2])
+    seen = {transposed: (FastPictures(unit), _resting(unit)) for transposed, unit in units.items()}
+    ways = [Way(*turn, colours) for turn in TURNS if turn[0] in units for colours in (False, True)]
+    left, apart = {}, {}
+    for number, way in enumerate(ways, 1):
+        bench, resting = seen[way.transposed]
+        sights = [Sight(_changed(press, way), factor) for press in plain]
+        missed = [fit_ball(bench, sight, sight.radius(ball_diameter / 2))[1] for sight in sights]
+        left[way] = float(np.median([unexplained_share(*pair) for pair in zip(sights, missed, strict=True)]))
+        apart[way] = min(float(np.abs(way.applied_to(untouched) - each).mean()) for each in resting)
+        progress(number, len(ways))
+    best = _best(left, apart)
+    if best == GIVEN:
+        return
+    shares = ", ".join(f"{100 * left[way]:.0f} % {way}" for way in sorted(left, key=left.__getitem__))
+    found = f"{100 * left[best]:.0f} % of the presses is unexplained {best}"
+    found += f", {100 * left[GIVEN]:.0f} % as they are" if GIVEN in left else ", and as they are they lie across"
+    expected = "fingertip up, as the camera sees the gel, and red, green, blue"
+    raise TactileError(photographs.folder, found, expected, f"Give them {best}. Each way leaves: {shares}")
+
+
+def _changed(press: Press, way: Way) -> Press:
+    """Return the press that a changed photograph shows."""
+    picture, drift, change = way.applied_to(press.picture), way.applied_to(press.drift), way.applied_to(press.change)
+    touched, region = way.applied_to(press.touched), way.applied_to(press.region)
+    return dataclasses.replace(press, picture=picture, drift=drift, change=change, touched=touched, region=region)
+
+
+def _best(left: dict[Way, float], apart: dict[Way, float]) -> Way:
+    """Way that leaves least; of those that leave hardly more, one whose untouched gel is clearly nearer."""
+    best = min(left, key=left.__getitem__)
+    near = [way for way in left if CLEARLY * left[way] <= left[best]]
+    nearest = min(near, key=apart.__getitem__)
+    best = nearest if apart[nearest] < CLEARLY * apart[best] else best
+    return GIVEN if GIVEN in near and CLEARLY * apart[GIVEN] <= apart[best] else best
+
+
+def _resting(unit: Calibration) -> list[np.ndarray]:
+    """Pictures (h, w, 3) of the untouched gel in a unit's pixels: its own, and the one of the unit that ships."""
+    known = [unit]
+    with contextlib.suppress(TactileError):  # a sensor without a calibration, or of another aspect ratio
+        known.append(load_calibration(None, unit.camera.sensor).at_size(unit.camera.width, unit.camera.height))
+    return [Renderer(each, FAST).background for each in known]
+
+
+def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int]) -> dict[bool, Calibration]:
+    """Calibrations in the pixels of pictures (h, w) as they are, and transposed, where the camera has that shape."""
+    units = {}
+    for transposed, (height, width) in ((False, shape), (True, shape[::-1])):
+        try:
+            units[transposed] = start.at_size(width, height)
+        except TactileError:  # of another aspect ratio
+            continue
+    if not units:
+        fitted_size(start, photographs)  # raises, and says why
+    return units
+
 
 FOLDS = 3  # of cross-validation
 WORTH = 0.8  # of the background's L1: a calibration that leaves more of a press is worth nothing (assumed)

@@ -97,7 +97,7 @@ def _try_press(
         return picture, metrics(picture, press.picture, background, press.region)
 
     ball, _ = fit_ball(working, sight, radius)
-    picture, ours = compared(whole.change(ball.numbers))
+    picture, ours = compared(whole.change(ball))
     through, lit = _with_light(whole, fit_ball(working, sight, radius, opaque=False)[0], press)
     _, with_light = compared(lit)
     _, baseline = compared(0.0)
@@ -117,7 +117,7 @@ def _try_press(
 
 def _with_light(bench: BallPictures, ball: Ball, press: Press) -> tuple[np.ndarray, np.ndarray]:
     """Light (3,) through the coating in a photograph of a ball, levels, and the change (H, W, 3) with it."""
-    change, disc = bench.change(ball.numbers), contact_disc(bench, ball.numbers)
+    change, disc = bench.change(ball), contact_disc(bench, ball)
     counts = press.touched & (press.picture.max(-1) < LARGEST_LEVEL)
     through = fitted_light((press.change - change)[counts], disc[counts], MODEL_ERROR)
     return through, change + disc[..., None] * through

@@ -18,9 +18,8 @@ from ..presets import FAST, QUALITY
 from ..renderer import Renderer
 from .ball_pictures import BallPictures, FastPictures, MitsubaPictures, missing_mitsuba, working_factor, working_preset
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
-from .levenberg_marquardt import minimise
 from .photographs import Photographs, Press
-from .press_fit import MODEL_ERROR, Sight, fit_ball
+from .press_fit import MODEL_ERROR, Sight, fit_ball, minimise
 from .residuals import FIRST_LED, GAIN_SPREAD, NAMES, SPREAD, UnitResiduals, parameters_of
 
 PLACING_STEPS, STEPS, FINISHING_STEPS = 6, 14, 8  # of the search
@@ -128,9 +127,7 @@ class _Search:
     def place(self) -> None:
         """Fit presses and gain alone, with the unit's numbers as in the start."""
         bench = FastPictures(self.start)
-        balls = [
-            1e3 * np.array(fit_ball(bench, sight, sight.radius(self.radius))[0].numbers[:3]) for sight in self._sights
-        ]
+        balls = [1e3 * np.array(fit_ball(bench, sight, sight.radius(self.radius))[0][:3]) for sight in self._sights]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
         self._minimise(np.concatenate(balls), PLACING_STEPS)
 
@@ -160,7 +157,7 @@ class _Search:
                 ball, left = fit_ball(bench, sight, sight.radius(self.radius))
                 self.aside[press.name] = unexplained_share(sight, left)
                 if self.aside[press.name] < UNEXPLAINED:
-                    placed[press.name] = (1e3 * np.array(ball.numbers[:3])).tolist()
+                    placed[press.name] = (1e3 * np.array(ball[:3])).tolist()
                     taken.append(press.name)
         for name in taken:
             del self.aside[name]

@@ -12,10 +12,9 @@ from ...sensors.calibration import Calibration
 from ..coating_spread import evened
 from ..perspective import lookup, slopes
 from ..presets import Preset
-from .gel_mesh import MM, GelMesh, check_mesh
+from .gel_mesh import MM, GelMesh, check_mesh, mend
 from .gel_scene import NOTHING, Surroundings, change_numbers, gel_shape, lamps, plugin_names, walls
-from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe, register
-from .tracer import MOST_MISSED
+from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe
 from .variant import LLVM, activate
 from .window import camera_rays
 
@@ -44,7 +43,6 @@ class GelLight:
         self.unit, self.preset, self._seed = unit, preset, seed
         self._mesh = GelMesh(unit.camera, preset.spacing)
         mi = activate(LLVM)
-        register(mi, LLVM)
         lights = lamps(unit) | surroundings.emitters()
         # Black: the unit's own light need not meet them.
         around = {
@@ -167,15 +165,7 @@ class GelLight:
         for light in lights:
             share = np.array(light.share).reshape(shape)
             radiance += np.array(light.open).T.reshape(*shape, 3) * evened(share)[..., None]
-        return self._mended(radiance, np.array(seen).reshape(shape))
-
-    def _mended(self, radiance: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """A ray in a million slips between two triangles: its pixel gets what its neighbour has."""
-        if np.mean(~seen) > MOST_MISSED:
-            found = f"{np.sum(~seen)} of {seen.size} rays miss it"
-            raise TactileError("gel mesh", found, "a gel that fills the picture", "Check heights and camera")
-        for row, column in np.argwhere(~seen):
-            radiance[row, column] = radiance[row, column - 1 if column else 1]
+        mend(~np.array(seen).reshape(shape), radiance)
         return radiance
 
     def _bounced(self, mi: Any) -> np.ndarray:

@@ -14,23 +14,19 @@ import numpy as np
 
 from ...sensors.calibration import DIFFUSE, PRINCIPLED, Calibration, Coating
 from ...sensors.camera import Led
-from .gel_mesh import MM, GelMesh, check_mesh
+from .gel_mesh import MM, GelMesh, triangle_mesh
 
 PIGMENT_INDEX = 1.5  # of the clear coat of a glossy paint: acrylic and polyurethane binders
 LEAST_STEP = 1e-3  # between indices: reflects a ten millionth
 # Of an LED's distance: Mitsuba samples a smaller sphere's cone to no better than 0.1 % in single precision.
 POINTLIKE = 0.01
 WALL_GAP = 1.0  # mm round the LEDs, and above them
+_BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}}
 
 
 def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, smooth: bool) -> Any:
     """Return the gel as a mesh of Mitsuba's with its coating; height : (H, W) m; smooth : give its vertices normals."""
-    vertices = mesh.vertices(height)
-    check_mesh(vertices, mesh.faces, mesh.count)
-    gel = mi.Mesh("gel", mesh.count, len(mesh.faces), has_vertex_normals=smooth)
-    values = mi.traverse(gel)
-    values["faces"], values["vertex_positions"] = mesh.faces.ravel(), vertices.ravel()
-    values.update()
+    gel = mesh.shape(mi, height, smooth=smooth)
     gel.set_bsdf(mi.load_dict(material(unit.coating, unit.gel_index)))
     return gel
 
@@ -75,7 +71,7 @@ def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[f
     radiance = [value / radius**2 for value in brightness]
     return {
         "type": "sphere", "center": to_scene(position), "radius": radius * MM,
-        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
+        "bsdf": _BLACK,
         "emitter": {"type": "area", "radiance": {"type": "rgb", "value": radiance}},
     }  # fmt: skip
 
@@ -132,19 +128,13 @@ def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
         frame = np.eye(4)
         frame[:3, 0], frame[:3, 1], frame[:3, 2] = across * half[1 - axis], up * half[2], normal
         frame[:3, 3] = middle - normal * half[axis]
-        found[f"wall_{name}"] = {
-            "type": "rectangle", "to_world": frame,
-            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}},
-        }  # fmt: skip
+        found[f"wall_{name}"] = {"type": "rectangle", "to_world": frame, "bsdf": _BLACK}
     return found
 
 
 def to_scene(place: Sequence[float]) -> list[float]:
     """Return a place right, down, toward the camera in m, in the scene's mm."""
     return [place[0] * MM, -place[1] * MM, place[2] * MM]
-
-
-_BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,11 +182,8 @@ NOTHING = Surroundings()
 
 
 def _mesh(mi: Any, name: str, body: Occluder) -> Any:
-    mesh = mi.Mesh(name, len(body.vertices), len(body.faces))
-    values = mi.traverse(mesh)
-    values["vertex_positions"] = (np.asarray(body.vertices) * [MM, -MM, MM]).astype(np.float32).ravel()
+    vertices = (np.asarray(body.vertices) * [MM, -MM, MM]).astype(np.float32)
     # Two axes keep their way and one turns: so do the faces, lest their outer side be the inner one.
-    values["faces"] = np.ascontiguousarray(body.faces[:, ::-1], np.uint32).ravel()
-    values.update()
+    mesh = triangle_mesh(mi, name, vertices, np.ascontiguousarray(body.faces[:, ::-1], np.uint32))
     mesh.set_bsdf(mi.load_dict(_BLACK))
     return mesh

@@ -1,4 +1,4 @@
-"""An integrator of our own for Mitsuba: a few even points of each emitter, shadows evened out, one coarse bounce.
+"""Our own light in Mitsuba's scenes: a few even points of each emitter, shadows evened out, one coarse bounce.
 
 It asks the scene's emitters and materials, so whatever shines or is painted takes part; Mitsuba's path integrator,
 given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and
@@ -12,7 +12,6 @@ from the flank they are easily followed. What an LED's light does near the mirro
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -20,7 +19,6 @@ import numpy as np
 
 from ...sensors.calibration import DIFFUSE, PRINCIPLED, Coating
 
-NAME = "tactile_leds"
 RING = 0.5  # share of a sphere's solid angle inside the ring
 RINGS, SPOKES = 4, 4  # directions of light that arrives by a bounce: even in solid angle, as most of it comes in low
 DIRECTIONS = RINGS * SPOKES
@@ -86,30 +84,6 @@ def bounced(
     sums = [dr.block_sum(light[k], DIRECTIONS) for k in range(3)]
     dr.eval(*sums)
     return np.stack([np.array(each) for each in sums], -1) / DIRECTIONS
-
-
-@functools.cache
-def register(mi: Any, variant: str) -> None:
-    """Make the integrator known to a variant of Mitsuba, by ``NAME``: direct light of each ray, for scene files too."""
-
-    class LedIntegrator(mi.SamplingIntegrator):
-        def __init__(self, properties: Any) -> None:
-            super().__init__(properties)
-            self.points = properties.get("points", 4)
-
-        def sample(self, scene: Any, sampler: Any, ray: Any, medium: Any = None, active: Any = True) -> tuple:
-            """Return the direct light of each ray; called by Mitsuba."""
-            hit = scene.ray_intersect(ray, active)
-            light = mi.Color3f(0)
-            for lit in direct(mi, scene, scene.emitters(), hit, self.points, sampler.next_1d()):
-                light += lit.open * lit.share
-            return light, hit.is_valid(), []
-
-        def to_string(self) -> str:
-            """Return the integrator's name, which Mitsuba prints."""
-            return f"LedIntegrator[points={self.points}]"
-
-    mi.register_integrator(NAME, LedIntegrator)
 
 
 NARROW = 0.2  # GGX's alpha: wider lobes are as wide as the bounce's directions lie apart

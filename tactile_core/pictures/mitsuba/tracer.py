@@ -12,13 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import TactileError
-from .gel_mesh import MM, GelMesh, check_mesh
+from .gel_mesh import MM, GelMesh, check_mesh, mend
 from .variant import LLVM, activate
 
 NEAREST_MM = 1.0  # nothing is nearer to the camera
 BEHIND_MM = 1e3  # nothing of the gel lies farther behind the plane of height zero
-MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
 class Tracer(abc.ABC):
@@ -28,12 +26,7 @@ class Tracer(abc.ABC):
         self.mesh, self.variant = mesh, variant
         self.camera = mesh.camera
         self.mi = activate(variant)
-        check_mesh(mesh.vertices(height), mesh.faces, mesh.count)
-        gel = self.mi.Mesh("gel", mesh.count, len(mesh.faces))
-        values = self.mi.traverse(gel)
-        values["faces"], values["vertex_positions"] = mesh.faces.ravel(), mesh.vertices(height).ravel()
-        values.update()
-        self.scene = self.mi.load_dict({"type": "scene", "gel": gel, **self.around()})
+        self.scene = self.mi.load_dict({"type": "scene", "gel": mesh.shape(self.mi, height), **self.around()})
         self.values = self.mi.traverse(self.scene)
 
     def around(self) -> dict[str, Any]:
@@ -134,14 +127,7 @@ class _ScalarTracer(Tracer):
 def _mended(place: np.ndarray, seen: np.ndarray, mesh: GelMesh) -> tuple[np.ndarray, np.ndarray]:
     """Places (H, W, 3) in the image frame, m, and what is seen from them, without holes.
 
-    A ray in a million slips between two triangles, which leaves its place at the origin, where no ray leads: its pixel
-    gets what its neighbour has. Raises TactileError where rays miss the gel.
+    Where a ray misses the gel its place is the origin, where no ray leads. Raises TactileError as ``mend`` does.
     """
-    missed = ~place.any(-1)
-    if missed.mean() > MOST_MISSED:
-        found = f"{missed.sum()} of {missed.size} rays miss it"
-        raise TactileError("gel mesh", found, "a gel that fills the picture", "Check heights and camera")
-    for row, column in np.argwhere(missed):
-        near = (row, column - 1 if column else 1)
-        place[row, column], seen[row, column] = place[near], seen[near]
+    mend(np.logical_not(place.any(-1)), place, seen)
     return place * np.array([1 / MM, -1 / (MM * mesh.up_scale), 1 / MM], np.float32), seen

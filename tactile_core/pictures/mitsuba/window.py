@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...geometry.catmull_rom import stencil
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
@@ -63,24 +64,9 @@ def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -
 
 def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
     """Interpolate (h, w, k) at fractional places by Catmull-Rom splines, edges held; exact at whole ones."""
-    i, j = np.floor(row).astype(int), np.floor(column).astype(int)
-    weights_row, weights_column = _catmull_rom(row - i), _catmull_rom(column - j)
-    found = np.zeros(row.shape + picture.shape[2:])
-    for a in range(4):
-        at_row = np.clip(i + a - 1, 0, picture.shape[0] - 1)
-        for b in range(4):
-            at_column = np.clip(j + b - 1, 0, picture.shape[1] - 1)
-            found += (weights_row[a] * weights_column[b])[..., None] * picture[at_row, at_column]
-    return found.astype(np.float32)
-
-
-def _catmull_rom(t: np.ndarray) -> list[np.ndarray]:
-    return [
-        0.5 * (-t + 2 * t**2 - t**3),
-        0.5 * (2 - 5 * t**2 + 3 * t**3),
-        0.5 * (t + 4 * t**2 - 3 * t**3),
-        0.5 * (t**3 - t**2),
-    ]
+    nodes, weights = stencil(picture.shape[:2], np.stack([row.ravel(), column.ravel()]), closed=False)
+    found = np.einsum("abn,abnk->nk", weights, picture.reshape(-1, picture.shape[2])[nodes])
+    return found.reshape(*row.shape, -1).astype(np.float32)
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,8 +8,7 @@ from benchmarks.mechanics.bonded_layer import GOLDEN_FORCE, quarter_disc
 
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
-from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
-from tactile_core.mechanics.solids.neo_hookean import NeoHookean
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, NeoHookean
 from tactile_core.sensors import Material
 
 RUBBER = Material(1e6, 0.49)

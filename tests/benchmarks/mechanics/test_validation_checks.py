@@ -8,7 +8,7 @@ from benchmarks.mechanics import fluid, hertz, incompressible, manufactured, ora
 from benchmarks.mechanics.golden import disc
 
 from tactile_core.accuracy import failed, order
-from tactile_core.mechanics.solids.neo_hookean import NeoHookean
+from tactile_core.mechanics.solids.finite_strain import NeoHookean
 
 
 @pytest.mark.parametrize("check", [patch, manufactured, fluid, symmetry], ids=lambda check: check.__name__[-12:])
