@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,62 +22,31 @@ COLUMNS = "N in one column or three (x, y, z), behind the column of time if ther
 ADVICE = "Leave in it what is measured beside the recording, in newtons"
 
 
-@dataclass(frozen=True, eq=False)
-class Force:
-    """Size (n,) N of a measured force at times (n,) s from the recording's first frame, which go forward."""
-
-    time: np.ndarray
-    size: np.ndarray
-
-    def at(self, time: np.ndarray) -> np.ndarray:
-        """Return the size (T,) N at times (T,) s, linear between those measured; NaN outside."""
-        return np.interp(time, self.time, self.size, left=np.nan, right=np.nan)
-
-
-def read_force(named: str, recording: Recording) -> Force:
+def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Read the force beside a recording: from a file, or from columns of the recording's own, ``"fx,fy,fz"``.
 
     A file of as many rows as the recording has frames needs no time. Where both know unix time, it places them beside
     each other; else both begin at once.
+    Returns rising times (n,) s from the recording's first frame, and the force's size (n,) N.
     Raises TactileError: no such file or column, other rows, a clock that does not overlap, and what cannot be newtons.
     """
-    if os.path.exists(named):
-        return _from_file(named, recording)
-    path, names = split(recording.path).file, [name.strip().lower() for name in named.split(",")]
+    own = not os.path.exists(named)
+    path, where = (split(recording.path).file, f"{recording.path}, {named}") if own else (named, named)
+    names = [name.strip().lower() for name in named.split(",")] if own else None
     table = _table(path, names)
-    picked = [[column for column in table.header if name in (column, column.partition("[")[0])] for name in names]
-    if not all(picked):
-        found = f"{named!r:.80}, neither a file nor columns of {path}"
-        raise TactileError("--force", found, "the force of a recording", "Check the path, or the names of the columns")
-    size = _size(f"{path}, {named}", table.columns([column for each in picked for column in each]), table.lines)
-    _check_rows(f"{path}, {named}", size, recording)
-    return Force(recording.time, size)
-
-
-def _from_file(path: str, recording: Recording) -> Force:
-    table = _table(path, None)
-    columns = table.columns(list(table.header))
-    count = columns.shape[1]
-    if not 1 <= count <= 4:
-        raise TactileError(path, f"{count} columns", COLUMNS, ADVICE)
-    size = _size(path, columns[:, count % 2 == 0 :], table.lines)
-    if count % 2:
-        _check_rows(path, size, recording)
-        return Force(recording.time, size)
-    time, start, _ = seconds_of(columns[:, 0])
-    if not np.isfinite(columns[:, 0]).all() or not (np.diff(time) > 0).all():
-        raise TactileError(f"{path}, column {table.header[0]!r}", "numbers that do not rise", "the time", ADVICE)
-    if start and recording.start_time:
-        time = time + (start - recording.start_time)
-    covered = (recording.time >= time[0]) & (recording.time <= time[-1])
-    if covered.mean() < SHARED:
-        found = f"{time[0]:.1f} to {time[-1]:.1f} s of the recording, {covered.mean():.0%} of its frames"
-        raise TactileError(path, found, f"at least {SHARED:.0%} of them", "Give the force that was measured meanwhile")
-    return Force(time, size)
+    columns = table.columns(list(table.header) if names is None else _picked(named, names, table))
+    timed = not own and columns.shape[1] in (2, 4)
+    size = _size(where, columns[:, int(timed) :], table.lines)
+    if timed:
+        return _beside(where, columns[:, 0], recording), size
+    if len(size) != len(recording) or np.isnan(recording.time).all():
+        expected = f"{len(recording):,}, as many as frames in {recording.path}, or a column of time"
+        raise TactileError(where, f"{len(size):,} rows", expected, ADVICE)
+    return recording.time, size
 
 
 def _table(path: str, names: list[str] | None) -> Table:
-    """Read a table of numbers: of a text whole, of other files the arrays of these names."""
+    """Read a table of numbers: a text whole, of other files the arrays of these names."""
     with opened(path) as (container, where, _, file):
         if container in ("csv", "json"):
             return read_json(where, file) if container == "json" else read_table(where, file)
@@ -89,10 +57,19 @@ def _table(path: str, names: list[str] | None) -> Table:
             return table_of(store, [name for name in names if name in held])
 
 
+def _picked(named: str, names: list[str], table: Table) -> list[str]:
+    """Return the table's columns of these names, all of an array's."""
+    picked = [[column for column in table.header if name in (column, column.partition("[")[0])] for name in names]
+    if not all(picked):
+        found = f"{named!r:.80}, neither a file nor columns of {table.path}"
+        raise TactileError("--force", found, "the force of a recording", "Check the path, or the names of the columns")
+    return [column for each in picked for column in each]
+
+
 def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
     """Return the length (n,) N of the force in one column or three (n, c)."""
     if columns.shape[1] not in (1, 3):
-        raise TactileError(where, f"{columns.shape[1]} columns of force", "one, or three", ADVICE)
+        raise TactileError(where, f"{columns.shape[1]} columns", COLUMNS, ADVICE)
     size = np.linalg.norm(columns, axis=1)
     if not np.isfinite(size).all():
         found = f"no number in row {lines[int(np.argmin(np.isfinite(size)))]}"
@@ -103,7 +80,15 @@ def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
     return size
 
 
-def _check_rows(where: str, size: np.ndarray, recording: Recording) -> None:
-    if len(size) != len(recording) or np.isnan(recording.time).all():
-        found, expected = f"{len(size):,} rows", f"{len(recording):,}, as many as frames in {recording.path}"
-        raise TactileError(where, found, f"{expected}, or a column of time", ADVICE)
+def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:
+    """Return times (n,) s from the recording's first frame of stamps (n,) of another clock."""
+    time, start, _ = seconds_of(stamps)
+    if not np.isfinite(stamps).all() or not (np.diff(time) > 0).all():
+        raise TactileError(f"{where}, column 1", "numbers that do not rise", "the time", ADVICE)
+    if start and recording.start_time:
+        time = time + (start - recording.start_time)
+    covered = ((recording.time >= time[0]) & (recording.time <= time[-1])).mean()
+    if covered < SHARED:
+        found = f"{time[0]:.1f} to {time[-1]:.1f} s of the recording, {covered:.0%} of its frames"
+        raise TactileError(where, found, f"at least {SHARED:.0%} of them", "Give the force that was measured meanwhile")
+    return time

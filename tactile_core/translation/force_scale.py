@@ -16,7 +16,7 @@ from .. import accuracy
 from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, read
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains
-from ..recordings.force_file import Force, read_force
+from ..recordings.force_file import read_force
 from ..recordings.polarity import spread_out
 from .translate import CHUNK, PreparedRows, RecordingPass
 from .translator import Translator
@@ -81,10 +81,13 @@ def with_stiffness(
     forces = [read_force(named, recording) for recording in recordings]
 
     def found_of(one: ElectrodeGains) -> ForceScale:
-        parts = [_translated(translator, recording, one, options) for recording in recordings]
-        translated = np.concatenate([size for _, size in parts])
-        times = [time for time, _ in parts]
-        return fit(translated, lambda lag: _measured(forces, times, lag), named)
+        times, sizes = zip(*(_translated(translator, recording, one, options) for recording in recordings), strict=True)
+
+        def measured(lag: float) -> np.ndarray:
+            pairs = zip(times, forces, strict=True)
+            return np.concatenate([np.interp(time + lag, *force, left=np.nan, right=np.nan) for time, force in pairs])
+
+        return fit(np.concatenate(sizes), measured, named)
 
     found, count = found_of(unit), len(unit.gain)
     plain = msgspec.structs.replace(unit, gain=[1.0] * count, offset_counts=[0.0] * count)
@@ -97,11 +100,6 @@ def with_stiffness(
         known = {"stiffness": round(found.scale, 4), "stiffness_error": round(found.error, 4)}
         unit = msgspec.structs.replace(unit, **known)
     return unit, found.describe()
-
-
-def _measured(forces: Sequence[Force], times: Sequence[np.ndarray], lag: float) -> np.ndarray:
-    """Measured force (n,) N at so many s, ``lag``, after the times (s) of each recording's frames."""
-    return np.concatenate([force.at(time + lag) for force, time in zip(forces, times, strict=True)])
 
 
 def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: str) -> ForceScale:
@@ -126,7 +124,7 @@ def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: 
         return float(np.abs(guess - force)[second].mean())
 
     return ForceScale(
-        scale, float(np.log(parts).std()), lag, correlations[lag],
+        scale, float(np.std(parts)) / scale, lag, correlations[lag],
         off(translated), off(scale * translated), off(float(np.median(force[first]))),
     )  # fmt: skip
 
