@@ -34,7 +34,11 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
     path, where = (split(recording.path).file, f"{recording.path}, {named}") if own else (named, named)
     names = [name.strip().lower() for name in named.split(",")] if own else None
     table = _table(path, names)
-    columns = table.columns(list(table.header) if names is None else _picked(named, names, table))
+    picked = [[column for column in table.header if name in (column, column.partition("[")[0])] for name in names or ()]
+    if not all(picked):
+        found, advice = f"{named!r:.80}, neither a file nor columns of {path}", "Check the path, or their names"
+        raise TactileError("--force", found, "the force of a recording", advice)
+    columns = table.columns([column for each in picked for column in each] if own else list(table.header))
     timed = not own and columns.shape[1] in (2, 4)
     size = _size(where, columns[:, int(timed) :], table.lines)
     if timed:
@@ -55,15 +59,6 @@ def _table(path: str, names: list[str] | None) -> Table:
         with open_store(where, container, file) as store:
             held = {name.lower() for name in store.shapes}
             return table_of(store, [name for name in names if name in held])
-
-
-def _picked(named: str, names: list[str], table: Table) -> list[str]:
-    """Return the table's columns of these names, all of an array's."""
-    picked = [[column for column in table.header if name in (column, column.partition("[")[0])] for name in names]
-    if not all(picked):
-        found = f"{named!r:.80}, neither a file nor columns of {table.path}"
-        raise TactileError("--force", found, "the force of a recording", "Check the path, or the names of the columns")
-    return [column for each in picked for column in each]
 
 
 def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:

@@ -164,7 +164,7 @@ def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
     """Return a unit with a known rest alone."""
     if rest is None:
         return None
-    source = "its own recording" if rest.recordings == 1 else f"the {rest.recordings} least pressed recordings"
+    source = f"the {rest.recordings} least pressed recordings" if rest.recordings else "a recording without contact"
     return _rest_alone(rest, f"rest from {source}")
 
 

@@ -62,8 +62,8 @@ class ForceScale:
         )
         if self.better:
             return f"stiffness: {said}"
-        together = self.correlation >= TOGETHER
-        why = "it makes the force no better where it was not fitted" if together else "the two do not go together"
+        apart = self.correlation < TOGETHER
+        why = "the two do not go together" if apart else "it makes the force no better where it was not fitted"
         return f"no stiffness is written, for {why}: {said}"
 
 
@@ -149,6 +149,5 @@ def _scale(translated: np.ndarray, force: np.ndarray) -> float:
 
 def _correlation(translated: np.ndarray, force: np.ndarray) -> float:
     known = np.isfinite(force)
-    if known.sum() < FEWEST_FRAMES or translated[known].std() == 0 or force[known].std() == 0:
-        return 0.0
-    return float(np.corrcoef(translated[known], force[known])[0, 1])
+    enough = known.sum() >= FEWEST_FRAMES and np.ptp(translated[known]) > 0 and np.ptp(force[known]) > 0
+    return float(np.corrcoef(translated[known], force[known])[0, 1]) if enough else 0.0

@@ -28,7 +28,8 @@ class UnitRest:
 
     The range is that of their less pressed half, or of their middle half.
 
-    pdc : counts, None where the recordings have none; recordings : number that rest was averaged over
+    pdc : counts, None where the recordings have none; recordings : number that rest was averaged over, none where it
+        was recorded by itself
     """
 
     counts: np.ndarray
@@ -76,7 +77,7 @@ def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
         found = f"E{spread.argmax() + 1} moves by {spread.max():.0f} counts"
         raise TactileError(path, found, f"an untouched finger, at most {UNIT_DRIFT:g}", "Record it without contact")
     pdc = None if recording.pdc is None else float(np.nanmedian(recording.pdc))
-    return UnitRest(level(readings), spread / 2, pdc, 1)
+    return UnitRest(level(readings), spread / 2, pdc, 0)
 
 
 def find_rest_sp(recordings: Sequence[Recording]) -> UnitRest:

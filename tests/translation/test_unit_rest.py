@@ -49,7 +49,7 @@ def test_an_untouched_finger_s_recording_is_its_rest_and_a_pressed_one_s_is_not(
     np.savez(tmp_path / "pressed.npz", electrodes=np.rint(REST + noise - np.linspace(0, 150, 300)[:, None]))
     np.savez(tmp_path / "tared.npz", electrodes=np.rint(noise))
     found = read_rest(str(tmp_path / "still.npz"))
-    assert np.abs(found.counts - REST).max() < 1 and found.pdc is None and found.recordings == 1
+    assert np.abs(found.counts - REST).max() < 1 and found.pdc is None and not found.recordings
     assert ((found.spread > 2) & (found.spread < 8)).all()  # half of what 98 % of the frames span, 2.3 deviations
     for name, said in (("pressed", "moves by 1[0-9]+ counts; expected an untouched finger"), ("tared", "raw counts")):
         with pytest.raises(TactileError, match=said):
