@@ -33,6 +33,9 @@ THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.3
 # The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
 # second (assumed: an idle finger drifted by .25 in 225 s, steadily).
 AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
+# Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s. A
+# change that is no larger is no contact.
+DRIFT_LEFT = 0.3
 # Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
@@ -53,13 +56,20 @@ class Film:
     conductivity: np.ndarray
 
     def changes(self, change: Changes, rest: Baseline) -> Changes:
-        """Return the changes (T, e) counts that a unit of typical films would show from the same rest."""
+        """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
+
+        None where they are no larger than what drifts leave.
+        """
         if self.thickness == 1 and not self.conductivity.any():
             return change
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
-            return divider.of_typical_film(change[frames], rest.at(frames), self.thickness, since_rest)
+            seen, still = change[frames], rest.at(frames)
+            found = divider.of_typical_film(seen, still, self.thickness, since_rest)
+            drift = divider.of_typical_film(seen, still, self.thickness) - found
+            unlike_drift = np.linalg.norm(found, axis=1) > DRIFT_LEFT * np.linalg.norm(drift, axis=1)
+            return found * unlike_drift[:, None]
 
         return Changes(len(change), of_typical_film)
 

@@ -74,6 +74,17 @@ def test_a_typical_unit_is_left_as_it_is():
     assert same.changes(whole, Baseline.constant(rest)) is whole
 
 
+def test_what_a_drift_leaves_is_no_contact():
+    """One conductivity leaves a tenth of an idle finger's drift here, in a pattern of its own; a contact stays."""
+    warm = divider.of_typical_film(np.zeros(19), REST_COUNTS, 1.0, 1 / 1.2)  # counts that the warmer fluid adds
+    uneven = 1 + 0.1 * np.random.default_rng(0).standard_normal(19)
+    touched = warm + 3 * contact_signals()[0] / np.linalg.norm(contact_signals()[0]) * np.linalg.norm(warm)
+    change = np.array([warm * uneven, touched])
+    found = film.Film(1.0, "", np.zeros(1), np.full(1, np.log(1.2)))
+    idle, pressed = found.changes(Changes(2, change.__getitem__), Baseline.constant(REST_COUNTS))[np.arange(2)]
+    assert not idle.any() and np.linalg.norm(pressed) > np.linalg.norm(warm)
+
+
 @pytest.mark.parametrize("thickness", [0.05, 30.0, np.nan])
 def test_impossible_films_are_refused(thickness, press):
     recording = assemble("press.npz", "NPZ", electrodes=press.electrodes, stamps=press.time)
@@ -155,6 +166,10 @@ def test_one_scale_by_half_of_a_measured_force_is_written_where_it_brings_the_ot
 
 
 def test_an_idle_finger_whose_fluid_warms_is_hardly_touched(forced):
-    """It drifts by 16 to 220 counts; with typical films, and drift between quiet parts alone, up to 4.4 N."""
+    """It drifts by 16 to 220 counts; with typical films, and drift between quiet parts alone, up to 4.4 N.
+
+    Its rest, taken before, is 30 counts off after some seconds, which a fluid's conductivity does not explain.
+    """
     _, (idle, rest), _ = forced
-    assert force_of(idle, rest).max() < 0.6
+    force = force_of(idle, rest)
+    assert force.max() < 0.6 and (force > 0).mean() < 0.5
