@@ -24,10 +24,9 @@ from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
-from ..mechanics.first_touch import first_touch_on_line, same_line
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import DEPTH_LIMIT, FRICTION, thickness_under
+from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, same_line, thickness_under
 from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer

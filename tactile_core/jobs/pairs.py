@@ -18,7 +18,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
-from ..mechanics.electrodes.law import SHEET
+from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
@@ -58,7 +58,7 @@ def make_pairs(
     progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
     place : where blocks are made, from the job's folder
-    electrodes : the law of their counts, of ``law.LAWS``; pair : the sensors, source and target
+    electrodes : the law of their counts, of ``biotac_sheet.LAWS``; pair : the sensors, source and target
     keep : words of ``pairs_file.KEEPABLE``
     Raises TactileError for a bad scene, count, or for parts of another scene or seed.
     """

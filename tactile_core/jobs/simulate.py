@@ -15,7 +15,7 @@ from typing import cast
 import msgspec
 
 from ..files import array_pack, atomic, checksummed
-from ..mechanics.electrodes.law import SHEET
+from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..simulation.scene import Scene, to_toml
@@ -62,7 +62,7 @@ def plan(
     """Return the job: the [recording] of a scene for each combination of the values in ``grid`` (``scene_grid``).
 
     seed : of the first recording, each has one more than that before it; keep : words of ``scene_recording.outputs``
-    electrodes : the law of their counts, of ``law.LAWS``
+    electrodes : the law of their counts, of ``biotac_sheet.LAWS``
     Raises TactileError for a bad scene, grid or place, before any work.
     """
     values = combinations(grid)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,19 +24,7 @@ class UnreachableError(TactileError):
     """A depth, or a force that needs one, beyond those that contacts are asked for."""
 
 
-class _Pressed(Protocol):
-    """A contact at a ``depth``, m, under a ``force`` (3,) N."""
-
-    @property
-    def depth(self) -> float:
-        """Depth past first touch, m."""
-
-    @property
-    def force(self) -> np.ndarray:
-        """Force (3,) N of the indenter."""
-
-
-_Found = TypeVar("_Found", bound=_Pressed)
+_Found = TypeVar("_Found", bound=Any)  # a contact at a ``depth``, m, under a ``force`` (3,) N
 
 
 def touch_at_force(

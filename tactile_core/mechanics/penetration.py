@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import TactileError
-from ..geometry.catmull_rom import on_grid
+from ..geometry.cubic_spline import on_grid
 from ..geometry.indenters import Indenter, Pose
-from .first_touch import in_front
+from .placement import in_front
 
 # What lattices hide under the tip of a body that they resolve: in 2,154 random contacts of nine indenters on both
 # sensors, with friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.

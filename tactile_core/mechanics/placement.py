@@ -1,6 +1,6 @@
-"""Placement of an indenter, the same unrolled place and angle on both sensors, and the thickness of a sensor there.
+"""Placement of an indenter, the same unrolled place and angle on both sensors; its way between poses, to first touch.
 
-The thickness is the reference for depth in per cent.
+Depth is counted from first touch; in per cent it is of the thickness of the sensor there.
 """
 
 from __future__ import annotations
@@ -10,8 +10,195 @@ import dataclasses
 import numpy as np
 
 from .. import sensors
+from ..errors import TactileError
+from ..geometry.cubic_spline import on_grid
 from ..geometry.indenters import Indenter, Pose, pose_on
-from .first_touch import first_touch
+from ..geometry.lattice import Lattice
+
+_ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
+_TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch
+_CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the true first place between them
+_MOST_PLACES = 12
+_FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
+_AROUND = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij")).reshape(2, -1)
+_MANY = 2**20  # more than a grid has columns: one number identifies a place (exactly, for they are sums of halves)
+_HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
+_CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
+_FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
+_LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
+_NEAREST = 16  # nodes with which the motion is tried first
+_NARROW = 2e-3  # m, four spacings of the coarser lattice, the BioTac's: a body this thin may pass between nodes
+_BESIDE = 1e-3  # m, at most from the line that a body's foremost point moves on to the node nearest to it
+_FRONT = 4e-3  # m, what lies this much behind the front is the far side of the sensor
+_MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
+_SAME = 1e-12  # m, sideways, of poses that differ in depth alone
+
+
+def same_place(first: Pose, second: Pose) -> bool:
+    """Return true if two poses are equal."""
+    return np.array_equal(first.apex, second.apex) and np.array_equal(first.axes, second.axes)
+
+
+def same_line(first: Pose, second: Pose) -> bool:
+    """Return true if two poses differ in depth alone."""
+    apart = second.apex - first.apex
+    sideways = apart - (apart @ first.direction) * first.direction
+    return bool(np.abs(sideways).max() < _SAME and np.array_equal(first.axes, second.axes))
+
+
+def between(first: Pose, second: Pose, share: float) -> Pose:
+    """Return the pose at a share 0..1 of the way: apex on a straight line, axes turned about one axis (Rodrigues)."""
+    apex = first.apex + share * (second.apex - first.apex)
+    turn = second.axes @ first.axes.T
+    twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
+    size = np.linalg.norm(twice)
+    angle = np.arctan2(size, np.trace(turn) - 1)
+    if size < 1e-15:
+        return Pose(apex, second.axes, second.push)
+    x, y, z = twice / size
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    part = np.eye(3) + np.sin(share * angle) * cross + (1 - np.cos(share * angle)) * (cross @ cross)
+    return Pose(apex, part @ first.axes, second.push)
+
+
+def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
+    """Find the additional distance, m, to first touch after an indenter has slid from ``pose``, itself at first touch.
+
+    Where it has slid off the sensor, as far as its motion is followed.
+    """
+    if same_line(pose, slid):
+        return 0.0
+    try:
+        return float((first_touch(lattice, indenter, slid).apex - pose.apex) @ slid.direction)
+    except TactileError:
+        return _FARTHEST
+
+
+def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
+    """Move a pose along its direction, in or out, until the indenter just touches the resting surface.
+
+    Between nodes the surface is the lattice's cubic (Catmull-Rom) interpolation. Raises TactileError for an indenter
+    that passes the sensor by.
+    """
+    rows, columns = lattice.shape
+    met = in_front(lattice.axes, indenter, pose, closed=lattice.closed) if indenter.least_side < _NARROW else None
+    pose, nodes = _on_nodes(lattice, np.empty((0, 3)) if met is None else met[1], indenter, pose)
+    tip = np.empty((0, 2)) if met is None or (nodes < len(lattice.rest)).all() else met[0]
+    nodes = nodes[nodes < rows * columns]
+    places = np.concatenate([np.array(np.divmod(nodes, columns), float), tip.T], axis=1)
+    for finer in _FINER if places.size else ():
+        tried = (places[:, :, None] + _AROUND[:, None] / finer).reshape(2, -1)
+        points = on_grid(lattice.axes, tried, closed=lattice.closed)
+        gap, _ = pose.distance(indenter, points)
+        best = np.argmin(gap.reshape(-1, _AROUND.shape[1]), axis=1) + np.arange(0, len(gap), _AROUND.shape[1])
+        best = best[gap[best] < gap[best].min() + _HIDDEN]
+        if len(best) > 1:  # neighbours find the same place
+            row, column = tried[:, best]
+            best = best[np.unique(_MANY * row + column, return_index=True)[1]]
+        places = tried[:, best]
+        pose = _advance(indenter, pose.moved(2 * min(gap[best].min(), 0.0)), points[best])
+    return pose
+
+
+def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
+    """Find the first touch of an indenter that comes along a pose's direction, wherever on that line the pose lies.
+
+    Raises TactileError where it passes the sensor by.
+    """
+    before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
+    return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
+
+
+def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
+    """Find where a body's foremost point meets a surface, also between nodes: place (1, 2) and point (1, 3) m.
+
+    axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
+    None where no node lies near its way.
+    """
+    foremost = pose.support(indenter, pose.direction)
+    along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
+    near = beside < _BESIDE
+    if not near.any():
+        return None
+    near &= along < along[near].min() + _FRONT
+    node = int(np.argmin(np.where(near, beside, np.inf)))
+    place = np.array([divmod(node, axes.shape[2])], float).T
+    for finer in _FINER:
+        tried = place + _AROUND / finer
+        points = on_grid(axes, tried, closed=closed)
+        best = int(np.argmin(_off_line(points, foremost, pose.direction)[1]))
+        place, point = tried[:, best : best + 1], points[best : best + 1]
+    return place.T, point
+
+
+def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates of points (n, 3) m along (n,) and beside (n,) m a line."""
+    arm = points - start
+    along = arm @ direction
+    return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)
+
+
+def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
+    """Find the pose at first touch of nodes or ``more`` points (j, 3) m, and those close then, nearest first."""
+    rest = np.concatenate([lattice.rest, more]) if len(more) else lattice.rest
+    for clear in _CLEAR:
+        away, reach = pose.moved(-clear), 2 * clear
+        nodes, gap = _near(lattice, more, indenter, away, reach)
+        if gap.min(initial=np.inf) > 0:
+            break
+    if len(nodes) < _NEAREST:
+        nodes, gap = _near(lattice, more, indenter, away, np.inf)
+    some = nodes[np.argsort(gap, kind="stable")[:_NEAREST]]
+    while True:
+        pose = _advance(indenter, away, rest[some])
+        if pose.distance(indenter, rest[some])[0].min() > _TOUCHES:  # it slides past them
+            pose, some = _advance(indenter, away, rest), np.arange(len(rest))
+            if pose.distance(indenter, rest)[0].min() > _MISSED:
+                raise TactileError("indenter", "it passes the sensor by", "a place and a lean that meet its surface")
+        travel = float(np.linalg.norm(pose.apex - away.apex))
+        if travel + _CLOSE > reach:
+            reach = travel + _CLOSE
+            nodes, gap = _near(lattice, more, indenter, away, reach)
+        reached = nodes[gap < travel + _CLOSE]  # no distance falls faster than the indenter moves
+        now, _ = pose.distance(indenter, rest[reached])
+        missed = reached[now < -_TOUCHES]
+        if len(missed):
+            missed = np.setdiff1d(missed, some)
+        if not len(missed):
+            order = np.argsort(now, kind="stable")[:_MOST_PLACES]
+            return pose, reached[order[now[order] < now[order[0]] + _CLOSE]]
+        some = np.r_[some, missed]
+
+
+def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, reach: float) -> tuple:
+    """Nodes (k,) and points after them that lie less than ``reach`` m outside an indenter, and distances (k,) m."""
+    nodes, gap = lattice.blocks.near(indenter, pose, reach)
+    if len(more):
+        nodes = np.concatenate([nodes, len(lattice.rest) + np.arange(len(more))])
+        gap = np.concatenate([gap, pose.distance(indenter, more)[0]])
+    return nodes, gap
+
+
+def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
+    """Move until the first of the points (n, 3) m is touched; at most ``_FARTHEST``, where it slides past them all.
+
+    Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
+    """
+    own, travel, left = pose.to_own(points), 0.0, _FARTHEST
+    ahead = pose.own_direction  # in its frame points come the other way
+    for _ in range(_ADVANCES):
+        gap, normal = indenter.distance(own)
+        step = smallest = float(gap.min())
+        if abs(smallest) < _TOUCHES:
+            break
+        if smallest > 0:
+            step = float((gap / np.maximum(normal @ ahead, _LEAST_RATE)).min())
+        step = min(step, left)
+        left -= step
+        travel += step
+        own -= step * ahead
+    return pose.moved(travel)
+
 
 FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, BioTac skin), taken for both sensors
 
@@ -49,12 +236,12 @@ def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = sensors.TARGET
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
 _DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
-_TOUCHES = 0.1e-3  # m: at first touch a node is mostly this near
+_HARDLY_APART = 0.1e-3  # m: at first touch a node is mostly this near
 
 
 def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
     """Return the thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
-    surface, reach = sensors.sensor_surface(sensor), _TOUCHES
+    surface, reach = sensors.sensor_surface(sensor), _HARDLY_APART
     nodes, gap = surface.blocks.near(indenter, pose, reach)
     while not len(nodes):
         reach *= 4

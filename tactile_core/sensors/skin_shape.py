@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from ..errors import TactileError
-from ..geometry.catmull_rom import catmull_rom
+from ..geometry.cubic_spline import catmull_rom
 from ..geometry.lattice import Lattice, cap_faces, grid_faces
 from .descriptor import of_kind
 from .fluid_sensor import Fluid

@@ -6,7 +6,7 @@ import functools
 
 import numpy as np
 
-from ..geometry.catmull_rom import on_grid
+from ..geometry.cubic_spline import on_grid
 from ..geometry.lattice import Lattice
 from .skin_shape import skin_of
 

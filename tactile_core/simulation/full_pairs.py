@@ -15,10 +15,9 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Box, Indenter, Ring
-from ..mechanics.first_touch import surface_drop
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at
+from ..mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, surface_drop
 from ..mechanics.solution import Solution, Step
 from ..mechanics.solve import solve, solve_path
 from ..sensors import SOURCE, TARGET

@@ -11,7 +11,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.law import SHEET, signal_of
+from ..mechanics.electrodes.biotac_sheet import SHEET, signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, depth_at, on_gel, pose_at
@@ -39,7 +39,7 @@ def press_rows(
     with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
     contacts of the same depth in place of those of the same force.
 
-    electrodes : their law, of ``law.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
+    electrodes : their law, of ``biotac_sheet.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
     """
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))

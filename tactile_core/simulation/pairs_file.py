@@ -14,7 +14,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked
-from ..mechanics.electrodes.law import LAWS
+from ..mechanics.electrodes.biotac_sheet import LAWS
 from ..sensors import PAIR
 from ..sensors.descriptor import OWN
 from ..sensors.descriptor import names as known_sensors

@@ -19,7 +19,7 @@ from ..files import array_pack, atomic
 from ..files.hdf5_writer import Disk
 from ..files.provenance import sha256
 from ..files.version import __version__
-from ..mechanics.electrodes.law import SHEET
+from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..sensors import PAIR, SOURCE, TARGET
 from ..sensors.fluid_sensor import FALLS
 from .pairs_file import FORMAT, KEEPABLE, NODES, SCALE

@@ -14,7 +14,7 @@ from ..errors import TactileError
 from ..files import atomic
 from ..files.version import __version__
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.law import SHEET, signal_of
+from ..mechanics.electrodes.biotac_sheet import SHEET, signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solution import Sensor, Solution, Tier
@@ -72,7 +72,7 @@ def simulate_recording(
     progress : called with (frames done, frames).
     keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default.
     loaded : a scene and its text in place of the file's, which is then named in messages alone.
-    electrodes : the law of their counts, of ``law.LAWS``.
+    electrodes : the law of their counts, of ``biotac_sheet.LAWS``.
     Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked,
     or tractions of another tier than the fast one.
     """

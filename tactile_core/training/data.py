@@ -8,7 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from ..mechanics.electrodes.law import rest_counts
+from ..mechanics.electrodes.biotac_sheet import rest_counts
 from ..sensors import COUNT_SIGN, PAIR, REST_COUNTS
 from ..sensors.readout import converted
 from ..simulation.pairs_file import Pairs, Split

@@ -17,7 +17,7 @@ sys.modules["bl_ext"] = types.ModuleType("bl_ext")
 sys.modules["bl_ext"].__path__ = sys.path[:1]
 if {package!r} == "tactile_core":
     del sys.modules["bl_ext"]
-from {package}.geometry.catmull_rom import on_grid
+from {package}.geometry.cubic_spline import on_grid
 nodes = np.stack(np.meshgrid(np.arange(4.0), np.arange(5.0), [0.0], indexing="ij"))[..., 0]
 print(on_grid(nodes, np.array([[1.5], [2.25]]), closed=False).round(6).tolist())
 """

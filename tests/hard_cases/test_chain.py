@@ -10,7 +10,7 @@ from hard_cases.case import TRANSLATION, Found, case
 from hard_cases.test_shapes import CONTACTS, HARD_OF, SHOWN
 from hard_cases.test_signals import prepared, translator
 from tactile_core import accuracy
-from tactile_core.mechanics.electrodes.law import signal_of
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
 from tactile_core.mechanics.force_search import UnreachableError
 from tactile_core.mechanics.solve import solve
 from tactile_core.recordings.flags import Flag

@@ -6,8 +6,7 @@ import pytest
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Pose, Ring, Sphere, pose_on
-from tactile_core.mechanics.first_touch import first_touch
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import Placement, first_touch, pose_at
 from tactile_core.sensors import shape_of
 
 DIGIT = shape_of("digit")

@@ -26,7 +26,7 @@ sys.path.insert(0, str(ROOT))
 from tactile_core import accuracy, sensors  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
-from tactile_core.mechanics.electrodes.law import signal_of  # noqa: E402
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of  # noqa: E402
 from tactile_core.mechanics.placement import Placement  # noqa: E402
 from tactile_core.mechanics.solution import Solution, Step  # noqa: E402
 from tactile_core.mechanics.solve import solve, solve_path  # noqa: E402

@@ -15,8 +15,7 @@ import numpy as np
 
 from tactile_core import accuracy, sensors
 from tactile_core.files import atomic
-from tactile_core.mechanics.first_touch import surface_drop
-from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, thickness_under
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, surface_drop, thickness_under
 from tactile_core.mechanics.solve import Sensor, Solution, Step, Tier, solve_path
 from tactile_core.simulation.pairs_file import SCALE, Pairs, quantise
 from tactile_core.simulation.scene import Scene

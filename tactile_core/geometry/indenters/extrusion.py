@@ -27,8 +27,6 @@ class Outline(NamedTuple):
 def disc(across: np.ndarray, radius: float) -> Outline:
     """Return the outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
     length = np.sqrt(np.einsum("ni,ni->n", across, across))
-    if length.min(initial=np.inf) >= NEAREST:
-        return Outline(length - radius, across / length[:, None], length)
     centre = length < NEAREST
     length = np.maximum(length, NEAREST)
     slope = across / length[:, None]

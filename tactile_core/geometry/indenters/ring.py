@@ -79,18 +79,13 @@ def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np
     """Distance (n,) m from the axis, direction from it (n, 2), arm from the circle (n, 2) m, its length (n,) m."""
     across = points[:, :2]
     around = np.sqrt(np.einsum("ni,ni->n", across, across))
-    if around.min(initial=np.inf) >= NEAREST:
-        radial = across / around[:, None]
-    else:
-        radial = across / np.maximum(around, NEAREST)[:, None]
-        radial[around < NEAREST] = [1.0, 0.0]
+    radial = across / np.maximum(around, NEAREST)[:, None]
+    radial[around < NEAREST] = [1.0, 0.0]
     arm = np.empty((len(points), 2))
     arm[:, 0], arm[:, 1] = around - radius, points[:, 2]
     length = np.sqrt(np.einsum("ni,ni->n", arm, arm))
-    if length.min(initial=np.inf) < NEAREST:
-        arm[length < NEAREST] = [0.0, -NEAREST]
-        length = np.maximum(length, NEAREST)
-    return around, radial, arm, length
+    arm[length < NEAREST] = [0.0, -NEAREST]
+    return around, radial, arm, np.maximum(length, NEAREST)
 
 
 def _square(vectors: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ thickness near an electrode is left out.
 
 The reduced sheet is cheap enough for every contact of a simulation. Galerkin's method: potentials are sought among the
 combinations of fixed fields, those of the electrodes at rest and the principal ones of sheets with random dents.
+``signal_of`` makes counts of it, or by a simpler law of gaps.
 """
 
 from __future__ import annotations
@@ -17,7 +18,9 @@ import functools
 import numpy as np
 
 from ... import sensors
+from ...errors import TactileError
 from ...geometry.lattice import Lattice, cap_faces
+from ...sensors import divider
 from ...sensors.fluid_sensor import FluidFilm
 from ...sensors.unrolling import closest_on_triangles
 from ..fast.contact_state import Contact
@@ -25,6 +28,7 @@ from ..fast.sensing_points import electrode_feet, sensing_nodes
 from ..solids.biotac_core import above_core
 from ..solids.hex_mesh import skin_mesh
 from ..solids.sparse_cholesky import factor
+from ..solution import Solution
 from .thin_sheet import ThinSheet, resistances
 
 FED = 4  # electrodes of the excitation
@@ -215,3 +219,32 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
         bell = np.exp(-((away / random.uniform(*_WIDTH)) ** 2))
         found.append(sheet.film - random.uniform(*_DEPTH) * bell + random.uniform(*_BULGE) * (1 - bell))
     return [np.maximum(films, sheet.fluid.thinnest) for films in found]
+
+
+SHEET, GAP = LAWS = ("sheet", "gap")
+
+
+def signal_of(contact: Contact | Solution, law: str = SHEET, sensor: str = sensors.SOURCE) -> np.ndarray:
+    """Noise-free change (e,) of the raw counts against rest, of a unit that rests at ``rest_counts``.
+
+    law : ``"sheet"``, the film as a conducting sheet, 3 ms; ``"gap"``, one over the film's thickness, at no cost
+    Raises TactileError for another law.
+    """
+    if law == SHEET:
+        films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
+        rest = rest_counts(sensor)
+        return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest
+    if law == GAP:
+        return signal_of_gaps(contact.electrode_gaps, sensor)
+    raise TactileError("electrodes", repr(law), ", ".join(LAWS))
+
+
+@functools.cache
+def rest_counts(sensor: str) -> np.ndarray:
+    """Counts at rest (e,) of a typical unit; of a sensor where they are not known, those of its conducting sheet."""
+    known = sensors.places_of(sensor).rest_counts
+    if np.isfinite(known).all():
+        return known
+    found, sheet = sensors.skin_of(sensor).descriptor, reduced_sheet(sensor)
+    impedance = sheet.at_rest + found.fluid.interface
+    return sensors.COUNT_MAX / (1 + impedance / found.readout.load)

@@ -12,13 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
-from ..first_touch import between, same_place
 from ..penetration import check_follows
+from ..placement import between, same_place
 from .active_set import UnsolvedError, Work
-from .candidates import Candidates, first_contact, project
 from .compliance import Compliance
 from .compliance_rows import ComplianceBlock, ComplianceRows, Rows, sensing_gaps
-from .contact_state import Contact, Loads, among, borne, sideways_share
+from .contact_state import Candidates, Contact, Loads, among, borne, first_contact, project, sideways_share
 from .contact_stiffness import ContactStiffness
 from .friction import Friction
 from .frictionless import Frictionless, Try

@@ -1,4 +1,7 @@
-"""State of a solved contact of an indenter with a sensor's surface."""
+"""States of an indenter's contact with a sensor's surface: the solved one, and the candidates that it is sought among.
+
+Candidates are the nodes that enter a solve; here is where they start, and what must be added to them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,8 @@ import functools
 
 import numpy as np
 
-from ...geometry.indenters import Pose
+from ...geometry.indenters import Indenter, Pose
+from ...geometry.indenters.indenter import lengths
 from .compliance import Compliance
 from .compliance_rows import sensing_gaps, surface_motion
 
@@ -103,3 +107,119 @@ def among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
     if not len(others):
         return np.zeros(len(nodes), bool)
     return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes
+
+
+# m, how far toward the second face of a concave crease its distance is measured: the least that finds it.
+_CREASE_PROBES = (10e-6, 40e-6, 120e-6, 400e-6)
+_MOST_LOOKS = 3  # for a node's second face: while it is still far from its place, only one may be seen (assumed)
+_SAME_FACE = 0.97  # cosine between the normal that was seen and the one found there
+_ARRIVED = 1e-8  # m, at which a point has landed
+_TRACE_STEPS = 6  # of sphere tracing: the start of an iteration needs no more
+_MET = 1e-10  # m, at which a point has met the indenter
+_SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well below a micrometre
+
+
+@dataclasses.dataclass
+class Candidates:
+    """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
+
+    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, see ``split``
+    active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
+    looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known
+    """
+
+    nodes: np.ndarray
+    displacement: np.ndarray
+    probe: np.ndarray
+    active: np.ndarray
+    inner: np.ndarray
+    looks: np.ndarray
+
+    @property
+    def faced(self) -> np.ndarray:
+        """Mark (k,) bool the nodes that need no further check: doubled ones, or ``split`` found one face alone."""
+        return self.looks >= _MOST_LOOKS
+
+    def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
+        """Take an iterate as the new first guess; ``active`` may go on with that of the inner points."""
+        self.displacement, self.active = displacement, active[: len(self.nodes)]
+
+    def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
+        """Let more nodes enter, all of them touching at first."""
+        self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
+        every = np.concatenate([self.nodes, nodes])
+        order = np.argsort(every, kind="stable")
+        self.nodes, self.looks = every[order], self.looks[order]
+        self.displacement = np.concatenate([self.displacement, displacement])[order]
+        self.probe = np.concatenate([self.probe, probe])[order]
+        self.active = np.concatenate([self.active, np.ones(len(nodes), bool)])[order]
+
+    def split(
+        self, at: np.ndarray, left: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray
+    ) -> None:
+        """Let nodes ``at`` (j,) touch two faces, where there are two: the one that they are at and the one they left.
+
+        left, normals : (j, 3), points of the faces that they left, and the normals there
+        Where the planes of two faces meet, a little away from one of them the other is the nearer one: there its
+        distance is measured.
+        """
+        self.looks[at] += 1
+        points = rest[at] + self.displacement[at]
+        gap, first = pose.distance(indenter, points)
+        crease = _meet(points - gap[:, None] * first, first, left, normals)
+        new, probe = np.zeros(len(at), bool), np.zeros_like(normals)
+        for reach in _CREASE_PROBES:
+            hit = ~new
+            for face, other in ((normals, first), (first, normals)):
+                _, found = pose.distance(indenter, crease + reach * other)
+                hit &= np.einsum("ai,ai->a", found, face) > _SAME_FACE
+            probe[hit], self.probe[at[hit]] = reach * first[hit], reach * normals[hit]
+            new |= hit
+        self.looks[at[new]] = _MOST_LOOKS
+        self.displacement[at[new]] = (crease - rest[at])[new]
+        self.add(self.nodes[at[new]], self.displacement[at[new]], probe[new])
+
+
+def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """The places (j, 3) nearest to points of planes with normals ``first`` that lie in other planes as well."""
+    across = second - np.einsum("ai,ai->a", second, first)[:, None] * first
+    way = np.einsum("ai,ai->a", others - points, second) / np.einsum("ai,ai->a", across, second)
+    return points + way[:, None] * across
+
+
+def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
+    """Return the displacements (n, 3) m along the motion that bring points (n, 3) m to an indenter's front at ``pose``.
+
+    far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
+    """
+    own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
+    ahead = pose.own_direction
+    for _ in range(_TRACE_STEPS):
+        place = own.take(on_way, axis=0) + travel[on_way, None] * ahead
+        gap, _ = indenter.distance(place)
+        travel[on_way] -= np.maximum(gap, 0)
+        on_way = on_way[(gap > _ARRIVED) & (travel[on_way] > 0)]
+        if not len(on_way):
+            break
+    return np.maximum(travel, 0)[:, None] * pose.direction
+
+
+def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Return where (n, 3), in its frame, nodes that move from ``first`` to ``last`` (n, 3) m first meet an indenter.
+
+    Points that it does not meet are given as they stand at the end.
+    """
+    way = last - first
+    share, on_way = np.zeros(len(first)), np.arange(len(first))
+    start, ahead, gone, length = first, way, share.copy(), np.maximum(lengths(way), 1e-12)  # of those on their way
+    for _ in range(_SPOT_STEPS):
+        gap, _ = indenter.distance(start + gone[:, None] * ahead)
+        gone = np.minimum(gone + np.maximum(gap, 0) / length, 1)
+        share[on_way] = gone
+        left = np.flatnonzero((gap > _MET) & (gone < 1))
+        if not len(left):
+            break
+        if len(left) < len(on_way):
+            on_way, start, ahead = on_way[left], start.take(left, axis=0), ahead.take(left, axis=0)
+            gone, length = gone[left], length[left]
+    return first + share[:, None] * way

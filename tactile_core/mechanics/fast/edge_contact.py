@@ -12,16 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...geometry.catmull_rom import stencil
+from ...geometry.cubic_spline import stencil
 from ...geometry.indenters import Indenter, Pose
 from ...geometry.lattice import Lattice
 from ..penetration import SLACK, check_follows, penetration_between
 from .active_set import Work
-from .candidates import Candidates
 from .compliance import Compliance
 from .compliance_rows import ComplianceBlock, ComplianceRows
 from .contact import ContactProblem
-from .contact_state import Contact, Loads
+from .contact_state import Candidates, Contact, Loads
 from .frictionless import Frictionless, Try
 
 # Of a spring, over a surface node's by itself: of 14 rings 1 to 1.9 mm deep 13 settled with 10, all with 20, which left

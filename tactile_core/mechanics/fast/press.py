@@ -10,9 +10,9 @@ import numpy as np
 
 from ...errors import TactileError
 from ...geometry.indenters import Indenter, Pose
-from ..first_touch import same_line, surface_drop
 from ..force_search import FORCE_TOLERANCE, touch_at_force
 from ..penetration import BENDS, PenetrationError, sharpest
+from ..placement import same_line, surface_drop
 from .active_set import ExhaustedError, UnsolvedError, Work
 from .compliance import Compliance
 from .contact import ContactProblem

@@ -9,12 +9,12 @@ yields, at most mu times its normal force over ``grip``.
 from __future__ import annotations
 
 import dataclasses
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
-from ..fast.candidates import first_contact
+from ..fast.contact_state import first_contact
 
 _NO_WAY = np.zeros((0, 3))
 
@@ -37,7 +37,7 @@ class ContactSet:
     pressing: np.ndarray
     rubbing: np.ndarray
     normals: np.ndarray
-    obstacle: Obstacle | None = None
+    obstacle: Any = None  # an ``Obstacle``, which every set with candidates has; friction is with a ``PlacedIndenter``
     friction: float = 0.0
     grip: float = 0.0
     imbalance: float = 0.0
@@ -57,18 +57,6 @@ class ContactSet:
         return cls(np.empty(0, int), flags, flags, _NO_WAY, np.empty(0), _NO_WAY, _NO_WAY)
 
     @property
-    def _met(self) -> Obstacle:
-        """The obstacle, which every set with candidates has."""
-        assert self.obstacle is not None
-        return self.obstacle
-
-    @property
-    def _indenter(self) -> PlacedIndenter:
-        """The obstacle as an indenter: friction is with nothing else."""
-        assert isinstance(self.obstacle, PlacedIndenter)
-        return self.obstacle
-
-    @property
     def nodes(self) -> np.ndarray:
         """Mesh nodes (k,) that touch."""
         return self.candidates[self.active]
@@ -85,7 +73,7 @@ class ContactSet:
 
     def gaps(self, at: np.ndarray) -> np.ndarray:
         """Return gaps (m,) m of all candidates, negative in the obstacle; at (n, 3) m: the mesh's nodes."""
-        return self._met.distance(at[self.candidates])[0] if len(self.candidates) else np.empty(0)
+        return self.obstacle.distance(at[self.candidates])[0] if len(self.candidates) else np.empty(0)
 
     def carried(
         self,
@@ -124,8 +112,8 @@ class ContactSet:
 
     def _tie(self, fresh: np.ndarray, at: np.ndarray) -> None:
         """Anchor nodes where they meet the obstacle, which moves onto them in this load step."""
-        last = self._indenter.pose.to_own(at[self.candidates[fresh]])
-        self.anchor[fresh] = first_contact(self._indenter.indenter, self._stood[fresh], last)
+        last = self.obstacle.pose.to_own(at[self.candidates[fresh]])
+        self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 
     def begin(self, at: np.ndarray) -> np.ndarray:
         """Look at the obstacle from where the nodes are; frames (k, 3, 3) with the normal as first axis.
@@ -135,7 +123,7 @@ class ContactSet:
         if not len(self.candidates):
             self._distance, self._frames = np.empty(0), np.empty((0, 3, 3))
             return self._frames
-        self._distance, self.normals = self._met.distance(at[self.nodes])
+        self._distance, self.normals = self.obstacle.distance(at[self.nodes])
         helper = np.eye(3)[np.argmin(np.abs(self.normals), axis=1)]
         first = np.cross(self.normals, helper)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
@@ -147,7 +135,7 @@ class ContactSet:
 
     def _look(self, at: np.ndarray) -> None:
         """Measure how far nodes are from their anchors, along the obstacle."""
-        away = at[self.nodes] - self._indenter.pose.from_own(self.anchor[self.active])
+        away = at[self.nodes] - self.obstacle.pose.from_own(self.anchor[self.active])
         self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
 
     def _rub(self) -> None:
@@ -193,7 +181,7 @@ class ContactSet:
         """
         if not self.active.any():
             return np.empty((0, 3, 3))
-        return self.pressing[:, None, None] * self._met.curvature(
+        return self.pressing[:, None, None] * self.obstacle.curvature(
             at[self.nodes] - self._distance[:, None] * self.normals
         )
 
@@ -246,7 +234,7 @@ class ContactSet:
         """Release nodes in tension, add nodes that penetrate; returns true if there is none. tolerance : m, of gaps."""
         if not len(self.candidates):
             return True
-        distance, normal = self._met.distance(at[self.candidates])
+        distance, normal = self.obstacle.distance(at[self.candidates])
         pressing = np.zeros(len(distance))
         pressing[self.active] = self.pressing
         release, enter = self.active & (pressing < 0), ~self.active & (distance < -tolerance)

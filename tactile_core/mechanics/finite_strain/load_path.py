@@ -14,9 +14,9 @@ from ...sensors import sensor_surface, skin_of
 from .. import error_estimate
 from ..electrodes.biotac_sheet import biotac_sheet
 from ..fast.sensing_points import electrode_feet
-from ..first_touch import same_line, surface_drop
 from ..force_search import touch_at_force
 from ..penetration import PenetrationError, sharpest
+from ..placement import same_line, surface_drop
 from ..solution import OnDemand, Sensor, Solution, Step, centre_of_pressure
 from .body import FRICTION_STEP, ONE_STEP, Body, graded_body
 from .newton import FiniteStrainContact

@@ -14,8 +14,8 @@ import dataclasses
 import numpy as np
 
 from ...geometry.indenters import Indenter, Pose
-from ..first_touch import between
 from ..penetration import BEHIND
+from ..placement import between
 from ..solids.finite_strain import FiniteStrainSolid, State
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.sparse_cholesky import DampedFactor, LinearSystem, NotPositiveDefiniteError, PatternFactor, held_back

@@ -11,7 +11,7 @@ import dataclasses
 import numpy as np
 
 from ... import sensors
-from ...geometry.catmull_rom import catmull_rom
+from ...geometry.cubic_spline import catmull_rom
 from ...sensors.gel_shape import GelShape
 from .block_pattern import BlockPattern
 from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid

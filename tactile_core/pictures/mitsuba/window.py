@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...geometry.catmull_rom import stencil
+from ...geometry.cubic_spline import stencil
 from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.electrodes.law import GAP, SHEET, rest_counts, signal_of
+from tactile_core.mechanics.electrodes.biotac_sheet import GAP, SHEET, rest_counts, signal_of
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tactile_core.geometry.catmull_rom import on_grid
+from tactile_core.geometry.cubic_spline import on_grid
 from tactile_core.geometry.indenters import Ring, Sphere
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem

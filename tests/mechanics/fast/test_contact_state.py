@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tactile_core.geometry.indenters import BumpyCube, Pose, Ring
-from tactile_core.mechanics.fast.candidates import Candidates
+from tactile_core.mechanics.fast.contact_state import Candidates
 
 BUMPY = BumpyCube(14e-3, 0.5e-3, 1.5e-3, 1e-3, 4e-3)
 HERE = Pose(np.zeros(3), np.eye(3))
