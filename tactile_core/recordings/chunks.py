@@ -11,7 +11,8 @@ from .array_store import Store, open_hdf5
 from .assemble import check_electrodes
 from .bags.bag import open_bag
 from .bags.bag_recordings import read_bag
-from .readers import layout_of, names, opened, read, table_reader
+from .opened_file import opened
+from .readers import layout_of, names, read, table_reader
 from .recording import Recording, split
 from .tables.column_map import ColumnMap, refuse_other
 from .tables.table import read_header, read_tables

@@ -7,7 +7,7 @@ import os
 import numpy as np
 
 from ..errors import TactileError
-from .readers import opened
+from .opened_file import opened
 from .recording import Recording, split
 from .tables.array_table import table_of
 from .tables.json_table import read_json

@@ -2,55 +2,37 @@
 
 from __future__ import annotations
 
-import io
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Collection, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from types import ModuleType
-from typing import BinaryIO, NamedTuple
 
 from ..errors import TactileError
-from ..files import outside
-from ..files.hdf5_checked import SIGNATURE
 from ..files.registry import modules_of
 from ..sensors import SOURCE, electrode_count, title
 from . import formats
-from .array_store import NPY, Store, open_hdf5, open_npz
+from .array_store import Store, open_hdf5, open_npz
 from .assemble import check_electrodes
-from .bags.bag import START_BYTES, is_bag_folder, kind_of, open_bag
+from .bags.bag import open_bag
 from .bags.bag_recordings import names_of, read_bag, streams_of
+from .opened_file import opened, refuse_finger
 from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
 from .tables.column_map import ColumnMap, refuse_other
-from .tables.json_table import is_json, read_json
+from .tables.json_table import read_json
 from .tables.mapped import read_mapped
 from .tables.mapped_files import read_by_map
-from .tables.matlab import START, START_OF_HDF5, open_matlab
+from .tables.matlab import open_matlab
 from .tables.table import Table, read_header, read_table
 from .tables.table_header import NUMBERED
 from .tables.truncated_cell import shown
-from .tables.unpacked import unpacked
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
 PAC = re.compile(r"pac\d+")
-ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
-PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
-
-
-class Opened(NamedTuple):
-    """Open file of recordings. container : csv, json, hdf5, npz, mat or bag; path : the file's
-
-    finger : requested, or None; file : its bytes from the start; none of a bag that is a folder
-    """
-
-    container: str
-    path: str
-    finger: int | None
-    file: BinaryIO
 
 
 @cache
@@ -91,7 +73,7 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
     with opened(path) as (container, where, finger, file):
         if columns is not None:
             refuse_other(path, container, columns)
-            _refuse_finger(where, finger)
+            refuse_finger(where, finger)
             return read_by_map(where, container, file, columns, partial(_unneeded, columns) if lean else None)
         if container == "hdf5":
             with open_hdf5(where) as store:
@@ -229,83 +211,6 @@ def names(store: Store) -> set[str]:
     return {*store.shapes, f"format={store.attributes.get('format', '')}"}
 
 
-@contextmanager
-def _reading(path: str) -> Iterator[None]:
-    """Turn errors of the operating system into a TactileError."""
-    try:
-        yield
-    except OSError as error:
-        raise TactileError(
-            path, error.strerror or str(error), "a readable file", "Check the path and its permissions"
-        ) from error
-    except MemoryError as error:
-        raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
-
-
-@contextmanager
-def opened(path: str) -> Iterator[Opened]:
-    """Open a file of recordings once, and detect what it is from its first bytes.
-
-    Raises TactileError for what is no file, and for errors of the operating system while it is open.
-    """
-    with _reading(path):
-        file, finger, topic = split(path)
-        if is_bag_folder(file):
-            yield Opened("bag", file, finger, io.BytesIO())
-            return
-        _check_file(file)
-        with outside.open_file(file, "a recording") as stream, unpacked(file, stream) as plain:
-            start = plain.read(START_BYTES)
-            for packed, program in PACKED.items():
-                if start.startswith(packed):
-                    raise TactileError(file, "a packed file", "a recording, or a gzipped text", f"Unpack it: {program}")
-            container = _container(start)
-            if plain is not stream and container not in ("csv", "json"):
-                raise TactileError(file, f"a gzipped file ({container})", "a gzipped text", "Unpack it: gunzip")
-            if container in ("hdf5", "npz"):
-                _refuse_finger(file, finger)
-            if topic and container != "bag":
-                raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
-            plain.seek(0)
-            yield Opened(container, file, finger, plain)
-
-
-def container_of(path: str) -> str:
-    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
-    with opened(path) as found:
-        return found.container
-
-
-def _check_file(path: str) -> None:
-    if os.path.isdir(path):
-        scene = os.path.isfile(os.path.join(path, "scene.toml"))
-        advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
-        raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
-    if not os.path.exists(path):
-        advice = "Check the path; to try with a recording that ships: tactile scenes copy press_roll_slide"
-        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)", advice)
-    if not os.path.isfile(path):
-        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)")
-
-
-def _container(start: bytes) -> str:
-    """Return the container that begins with these bytes; anything but a known signature is a table of text."""
-    if kind_of(start) is not None:
-        return "bag"
-    if start.startswith(START):
-        return "mat"
-    if start.startswith((SIGNATURE, START_OF_HDF5)):
-        return "hdf5"
-    if start.startswith((*ZIP_STARTS, NPY)):
-        return "npz"
-    return "json" if is_json(start) else "csv"
-
-
-def _refuse_finger(path: str, finger: int | None) -> None:
-    if finger is not None:
-        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
-
-
 def table_reader(
     path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
 ) -> Callable[[Table], Recording]:
@@ -321,7 +226,7 @@ def table_reader(
         if _holds_hands(layout):
             return partial(_read_finger, layout, finger=finger)
         reader = layout.read
-    _refuse_finger(path, finger)
+    refuse_finger(path, finger)
     return reader
 
 

@@ -18,7 +18,7 @@ from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
-from tactile_core.recordings.readers import opened
+from tactile_core.recordings.opened_file import opened
 from tactile_core.recordings.tables import column_map
 from tactile_core.recordings.tables.mapped_files import guess_map
 

@@ -83,7 +83,7 @@ def _unit(path: str) -> SensorFile:
 
 def _write_columns(options: argparse.Namespace) -> None:
     """Write the map that the first recording suggests."""
-    from ...recordings.readers import opened
+    from ...recordings.opened_file import opened
     from ...recordings.tables import column_map
     from ...recordings.tables.mapped_files import guess_map
 

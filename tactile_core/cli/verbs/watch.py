@@ -81,7 +81,8 @@ def run(options: argparse.Namespace) -> int:
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
     from ...recordings import PrepareOptions
-    from ...recordings.readers import container_of, sensor_of_first
+    from ...recordings.opened_file import container_of
+    from ...recordings.readers import sensor_of_first
     from ...recordings.tables.column_map import refuse_other
 
     _check(options)
@@ -131,7 +132,7 @@ def _check(options: argparse.Namespace) -> None:
     if options.out is not None:
         _check_out(options.out)
     if options.rosbag_play is not None:
-        from ...recordings.readers import container_of
+        from ...recordings.opened_file import container_of
 
         if container_of(options.rosbag_play) != "bag":
             raise TactileError(options.rosbag_play, "no bag", "a ROS 1 or 2 bag, or MCAP", "Play others with --play")

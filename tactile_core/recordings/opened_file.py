@@ -1,0 +1,112 @@
+"""Open a file of recordings once, and detect what it is from its first bytes, not from its name."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import BinaryIO, NamedTuple
+
+from ..errors import TactileError
+from ..files import outside
+from ..files.hdf5_checked import SIGNATURE
+from .array_store import NPY
+from .bags.bag import START_BYTES, is_bag_folder, kind_of
+from .recording import split
+from .tables.json_table import is_json
+from .tables.matlab import START, START_OF_HDF5
+from .tables.unpacked import unpacked
+
+ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
+PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
+
+
+class Opened(NamedTuple):
+    """Open file of recordings. container : csv, json, hdf5, npz, mat or bag; path : the file's
+
+    finger : requested, or None; file : its bytes from the start; none of a bag that is a folder
+    """
+
+    container: str
+    path: str
+    finger: int | None
+    file: BinaryIO
+
+
+@contextmanager
+def _reading(path: str) -> Iterator[None]:
+    """Turn errors of the operating system into a TactileError."""
+    try:
+        yield
+    except OSError as error:
+        raise TactileError(
+            path, error.strerror or str(error), "a readable file", "Check the path and its permissions"
+        ) from error
+    except MemoryError as error:
+        raise TactileError(path, "too large for this machine's memory", advice="Split the recording") from error
+
+
+@contextmanager
+def opened(path: str) -> Iterator[Opened]:
+    """Open a file of recordings once, and detect what it is from its first bytes.
+
+    Raises TactileError for what is no file, and for errors of the operating system while it is open.
+    """
+    with _reading(path):
+        file, finger, topic = split(path)
+        if is_bag_folder(file):
+            yield Opened("bag", file, finger, io.BytesIO())
+            return
+        _check_file(file)
+        with outside.open_file(file, "a recording") as stream, unpacked(file, stream) as plain:
+            start = plain.read(START_BYTES)
+            for packed, program in PACKED.items():
+                if start.startswith(packed):
+                    raise TactileError(file, "a packed file", "a recording, or a gzipped text", f"Unpack it: {program}")
+            container = _container(start)
+            if plain is not stream and container not in ("csv", "json"):
+                raise TactileError(file, f"a gzipped file ({container})", "a gzipped text", "Unpack it: gunzip")
+            if container in ("hdf5", "npz"):
+                refuse_finger(file, finger)
+            if topic and container != "bag":
+                raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
+            plain.seek(0)
+            yield Opened(container, file, finger, plain)
+
+
+def container_of(path: str) -> str:
+    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
+    with opened(path) as found:
+        return found.container
+
+
+def _check_file(path: str) -> None:
+    if os.path.isdir(path):
+        scene = os.path.isfile(os.path.join(path, "scene.toml"))
+        advice = "Simulate it first: tactile simulate" if scene else "Name the recording inside the folder"
+        raise TactileError(path, "a scene" if scene else "a folder", "one recording file", advice)
+    if not os.path.exists(path):
+        advice = "Check the path; to try with a recording that ships: tactile scenes copy press_roll_slide"
+        raise TactileError(path, "there is no such file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)", advice)
+    if not os.path.isfile(path):
+        raise TactileError(path, "not a regular file", "a recording (CSV, HDF5, NPZ, MAT, JSON or bag)")
+
+
+def _container(start: bytes) -> str:
+    """Return the container that begins with these bytes; anything but a known signature is a table of text."""
+    if kind_of(start) is not None:
+        return "bag"
+    if start.startswith(START):
+        return "mat"
+    if start.startswith((SIGNATURE, START_OF_HDF5)):
+        return "hdf5"
+    if start.startswith((*ZIP_STARTS, NPY)):
+        return "npz"
+    return "json" if is_json(start) else "csv"
+
+
+def refuse_finger(path: str, finger: int | None) -> None:
+    """Raise TactileError where a finger is asked of a file of one."""
+    if finger is not None:
+        raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
