@@ -186,5 +186,5 @@ def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) ->
 def contact_radius(contact: FiniteStrainContact, touch: ContactState) -> float:
     """Radius at rest, m: halfway between the last node that touches and the first that does not."""
     radii = np.sort(contact.solid.mesh.nodes[contact.touchable, 0])
-    last = int(np.searchsorted(radii, contact.solid.mesh.nodes[touch.nodes, 0].max()))
+    last = int(np.searchsorted(radii, contact.solid.mesh.nodes[touch.outer.nodes, 0].max()))
     return float(radii[last : last + 2].mean())

@@ -77,7 +77,7 @@ class Body:
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)
-        normals = touch.normals[touch.pressing > 0]
+        normals = touch.outer.normals[touch.outer.pressing > 0]
         check_follows(where, surface, indenter, touch.pose, touch.depth, normals, closed=closed)
         return penetration_between(where, surface, indenter, touch.pose, touch.depth, closed=closed)
 
@@ -88,7 +88,7 @@ class Body:
 
     def contact_patch(self, touch: ContactState) -> np.ndarray:
         """Mark (n,) bool the lattice nodes that carry force."""
-        flags = np.isin(self.solid.mesh.surface, touch.nodes[touch.pressing > 0])
+        flags = np.isin(self.solid.mesh.surface, touch.outer.nodes[touch.outer.pressing > 0])
         return self.graded.nearest_on_lattice(flags)
 
 

@@ -144,14 +144,14 @@ class LoadPath:
         below = self.body.penetration_depth(touch, self.indenter)
         gap = touch.outer.gaps(mesh.nodes + touch.state.displacement)
         table = error_estimate.expected_error(self.tier, self.sensor, touch.depth / self.thickness)
-        pressing = int((touch.pressing > 0).sum())
+        pressing = int((touch.outer.pressing > 0).sum())
         stated = error_estimate.of_finite_strain(table, touch.depth, pressing, self._nodes_across(touch), below)
         slips = touch.outer.slipping[touch.outer.active]
         skin = len(mesh.inner) > 0
         return Solution(
             self.tier, True, touch.iterations, self.body.displacement(touch), self.body.contact_patch(touch),
             self.thickness, touch.force, float(touch.force @ touch.pose.direction), touch.depth, touch.fluid,
-            centre_of_pressure(mesh.nodes[touch.nodes], touch.outer.forces), float(-gap.min(initial=0.0)),
+            centre_of_pressure(mesh.nodes[touch.outer.nodes], touch.outer.forces), float(-gap.min(initial=0.0)),
             float(slips.mean()) if len(slips) and self.friction else 0.0, len(touch.inner.nodes),
             OnDemand(
                 electrode_gaps=functools.partial(_electrode_gaps, self.body, touch) if skin else _nothing,

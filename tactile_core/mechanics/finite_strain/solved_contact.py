@@ -34,21 +34,6 @@ class ContactState:
     steps: int = 0
 
     @property
-    def nodes(self) -> np.ndarray:
-        """Mesh nodes (k,) that the indenter touches."""
-        return self.outer.nodes
-
-    @property
-    def pressing(self) -> np.ndarray:
-        """Normal forces (k,) N of the indenter on ``nodes``."""
-        return self.outer.pressing
-
-    @property
-    def normals(self) -> np.ndarray:
-        """Normals (k, 3) of the indenter at ``nodes``."""
-        return self.outer.normals
-
-    @property
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
         return self.outer.forces.sum(axis=0) + self.push.total

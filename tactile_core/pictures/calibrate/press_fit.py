@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,20 +15,14 @@ START_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-7, 1e6
 EASIER, HARDER = 0.2, 8.0  # factors of the damping after a step that helped, and after one that did not
 
 
-class Problem(Protocol):
-    """A sum of squares over parameters x (n,)."""
-
-    def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares at x; infinity where x is meaningless."""
-
-    def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last accepted x."""
-
-
 def minimise(
-    problem: Problem, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
+    problem: Any, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, float]:
-    """Find a minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``."""
+    """Find a minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``.
+
+    problem : a sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless;
+        ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last accepted x
+    """
     cost, damping = problem.cost(x), START_DAMPING
     for step in range(most):
         matrix, gradient = problem.normal_equations(x)
