@@ -25,6 +25,7 @@ from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
 from ..sensors.gel_sensor import GelSensor
 from ..simulation.pairs_writer import Made, card, card_path, merge
+from ..simulation.random_bodies import NAME
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import run as runs
@@ -94,7 +95,8 @@ def plan(
     job = jobs.make(
         inputs, Pairs(count, seed, surfaces, files, cast(Law, electrodes), source, target, list(keep)), None
     )
-    return job, [spec.name for spec in scene.indenters], text
+    names = [spec.name for spec in scene.indenters]
+    return job, names + [NAME] * (scene.pairs.random_bodies > 0), text
 
 
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:

@@ -19,6 +19,7 @@ from ..mechanics.solution import Sensor, Solution, Step
 from ..mechanics.solve import solve_path
 from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from .pairs_file import quantise
+from .random_bodies import random_body
 from .scene import PairSpec, Scene
 
 _SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
@@ -43,8 +44,7 @@ def press_rows(
     """
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
-    which = int(random.integers(len(scene.indenters)))
-    indenter = scene.indenters[which].build()
+    which, indenter = _draw_body(random, scene, spec)
     place = draw_place(random, spec, pair[1])
     rows: list[dict[str, np.ndarray]] = []
     stood = np.array(dataclasses.astuple(place), np.float32)
@@ -58,6 +58,14 @@ def press_rows(
         }
         rows.append({**named, **pair_row(biotac, digit, electrodes, pair, keep)})
     return rows
+
+
+def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tuple[int, Indenter]:
+    """Draw a press's body and its number: one of the scene's, or, behind all of these, one of its own."""
+    which = int(random.integers(len(scene.indenters)))
+    if spec.random_bodies and random.uniform() < spec.random_bodies:
+        return len(scene.indenters), random_body(random)
+    return which, scene.indenters[which].build()
 
 
 def _on_both(
