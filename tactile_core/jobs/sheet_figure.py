@@ -36,6 +36,7 @@ BORDER = 0.6  # points
 COLORMAP = "viridis"
 SMALLEST_SCALE = 1e-6  # m, so that frames without contact do not show rounding as colour
 MARK = "#c03028"
+LEGEND = {"loc": "center left", "bbox_to_anchor": (1.003, 0.5), "fontsize": 6.5, "frameon": False, "borderaxespad": 0}
 PACKING = {"compress_level": 4}  # of a sheet without libdeflate: 1.2 MB in 0.14 s; 1.7 MB in 0.13 s as pictures are
 
 
@@ -107,9 +108,7 @@ class SheetFigure:
         axes.margins(x=0.005)
         axes.set_xlabel(self._over, labelpad=1)
         axes.set_ylabel("electrodes, counts\nfrom rest")
-        axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), ncols=2, fontsize=6.5, frameon=False,
-                    handlelength=0.9, columnspacing=0.7, handletextpad=0.4, labelspacing=0.25,
-                    borderaxespad=0)  # fmt: skip
+        axes.legend(ncols=2, handlelength=0.9, columnspacing=0.7, handletextpad=0.4, labelspacing=0.25, **LEGEND)
         self._over_time = axes.get_xlim()
         self.top += ELECTRODES + TIME_AXIS
 
@@ -117,10 +116,7 @@ class SheetFigure:
         """Draw the share of the electrodes' change that the translation explains (T,) over (T,) s; below 0 as 0."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, EXPLAINED)
         axes.plot(time, np.clip(explained, 0, 1), color="black", linewidth=0.8)
-        axes.set_xlim(self._over_time)
-        axes.set_ylim(0, 1)
-        axes.set_yticks([0, 0.5, 1])
-        axes.tick_params(labelbottom=False)
+        axes.set(xlim=self._over_time, ylim=(0, 1), yticks=[0, 0.5, 1], xticklabels=[])
         axes.set_ylabel("explained", size=8)
         self.top += EXPLAINED + GAP
 
@@ -131,9 +127,9 @@ class SheetFigure:
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
         axes.plot(time, 1e-3 * pressure, color=MARK, linewidth=0.9, label="translated")
         axes.margins(x=0.005)
+        axes.set(ylabel="fluid, kPa")
         axes.set_xlabel(self._over, labelpad=1)
-        axes.set_ylabel("fluid, kPa")
-        axes.legend(loc="center left", bbox_to_anchor=(1.003, 0.5), fontsize=6.5, frameon=False, borderaxespad=0)
+        axes.legend(**LEGEND)
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
@@ -270,11 +266,10 @@ class SheetFigure:
             color = MARK if is_guess(confidence[k], flags[k]) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION
-        along = "left" if self.camera.right_z < 0 else "right"
-        gel = sensors.title(self.camera.sensor)
+        tip, along = "up" if self.camera.down_x > 0 else "down", "left" if self.camera.right_z < 0 else "right"
         foot = (
-            f"Maps lie as the camera sees the gel: fingertip (-x) {'up' if self.camera.down_x > 0 else 'down'}, "
-            f"z to the {along}. Black: outline of the {gel}'s gel. Dashed: its picture. Cross: contact centre."
+            f"Maps lie as the camera sees the gel: fingertip (-x) {tip}, z to the {along}. Black: outline of the "
+            f"{sensors.title(self.camera.sensor)}'s gel. Dashed: its picture. Cross: contact centre."
         )
         self._text(LEFT, 0.05, foot, size=7.5, color="0.35", va="center")
 

@@ -111,8 +111,7 @@ def doubt_law(signals: Signals) -> Signals:
     """
     changes = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(changes, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
-    others = without(signals.warnings, LAW)
-    return replace(signals, flags=flags, warnings=(*others, *filter(None, [doubt])))
+    return replace(signals, flags=flags, warnings=(*without(signals.warnings, LAW), *filter(None, [doubt])))
 
 
 def _changes(readings: np.ndarray, rest: Baseline, window: int) -> Changes:

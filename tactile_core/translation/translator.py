@@ -24,6 +24,8 @@ from .posterior import FORCE_SCALE, Posterior, touches
 from .simulated_likeness import Patterns, recovered, residual_shares, two_contacts, unlike
 
 # Frames that differ from training in kind, not in degree, are worth little.
+UNTRAINED = Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE
+UNTRAINED |= Flag.UNEXPLAINED
 UNTRAINED_CONFIDENCE = 0.2  # assumed
 # Share of validation's frames that a distance leaves in range. On networks that a part of the pad was kept from
 # (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should.
@@ -34,7 +36,6 @@ IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
 UNDECIDED, APART = 0.3, 3e-3  # assumed
 LEAST_SQUARE = 1.0  # counts^2 of all electrodes' change, below any reading's noise: what no contact makes
 SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterior
-SEED = 0  # of them: the same recording, the same contacts
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -103,18 +104,6 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
     return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
 
 
-def drawn(posterior: Posterior, frames: np.ndarray, count: int) -> np.ndarray:
-    """Draw states (T, count, STATE) from a posterior of frames (T,), whose numbers are the only seeds."""
-    found = np.empty((len(frames), count, STATE), np.float32)
-    for row, frame in enumerate(frames):
-        random = np.random.default_rng([SEED, int(frame)])
-        share = posterior.weight[row].astype(np.float64)
-        which = random.choice(len(share), count, p=share / share.sum())
-        noise = random.standard_normal((count, STATE), dtype=np.float32)
-        found[row] = posterior.mean[row, which] + posterior.spread[row, which] * noise
-    return found
-
-
 class Translator:
     """Verified networks that encode signals and decode contacts.
 
@@ -147,7 +136,7 @@ class Translator:
         frames : (T,) in the recording, whose numbers are the only seeds; stiffness : of `Signals`
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N
         """
-        states = drawn(evidence, frames, self.answer.samples)
+        states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
         center = gel_place.on_gel(self.nets.frames["MVD"], flat[:, :PLACE]) + self.answer.mount_shift
         touched = touches(flat)
@@ -279,15 +268,7 @@ class Translator:
         """
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         confidence = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
-        untrained = flags & np.uint16(
-            Flag.NO_QUIET_PART
-            | Flag.SATURATED
-            | Flag.DEAD_CHANNEL
-            | Flag.LAW_DOUBTED
-            | Flag.OUT_OF_RANGE
-            | Flag.UNEXPLAINED
-        )
-        doubted = (untrained > 0) | bool(doubt(self.card))
+        doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))
         confidence = np.where(doubted, np.minimum(confidence, UNTRAINED_CONFIDENCE), confidence)
         return confidence.astype(np.float32)
 

@@ -70,11 +70,11 @@ def test_the_mean_is_another_answer(touched):
 def test_drawn_contacts_spread_as_the_posterior_says(touched):
     signals, frames = touched
     said = load_translator().encode(signals)
-    drawn = translator.drawn(said, frames, 40_000)
+    drawn = said.drawn(frames, 40_000)
     spread = np.sqrt((said.weight[..., None] * (said.spread**2 + (said.mean - said.average[:, None]) ** 2)).sum(1))
     assert np.abs((drawn.mean(1) - said.average) / spread).max() < 5 / np.sqrt(40_000)  # 80 means, 5 standard errors
     assert np.allclose(drawn.std(1) / spread, 1, atol=0.25)  # rare far components are drawn a few times
-    assert np.array_equal(translator.drawn(said, frames, 7), translator.drawn(said, frames, 7))
+    assert np.array_equal(said.drawn(frames, 7), said.drawn(frames, 7))
 
 
 def test_drawn_contacts_lie_round_the_answer(request, tmp_path):
