@@ -52,7 +52,7 @@ class Translation(Summary):
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
         BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
-    explained : (T,), share of the electrodes' change, 1 - |change - predicted|^2 / |change|^2, that a unit of this film
+    explained : (T,), share of the electrodes' change, 1 less the squared rest over its square, that a unit of this film
         and rest shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without
         contact
     """
