@@ -129,9 +129,7 @@ def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) 
 
 def _child(gel: bpy.types.Object, name: str, data: bpy.types.ID, role: str) -> bpy.types.Object:
     thing = bpy.data.objects.new(name, data)
-    properties.set_up(thing, role, gel.tactile.per_metre)
-    properties.home_of(gel).objects.link(thing)
-    thing.parent = gel
+    properties.set_up_part(thing, gel, role)
     return thing
 
 
@@ -145,9 +143,8 @@ def _add_led(gel: bpy.types.Object, led: Led) -> bpy.types.Object:
     faces = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])
     faces = np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     chip = surfaces.new_mesh_object(f"{name} package", corners, faces, smooth=False)
-    properties.set_up(chip, "BODY", gel.tactile.per_metre)
-    properties.home_of(gel).objects.link(chip)
-    chip.parent, chip.hide_select = thing, True
+    properties.set_up_part(chip, thing, "BODY")
+    chip.hide_select = True
     chip.visible_shadow = False  # it stands inside its lamp
     chip.data.materials.append(digit_materials.glow())
     for index in range(3):
@@ -202,9 +199,8 @@ def _add_solid(gel, name: str, mesh: tuple[np.ndarray, np.ndarray], material: bp
 
     nodes, faces = mesh
     thing = surfaces.new_mesh_object(name, axes.to_blender(nodes, gel.tactile.per_metre), faces, smooth=False)
-    properties.set_up(thing, "BODY", gel.tactile.per_metre)
-    properties.home_of(gel).objects.link(thing)
-    thing.parent, thing.hide_select = gel, True
+    properties.set_up_part(thing, gel, "BODY")
+    thing.hide_select = True
     thing.data.materials.append(material)
     thing.color = material.diffuse_color
 

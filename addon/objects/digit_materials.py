@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 
 from ...tactile_core.sensors.calibration import DIFFUSE, Coating
+from .surfaces import new_material
 
 ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
 _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
@@ -115,8 +116,6 @@ def math(material: bpy.types.Material, operation: str, *values: object, kind: st
 
 
 def _new(name: str, shown: tuple[float, ...]) -> tuple[bpy.types.Material, bpy.types.Node]:
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
+    material, shader = new_material(name)
     material.diffuse_color = shown  # in the Solid view
-    return material, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    return material, shader

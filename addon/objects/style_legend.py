@@ -44,9 +44,8 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
     middle = (flat[:, 0].min() + flat[:, 0].max()) / 2
     nodes = _corner(thing, unit) + unit * ((flat[:, :1] - middle) * along + flat[:, 1:] * up)
     legend = surfaces.new_mesh_object(f"{thing.name} legend", nodes, faces, smooth=False)
-    properties.set_up(legend, "LEGEND", thing.tactile.per_metre)
-    properties.home_of(thing).objects.link(legend)
-    legend.parent, legend.hide_select = thing, True
+    properties.set_up_part(legend, thing, "LEGEND")
+    legend.hide_select = True
     legend["text"] = [title, *(ends or ())]
     styles.make_colour_active(legend.data)
     shown = np.column_stack([colours, np.ones(len(colours))]).astype(np.float32)

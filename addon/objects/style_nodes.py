@@ -13,6 +13,7 @@ import bpy
 
 from . import electrode_markers, frame_attribute
 from .node_group import NodeGroup
+from .surfaces import new_material
 
 COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
 MATERIAL, LEGEND = "Tactile style", "Tactile legend"
@@ -93,13 +94,9 @@ def _material(name: str, takes: str) -> bpy.types.Material:
     found = bpy.data.materials.get(name)
     if found is not None:
         return found
-    made = bpy.data.materials.new(name)
-    if made.node_tree is None:
-        made.use_nodes = True
-    nodes = made.node_tree.nodes
-    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    made, shader = new_material(name)
     shader.inputs["Roughness"].default_value = 0.5
-    colour = nodes.new("ShaderNodeVertexColor")
+    colour = made.node_tree.nodes.new("ShaderNodeVertexColor")
     colour.layer_name = COLOUR
     made.node_tree.links.new(colour.outputs["Color"], shader.inputs[takes])
     return made

@@ -58,9 +58,8 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
     """
     get_ready(sensor)
     arrow = surfaces.new_mesh_object(f"{sensor.name} force", *_upright(), smooth=False)
-    properties.set_up(arrow, "LEGEND", sensor.tactile.per_metre)
-    properties.home_of(sensor).objects.link(arrow)
-    arrow.parent, arrow.hide_select = sensor, True
+    properties.set_up_part(arrow, sensor, "LEGEND")
+    arrow.hide_select = True
     make_colour_active(arrow.data)
     modifier = _add_nodes(arrow, "FORCE_ARROW", {style_nodes.SENSOR: sensor, style_nodes.LENGTH: length})
     path = style_nodes.input_path(modifier, style_nodes.FORCE)

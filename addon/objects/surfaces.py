@@ -45,16 +45,21 @@ def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) ->
     thing.data.materials.append(_material())
 
 
+def new_material(name: str) -> tuple[bpy.types.Material, bpy.types.Node]:
+    """Make a material of nodes; also returns its Principled BSDF."""
+    material = bpy.data.materials.new(name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    return material, next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+
+
 def _material() -> bpy.types.Material:
     name = "Tactile object colour"
     found = bpy.data.materials.get(name)
     if found is not None:
         return found
-    material = bpy.data.materials.new(name)
-    if material.node_tree is None:
-        material.use_nodes = True
+    material, shader = new_material(name)
     nodes, links = material.node_tree.nodes, material.node_tree.links
-    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
     colour = nodes.new("ShaderNodeObjectInfo")
     colour.location = (-250, 200)
     links.new(colour.outputs["Color"], shader.inputs["Base Color"])

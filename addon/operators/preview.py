@@ -12,7 +12,6 @@ from ..settings import properties, render_settings
 from ..settings.reports import TactileOperator
 from . import pictures, stale_picture, view
 
-_SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
 _drawing = False  # a picture's own update must not draw another
 _failed = ""  # why the last frame could not be drawn; shown in the panel
 
@@ -48,7 +47,7 @@ def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) 
 @persistent
 def _draw_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Called at each change of the scene: one of what the picture shows draws it again."""
-    if any(isinstance(update.id, _SEEN) for update in depsgraph.updates):
+    if any(isinstance(update.id, stale_picture.SEEN) for update in depsgraph.updates):
         _draw(scene, depsgraph)
 
 

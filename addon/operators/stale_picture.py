@@ -15,7 +15,7 @@ from ..settings import properties, render_settings
 DIM = 0.3  # of a stale picture's brightness
 _STALE = "tactile_stale"  # property of the picture's datablock in a saved file
 _STILL = 1e-7  # m, of displacements that are read back from float32 coordinates
-_SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
+SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
 
 
 @dataclasses.dataclass
@@ -95,7 +95,7 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None
 @persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Check the picture at each change of the scene; Blender calls it."""
-    if any(isinstance(update.id, _SEEN) for update in depsgraph.updates):
+    if any(isinstance(update.id, SEEN) for update in depsgraph.updates):
         _frame_changed(scene, depsgraph)
 
 

@@ -118,7 +118,7 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.tactile.import_recording(filepath=str(path.resolve()), weights=weights, **words)
     bpy.ops.tactile.translate(**({} if options.to is None else {"to": options.to.upper()}))
     _claimed(folder, options)
-    _finish(folder, options, options.pictures)
+    _finish(folder, options)
 
 
 def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
@@ -130,7 +130,7 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
     bpy.context.scene.tactile_render.error = options.error
     bpy.ops.tactile.simulate(seed=options.seed)
-    _finish(folder, options, options.pictures)
+    _finish(folder, options)
 
 
 def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
@@ -156,12 +156,12 @@ def _fresh() -> None:
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
 
 
-def _finish(folder: Path, options: argparse.Namespace, pictures: bool) -> None:
+def _finish(folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.tactile.set_up_render()
     bpy.context.scene.tactile_render.preset, bpy.context.scene.tactile_render.error = options.preset, options.error
     bpy.context.scene.render.filepath = "//images/"
     bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
-    if pictures:
+    if options.pictures:
         _pictures(folder, options)
 
 

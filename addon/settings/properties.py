@@ -116,6 +116,13 @@ def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "
     return about
 
 
+def set_up_part(thing: bpy.types.Object, parent: bpy.types.Object, role: str) -> None:
+    """Mark an object of ours that goes with another one, in whose collection it is shown."""
+    set_up(thing, role, parent.tactile.per_metre)
+    home_of(parent).objects.link(thing)
+    thing.parent = parent
+
+
 def sensor_name(thing: bpy.types.Object) -> str:
     """Name the sensor of a skin or a gel; those of former files are the BioTac's and the DIGIT's."""
     return thing.tactile.sensor or OF_ROLE[thing.tactile.role]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 
-class Disk(io.RawIOBase):
+class Disk(io.FileIO):
     """File object for HDF5 that hides a full disk from the library; `check` reports it.
 
     HDF5 cannot close a file whose writing failed: it keeps the place on the disk and crashes at the process's end (seen
@@ -15,8 +15,8 @@ class Disk(io.RawIOBase):
     """
 
     def __init__(self, path: Path) -> None:
+        super().__init__(path, "w+")
         self._path = path
-        self._file = open(path, "wb+", buffering=0)  # noqa: SIM115 - closed by close()
         self._failure: OSError | None = None
 
     def check(self) -> None:
@@ -30,7 +30,7 @@ class Disk(io.RawIOBase):
         count = len(rest)
         try:
             while len(rest) and self._failure is None:
-                rest = rest[self._file.write(rest) :]  # one call may write a part
+                rest = rest[super().write(rest) :]  # one call may write a part
         except OSError as error:
             self._failure = error
         return count
@@ -38,36 +38,7 @@ class Disk(io.RawIOBase):
     def truncate(self, size: int | None = None) -> int:
         """Truncate like any file, but without raising: `check` raises the error."""
         try:
-            return self._file.truncate(size)
+            return super().truncate(size)
         except OSError as error:
             self._failure = self._failure or error
-            return self._file.tell() if size is None else size
-
-    def readinto(self, buffer: Any) -> int:
-        """Read into a buffer like any file."""
-        return self._file.readinto(buffer)
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Move like any file; returns the place, bytes."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the place in the file, bytes."""
-        return self._file.tell()
-
-    def readable(self) -> bool:
-        """Return true: HDF5 reads back what it wrote."""
-        return True
-
-    def writable(self) -> bool:
-        """Return true."""
-        return True
-
-    def seekable(self) -> bool:
-        """Return true."""
-        return True
-
-    def close(self) -> None:
-        """Close the file; what failed before is for `check` to raise."""
-        self._file.close()
-        super().close()
+            return self.tell() if size is None else size

@@ -10,7 +10,6 @@ import struct
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 
@@ -25,13 +24,9 @@ SIGNATURE = b"\x89PNG\r\n\x1a\n"  # a file's first bytes
 UP = 2  # PNG's filter of each row: less the row above, modulo 256
 
 
-def write_png(file: str | os.PathLike | BinaryIO, picture: np.ndarray) -> None:
-    """Write a picture (H, W, 3) uint8 to a path or an open file. Raises OSError where the disk refuses."""
-    content = pack_png(picture)
-    if isinstance(file, str | os.PathLike):
-        Path(file).write_bytes(content)
-    else:
-        file.write(content)
+def write_png(file: str | os.PathLike, picture: np.ndarray) -> None:
+    """Write a picture (H, W, 3) uint8 to a file. Raises OSError where the disk refuses."""
+    Path(file).write_bytes(pack_png(picture))
 
 
 def pack_png(picture: np.ndarray, packing: Mapping[str, int] = PACKING) -> bytes:

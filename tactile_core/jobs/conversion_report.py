@@ -179,10 +179,10 @@ class Contents:
     confidence: np.ndarray
     flags: np.ndarray
     expected_error_digit: np.ndarray
-    contact_center: np.ndarray | None = None
-    pressure: np.ndarray | None = None
-    explained: np.ndarray | None = None
-    pressure_measured: np.ndarray | None = None
+    contact_center: np.ndarray
+    pressure: np.ndarray
+    explained: np.ndarray
+    pressure_measured: np.ndarray
     true_displacement_biotac: np.ndarray | None = None
     simulated: bool = False
     mount_shift: np.ndarray | float = 0.0
@@ -234,23 +234,18 @@ def _drawn(shown: Contents) -> SheetFigure:
         shown.camera,
         _sentences(shown.warnings, shown.confidence),
         truth is not None,
-        pressure=shown.pressure is not None,
-        explained=shown.explained is not None,
         snapshots=shown.snapshots,
     )
     # File names may hold what is no text at all.
     figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
     figure.electrodes(shown.time, shown.electrodes, shown.frames)
-    if shown.explained is not None:
-        figure.explained(shown.time, shown.explained)
-    if shown.pressure is not None:
-        figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
+    figure.explained(shown.time, shown.explained)
+    figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
     figure.headings(shown.time[shown.frames])
     largest = scale(displacement, truth)
     name = title(shown.source)
     label = f"{name}, unrolled\n" + ("translated" if shown.simulated else "displacement")
-    center = None if shown.contact_center is None else shown.contact_center - shown.mount_shift
-    figure.skin_row(label, displacement, largest, center, shown.source)
+    figure.skin_row(label, displacement, largest, shown.contact_center - shown.mount_shift, shown.source)
     if truth is not None:
         figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
     gel = title(shown.camera.sensor)

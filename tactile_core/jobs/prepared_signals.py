@@ -28,7 +28,7 @@ from ..sensors import SOURCE
 from ..sensors.fluid_sensor import MOST_ELECTRODES
 from .convert import check_order
 from .engine import job as jobs
-from .engine.inputs import content_hash
+from .engine.inputs import check_unchanged
 
 if TYPE_CHECKING:
     import h5py
@@ -76,12 +76,9 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
     frames = checksummed.stated_rows(file)
     if frames is not None and checksummed.verified_checksum(file) is not None:
         return frames, False
-    digest, size = content_hash(Path(one.path))
-    if (digest, size) != (one.sha256, one.bytes):
-        found = "another content than when the job was made"
-        raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+    check_unchanged(one)
     with atomic.new_file(file, shared=True) as partial:
-        count = _write(partial, job, one.path, digest)
+        count = _write(partial, job, one.path, one.sha256)
         checksummed.write_checksum(partial, rows=count)
     return count, True
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
 from ..pictures.mitsuba.variant import variant_for
 from ..sensors.calibration_file import load_calibration
@@ -18,7 +17,6 @@ from . import results
 from .engine import inputs
 from .engine import job as jobs
 from .engine import run as runs
-from .engine.inputs import content_hash
 from .engine.job import Job
 from .engine.recipes import InputFacts, Render
 from .engine.run import Place
@@ -89,9 +87,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None
     if made:
-        if content_hash(Path(one.path))[0] != one.sha256:
-            found = "another content than when the job was made"
-            raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+        inputs.check_unchanged(one)
         frames = read_frames(one.path, gel=load_calibration(job.calibration).camera.sensor)
         rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
         arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}

@@ -44,9 +44,8 @@ class SheetFigure:
     """A figure that is filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
 
     def __init__(
-        self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, pressure: bool, explained: bool,
-        snapshots: bool = False,
-    ) -> None:  # fmt: skip
+        self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, snapshots: bool = False
+    ) -> None:
         """Make an empty figure. snapshots : whether frames are shown over their numbers, having no time"""
         from matplotlib.figure import Figure
 
@@ -62,7 +61,7 @@ class SheetFigure:
         )
         rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
-        head += (PRESSURE + TIME_AXIS) * pressure + (EXPLAINED + GAP) * explained
+        head += (PRESSURE + TIME_AXIS) + (EXPLAINED + GAP)
         self.height = head + rows + CAPTION + FOOT
         self.figure: Figure = Figure(figsize=(WIDTH, self.height), dpi=DPI, facecolor="white")
         self.top = 0.0  # inches from the upper edge to what is still free
@@ -120,10 +119,10 @@ class SheetFigure:
         axes.set_ylabel("explained", size=8)
         self.top += EXPLAINED + GAP
 
-    def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray | None) -> None:
+    def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray) -> None:
         """Draw lines of the fluid's pressure (T,) Pa over (T,) s: as translated, and as measured where it was."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
-        if measured is not None and np.isfinite(measured).any():
+        if np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
         axes.plot(time, 1e-3 * pressure, color=MARK, linewidth=0.9, label="translated")
         axes.margins(x=0.005)
@@ -148,7 +147,7 @@ class SheetFigure:
         self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
         self.top += GAP
 
-    def gel_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray | None) -> None:
+    def gel_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray) -> None:
         """Draw maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(

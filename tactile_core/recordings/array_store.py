@@ -96,17 +96,8 @@ class Store:
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:
-        try:
+        with damage_reported(f"{self.path}, {name}", "data"):
             return np.asarray(self.load(name))
-        except (TactileError, MemoryError):
-            raise
-        except Exception as error:  # the file libraries raise a dozen types on damaged bytes
-            raise TactileError(
-                f"{self.path}, {name}",
-                f"damaged data ({_short(error)})",
-                "a whole file",
-                "Copy or export the recording again",
-            ) from error
 
 
 def _short(error: BaseException) -> str:
@@ -144,7 +135,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
 @contextmanager
 def damage_reported(where: str, what: str) -> Iterator[None]:
-    """Turn any error of a file library into a TactileError; see Store._loaded."""
+    """Turn any error of a file library into a TactileError."""
     try:
         yield
     except (TactileError, MemoryError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from math import prod
 
 from ..sensors import SOURCE, title
 from .array_store import Store, open_hdf5
@@ -14,7 +15,7 @@ from .bags.bag_recordings import read_bag
 from .opened_file import opened
 from .readers import layout_of, names, read, table_reader
 from .recording import Recording, split
-from .tables.column_map import ColumnMap, refuse_other
+from .tables.column_map import ColumnMap, refuse_bag
 from .tables.table import read_header, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
@@ -52,7 +53,8 @@ def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, s
 
 def _parts(path: str, columns: ColumnMap | None, sensor: str) -> Iterator[Part]:
     with opened(path) as (container, where, finger, file):
-        refuse_other(path, container, columns)
+        if columns is not None:
+            refuse_bag(path, container)
         long = columns is not None and columns.channel  # its rows are no frames
         if container == "csv" and os.fstat(file.fileno()).st_size > TEXT_BYTES and not long:
             reader = table_reader(where, read_header(where, file), columns, sensor, finger)
@@ -89,11 +91,5 @@ def _frames(store: Store, name: str) -> int:
 
 
 def _bytes_a_frame(store: Store, count: int) -> int:
-    total = 0
-    for shape, kind in store.shapes.values():
-        if count and shape[:1] == (count,):
-            numbers = 1
-            for length in shape[1:]:
-                numbers *= length
-            total += numbers * max(kind.itemsize, 8)  # read as float64
-    return total
+    long = [(shape[1:], kind) for shape, kind in store.shapes.values() if count and shape[:1] == (count,)]
+    return sum(prod(inner) * max(kind.itemsize, 8) for inner, kind in long)  # read as float64

@@ -81,13 +81,13 @@ def alike(electrodes: np.ndarray) -> np.ndarray:
 def _lasting(same: np.ndarray) -> np.ndarray:
     """Return the frames (T,) bool of runs that are longer than a glitch may be."""
     found = same.copy()
-    for first, last in _runs(same):
+    for first, last in runs(same):
         longest = END if first == 0 or last == len(same) else SHORT
         found[first:last] = last - first > longest or last - first == len(same)
     return found
 
 
-def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
     """Return the first frame of each run of a mask (T,), and the one after its last."""
     bounds = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int))).tolist()
     return list(zip(bounds[::2], bounds[1::2], strict=True))
@@ -96,11 +96,11 @@ def _runs(mask: np.ndarray) -> list[tuple[int, int]]:
 def _frozen(change: np.ndarray) -> np.ndarray:
     """Mark the frames (T,) of long runs without a change (T - 1, e) in any electrode, where most are noisy else."""
     still = np.r_[False, ~change.any(axis=1)]
-    runs = [(first, last) for first, last in _runs(still) if last - first >= FROZEN]
+    long = [(first, last) for first, last in runs(still) if last - first >= FROZEN]
     found = np.zeros(len(still), bool)
-    for first, last in runs:
+    for first, last in long:
         found[first:last] = True
-    if not runs or found.all() or np.median(change[~found[1:]].mean(axis=0)) < NOISY:
+    if not long or found.all() or np.median(change[~found[1:]].mean(axis=0)) < NOISY:
         return np.zeros(len(still), bool)
     return found
 

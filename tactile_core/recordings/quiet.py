@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import TactileError
+from .electrode_faults import runs
 from .recording import BLOCK
 from .signal_kind import median
 
@@ -91,7 +92,7 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
     ends[:-n] += accepted
     ends[n:] -= accepted
     mask = np.cumsum(ends[:-1]) > 0
-    parts = _runs(mask)
+    parts = tuple(runs(mask))
     by = "calm electrodes and the lowest PDC" if windows.pdc is not None else "calm electrodes (no PDC to confirm it)"
     evidence = f"{len(parts)} quiet part{'s' * (len(parts) != 1)} ({by})" if parts else "no calm part at the rest level"
     return Quiet(mask, parts, evidence)
@@ -224,11 +225,6 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
     if early.any():
         return int(calm[0])
     return int(calm[-1]) if late.any() else int(calm[0])
-
-
-def _runs(mask: np.ndarray) -> tuple[tuple[int, int], ...]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return tuple((int(a), int(b)) for a, b in edges.reshape(-1, 2))
 
 
 def tare_frames(asked: slice | str, count: int) -> slice:

@@ -14,18 +14,17 @@ from ..errors import TactileError
 from ..files.registry import modules_of
 from ..sensors import SOURCE, electrode_count, title
 from . import formats
-from .array_store import Store, open_hdf5, open_npz
+from .array_store import Store
 from .assemble import check_electrodes
 from .bags.bag import open_bag
 from .bags.bag_recordings import names_of, read_bag, streams_of
 from .opened_file import opened, refuse_finger
 from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
-from .tables.column_map import ColumnMap, refuse_other
+from .tables.column_map import ColumnMap, refuse_bag
 from .tables.json_table import read_json
 from .tables.mapped import read_mapped
-from .tables.mapped_files import read_by_map
-from .tables.matlab import open_matlab
+from .tables.mapped_files import open_store, read_by_map
 from .tables.table import Table, read_header, read_table
 from .tables.table_header import NUMBERED
 from .tables.truncated_cell import shown
@@ -72,21 +71,17 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
     """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header."""
     with opened(path) as (container, where, finger, file):
         if columns is not None:
-            refuse_other(path, container, columns)
+            refuse_bag(path, container)
             refuse_finger(where, finger)
             return read_by_map(where, container, file, columns, partial(_unneeded, columns) if lean else None)
-        if container == "hdf5":
-            with open_hdf5(where) as store:
-                return _noted(layout_of(where, container, names(store)).read(store), store)
-        if container == "npz":
-            with open_npz(where, file) as store:
-                return _noted(layout_of(where, container, store.shapes).read(store), store)
+        if container in ("hdf5", "npz", "mat"):
+            with open_store(where, container, file) as store:
+                layout = layout_of(where, container, names(store) if container == "hdf5" else store.shapes)
+                found = _read_finger(layout, store, finger) if container == "mat" else layout.read(store)
+                return _noted(found, store)
         if container == "bag":
             with open_bag(where, file) as bag:
                 return next(read_bag(bag, split(path)))[0]
-        if container == "mat":
-            with open_matlab(where, file) as store:
-                return _noted(_read_finger(layout_of(where, container, store.shapes), store, finger), store)
         if container == "json":
             layout_of(where, container, read_json(where, file).header)  # which none is
         header = read_header(where, file)
@@ -178,7 +173,7 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
         if container == "csv":
             known = _fingers_of_table(read_header(path, file))
         if container == "mat":
-            with open_matlab(path, file) as store:
+            with open_store(path, container, file) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)
     alone = len(known) < 2 and (container != "mat" or known == (0,))
     return [path] if alone else [f"{path}#{finger}" for finger in known]

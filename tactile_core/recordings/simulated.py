@@ -17,7 +17,7 @@ from __future__ import annotations
 import io
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,9 +28,6 @@ from ..sensors.fluid_sensor import FALLS, RISES
 from .array_store import Store, open_hdf5
 from .assemble import assemble
 from .recording import Recording, Truth
-
-if TYPE_CHECKING:
-    import h5py
 
 FORMAT = "tactile-recording-1"
 SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
@@ -51,7 +48,6 @@ def write_simulated(
     seed: int,
     made_by: str,
     note: str,
-    sensor: str = "BioTac",
     start_time: float = 0.0,
 ) -> Path:
     """Write the file whole or not at all, and return its path; None is left out. Shapes and units: see the module.
@@ -73,10 +69,10 @@ def write_simulated(
         _check_shape(path, name, value, (frames, 3 if name == "truth/force" else 2))
     moved = {f"{_MOVED}{sensor}": values for sensor, values in truth.displacements.items()}
     steps = {name: _steps(path, name, value, frames) for name, value in moved.items()}
-    attributes = {
+    attributes: dict[str, Any] = {
         "format": FORMAT,
         "simulated": True,
-        "sensor": sensor,
+        "sensor": "BioTac",
         "scene": scene,
         "seed": int(seed),
         "made_by": made_by,
@@ -87,33 +83,42 @@ def write_simulated(
     plain = {"time": np.asarray(time, np.float64)} | counts
     pressed = {f"truth/{_PRESSED}{sensor}": values for sensor, values in truth.tractions.items()}
     tractions = {name: _tractions(path, name, value, frames) for name, value in pressed.items()}
-    _write_whole(path, lambda file: _fill(file, attributes, plain, steps, forces, tractions))
+    _write_whole(path, attributes, plain, steps, forces, tractions)
     return path
 
 
-def _fill(
-    file: h5py.File,
+def _write_whole(
+    path: Path,
     attributes: dict[str, Any],
     plain: dict[str, np.ndarray],
     steps: dict[str, np.ndarray],
     forces: dict[str, np.ndarray],
     tractions: dict[str, np.ndarray],
 ) -> None:
-    """Write the datasets of a file, always in this order, so that the same arrays give the same bytes."""
-    for key, value in attributes.items():
-        file.attrs[key] = value
+    """Write a file that appears whole or not at all, its datasets in this order: the same arrays give the same bytes.
+
+    It is made in memory: HDF5 keeps a file open whose writing failed on a full disk, and crashes at the process's end.
+    """
+    import h5py
+
+    memory = io.BytesIO()
     packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
-    for name, value in plain.items():
-        file.create_dataset(name, data=value, **packed)
-    for name, value in steps.items():
-        chunks = (min(BLOCK, len(value)), *value.shape[1:])
-        data = file.create_dataset(f"truth/{name}", data=value, chunks=chunks, **packed)
-        data.attrs["scale"] = SCALE
-    for name, value in forces.items():
-        file.create_dataset(name, data=value, **packed)
-    for name, value in tractions.items():
-        chunks = (min(BLOCK, len(value)), *value.shape[1:])
-        file.create_dataset(name, data=value, chunks=chunks, **packed).attrs["unit"] = "Pa"
+    with h5py.File(memory, "w") as file:
+        for key, value in attributes.items():
+            file.attrs[key] = value
+        for name, value in plain.items():
+            file.create_dataset(name, data=value, **packed)
+        for name, value in steps.items():
+            chunks = (min(BLOCK, len(value)), *value.shape[1:])
+            data = file.create_dataset(f"truth/{name}", data=value, chunks=chunks, **packed)
+            data.attrs["scale"] = SCALE
+        for name, value in forces.items():
+            file.create_dataset(name, data=value, **packed)
+        for name, value in tractions.items():
+            chunks = (min(BLOCK, len(value)), *value.shape[1:])
+            file.create_dataset(name, data=value, chunks=chunks, **packed).attrs["unit"] = "Pa"
+    with atomic.writing(path, "room in a folder that can be written to", ""):
+        atomic.write_bytes(path, memory.getvalue())
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
@@ -215,17 +220,3 @@ def _tractions(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndar
     if np.ndim(value) != 3 or np.shape(value)[0] != frames or np.shape(value)[2] != 3:
         raise TactileError(f"{path}, {name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
     return np.asarray(value, np.float32)
-
-
-def _write_whole(path: Path, fill: Any) -> None:
-    """Write a file by calling ``fill``; it appears whole or not at all.
-
-    It is made in memory: HDF5 keeps a file open whose writing failed on a full disk, and crashes at the process's end.
-    """
-    import h5py
-
-    memory = io.BytesIO()
-    with h5py.File(memory, "w") as file:
-        fill(file)
-    with atomic.writing(path, "room in a folder that can be written to", ""):
-        atomic.write_bytes(path, memory.getvalue())

@@ -30,6 +30,9 @@ def columns() -> dict:
         "flags": np.array([0, 4], np.uint16),
         "expected_error_digit": np.array([30e-6, 90e-6]),
         "contact_center": np.array([[-7e-3, 1e-3], [np.nan, np.nan]]),
+        "pressure": np.linspace(0, 2e3, 50),
+        "pressure_measured": np.full(50, np.nan),
+        "explained": np.r_[np.full(10, np.nan), np.linspace(-3, 1, 40)],
     }
 
 
@@ -70,8 +73,6 @@ def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path, columns: dict) 
     assert with_truth > plain + 200
     contact_sheet(path, Contents(**columns, warnings=["rectified: the sign is lost", "no quiet part"]))
     assert plain + 30 < size(path)[1] < plain + 60
-    contact_sheet(path, Contents(**columns, explained=np.r_[np.full(10, np.nan), np.linspace(-3, 1, 40)]))
-    assert plain + 40 < size(path)[1] < plain + 80
     contact_sheet(path, Contents(**columns, warnings=["many words " * 40] * 30))  # cut off, with a line that says so
     assert size(path)[1] < plain + 120
 
@@ -87,6 +88,7 @@ def test_one_frame_without_contact(tmp_path: Path, columns: dict) -> None:
     for what in (*given, "expected_error_digit", "contact_center"):
         columns[what] = 0 * columns[what][:1]
     columns |= {"frames": np.array([0]), "time": np.zeros(1), "electrodes": np.full((1, 19), np.nan)}
+    columns |= {name: np.full(1, np.nan) for name in ("pressure", "pressure_measured", "explained")}
     contact_sheet(tmp_path / "a.png", Contents(**columns))
     assert size(tmp_path / "a.png")[0] == 1600
 
@@ -107,7 +109,7 @@ def test_frames_are_the_strongest_that_lie_apart() -> None:
 def test_captions_touch_neither_each_other_nor_the_line_below_them() -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    figure = SheetFigure(6, load_calibration().camera, [], False, pressure=False, explained=False)
+    figure = SheetFigure(6, load_calibration().camera, [], False)
     figure.top = figure.height - CAPTION - FOOT
     pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.BEYOND_PICTURE | Flag.POLARITY_ASSUMED, Flag.RECTIFIED]
     flags = np.array([int(flag) for flag in (*pairs, *pairs)], np.uint16)

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import argparse
 import os
-from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import complain, say, tell
 from .common import NOTHING, prepare_arguments, prepare_words
-
-if TYPE_CHECKING:
-    from ...recordings.electrode_gains import SensorFile
 
 BRIEF = "describe recordings, or a sensor"
 TEXT = """\
@@ -44,14 +40,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Describe each recording, going on after a bad one; returns the exit status."""
-    from ...recordings import PrepareOptions, info
+    from ...recordings import PrepareOptions, electrode_gains, info
     from ...recordings.readers import each_finger
 
     if not options.recordings:
         return _tell_sensor(options.sensor)
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
-    unit = None if options.sensor is None else _unit(options.sensor)
+    unit = None if options.sensor is None else electrode_gains.read(options.sensor)
     prepare, failed = PrepareOptions(**prepare_words(options)), 0
     for path in options.recordings:
         try:
@@ -73,12 +69,6 @@ def _tell_sensor(name: str | None) -> int:
         )
     tell(about(name))
     return 0
-
-
-def _unit(path: str) -> SensorFile:
-    from ...recordings import electrode_gains
-
-    return electrode_gains.read(path)
 
 
 def _write_columns(options: argparse.Namespace) -> None:

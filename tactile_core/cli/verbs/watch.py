@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...jobs.live import Shown
+    from ...jobs.live.playback import Output
     from ...recordings.electrode_gains import ElectrodeGains
-
-    Output = Callable[[Shown, dict[str, np.ndarray]], bool]  # takes a frame and its pictures; false: it has ended
 
 BRIEF = "show a recording live while it is being written"
 TEXT = """\
@@ -83,7 +82,7 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings import PrepareOptions
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
-    from ...recordings.tables.column_map import refuse_other
+    from ...recordings.tables.column_map import refuse_bag
 
     _check(options)
     path = options.rosbag_play or options.recording
@@ -94,7 +93,8 @@ def run(options: argparse.Namespace) -> int:
         raise TactileError("--rate", f"{options.rate:g}", "1 to 10,000 Hz")
     playing = options.play or options.rosbag_play
     columns = columns_of(options)
-    refuse_other(path, container, columns)
+    if columns is not None:
+        refuse_bag(path, container)
     speed = 1.0 if options.speed is None else options.speed
     sensor = None if options.weights else sensor_of_first([path], columns)
     asked = convert.ToolOptions(options.weights, options.calibration, target=options.target, source=sensor)
@@ -193,17 +193,13 @@ def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:
     """Write pictures to a file that is complete at every moment."""
-    import io
-
     from ...files import atomic
-    from ...files.png_writer import write_png
+    from ...files.png_writer import pack_png
 
     def draw(picture: np.ndarray) -> bool:
         """Write the picture (H, W, 3) uint8; returns true: a file never ends the view."""
-        out = io.BytesIO()
-        write_png(out, picture)
         with atomic.writing(path, "a file in a writable folder", ""):
-            atomic.write_bytes(path, out.getvalue())
+            atomic.write_bytes(path, pack_png(picture))
         return True
 
     return draw

@@ -167,6 +167,13 @@ def content_hash(path: Path) -> tuple[str, int]:
         raise TactileError(path, f"cannot be read ({error.strerror or error})", "a recording") from error
 
 
+def check_unchanged(one: Input) -> None:
+    """Raise TactileError where an input's content is another than when the job was made."""
+    if content_hash(Path(one.path)) != (one.sha256, one.bytes):
+        found = "another content than when the job was made"
+        raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
+
+
 def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
     """Read a scene; return it, its text, an input for each of some names, and the hashes of its meshes in order.
 

@@ -76,7 +76,7 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
-def of_finger(table: Table, layout: str, style: str, finger: int, *, snapshots: bool) -> Recording:
+def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
     """Build a finger's recording of a BioTac SP's table; its other columns are named in ``about``.
 
     Raises TactileError for a missing column, and the errors of ``assemble``.

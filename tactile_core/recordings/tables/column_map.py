@@ -131,7 +131,7 @@ def _channel_lines(columns: ColumnMap) -> list[str]:
     ]
 
 
-def refuse_other(path: str, container: str, columns: ColumnMap | None) -> None:
+def refuse_bag(path: str, container: str) -> None:
     """Raise TactileError where a map is given for a bag, whose messages say what is what."""
-    if columns is not None and container == "bag":
+    if container == "bag":
         raise TactileError("--columns", f"given for {path} (bag)", "a file of columns or arrays", "Leave it out")

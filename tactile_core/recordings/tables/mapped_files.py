@@ -7,11 +7,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import BinaryIO
 
-from ...errors import TactileError
 from ..array_store import Store, open_hdf5, open_npz
 from ..recording import Recording
 from .array_table import names_of, table_of
-from .column_map import ColumnMap
+from .column_map import ColumnMap, refuse_bag
 from .json_table import read_json
 from .map_guess import guess, with_unit
 from .mapped import read_mapped
@@ -52,8 +51,7 @@ def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap
 
     Raises TactileError for a bag, and like `read_by_map`.
     """
-    if container == "bag":
-        raise TactileError("--columns", f"given for {path} (bag)", "a file of columns or arrays", "Leave it out")
+    refuse_bag(path, container)
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else next(read_tables(path, file, LOOKED_AT, 0))[0]
         return guess(table.header, table), table.header

@@ -6,16 +6,13 @@ data/chunk-CCC/file-FFF.parquet
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from ....files import atomic
-from ....files.png_writer import write_png
+from ....files.png_writer import pack_png
 from ..finished_job import Finished
 from ..lerobot_set import CHUNK, PICTURE, TASK, Features, Rows, table, write_set
 from ..lerobot_stats import Stats, aggregate, listed
@@ -47,7 +44,7 @@ class _Together:
 
         columns: dict[str, Any] = dict(rows)
         if PICTURE in rows:
-            columns[PICTURE] = [{"bytes": _png(picture), "path": None} for picture in rows[PICTURE]]
+            columns[PICTURE] = [{"bytes": pack_png(picture), "path": None} for picture in rows[PICTURE]]
         added = table(columns, features)
         if self._writer is None:
             self._path = self._folder / DATA.format(**self._place())
@@ -85,12 +82,6 @@ class _Together:
         if self._writer is not None:
             self._writer.close()
             self._writer = None
-
-
-def _png(picture: np.ndarray) -> bytes:
-    out = io.BytesIO()
-    write_png(out, picture)
-    return out.getvalue()
 
 
 def _write_tasks(path: Path) -> None:
