@@ -24,7 +24,7 @@ HARD = (
     "two patches at once", "load step ten times too large", "coarse and fine meshes", "inverted start",
     "saturated electrodes", "dead electrodes", "12-bit quantisation", "drift over an hour", "out-of-range latents",
     "single precision against double", "extreme px/mm", "grazing light", "depth discontinuities",
-    "one-frame recordings",
+    "one-frame recordings", "thin films and other fluids",
 )  # fmt: skip
 
 

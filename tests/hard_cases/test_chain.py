@@ -13,6 +13,7 @@ from tactile_core import accuracy
 from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
 from tactile_core.mechanics.force_search import UnreachableError
 from tactile_core.mechanics.solve import solve
+from tactile_core.recordings import Signals
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNTS
 
@@ -50,10 +51,15 @@ def translated(name: str, share: float) -> Found:
         flags=np.zeros(1, np.uint16),
         pdc=np.zeros(1),
     )
+    return over_bound(signals, {"biotac": biotac.displacement, "digit": digit.displacement})
+
+
+def over_bound(signals: Signals, truths: dict[str, np.ndarray]) -> Found:
+    """The larger of both surfaces' largest node errors over their bounds, of one frame; 1 where it is flagged."""
     found = translator()(signals)
     worst, words = 0.0, []
-    for sensor, truth in (("biotac", biotac), ("digit", digit)):
-        error = float(accuracy.max_error(getattr(found, f"displacement_{sensor}"), truth.displacement[None])[0])
+    for sensor, truth in truths.items():
+        error = float(accuracy.max_error(getattr(found, f"displacement_{sensor}"), truth[None])[0])
         bound = float(getattr(found, f"error_bound_{sensor}")[0])
         worst = max(worst, error / bound)
         words.append(f"{sensor} {error * 1e6:.0f} um (bound {bound * 1e6:.0f})")

@@ -22,6 +22,7 @@ from benchmarks.translation import (
     fluid_pressure,
     followed_rows,
     grips,
+    made_up_units,
     prints,
     recordings,
     sequence_rows,
@@ -99,6 +100,7 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
     found += sequence_rows.full_rows(network, pairs)
     found += two_contact_rows.rows(pairs)
+    found += made_up_units.rows(network, *((2, 2) if options.quick else ()))
     apart = [translate.load_translator(folder) for folder in options.held_out]
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)

@@ -1,0 +1,204 @@
+"""Rows of made-up units: what a film, a fluid and a skin unlike the typical unit's cost, known, found or not known.
+
+Presses by the training's indenters, each contact solved by the fast tier with the core as near as the unit's film is
+thin, and read by the conducting sheet itself, not its reduced one; gains 10 % apart, 1.5 counts of noise, gains never
+given. Truth is the fast tier's, the gel under the unit's own force.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from tactile_core import accuracy, sensors
+from tactile_core.accuracy import Row, row
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Indenter
+from tactile_core.mechanics.electrodes.biotac_sheet import BiotacSheet, biotac_sheet
+from tactile_core.mechanics.fast.compliance import Compliance, compliance_of
+from tactile_core.mechanics.fast.contact_state import Contact
+from tactile_core.mechanics.fast.press import CorrectedPress
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, pose_at, thickness_under
+from tactile_core.mechanics.solve import Step, solve_path
+from tactile_core.recordings import Recording
+from tactile_core.recordings.assemble import assemble
+from tactile_core.recordings.electrode_gains import ElectrodeGains
+from tactile_core.recordings.signals import PrepareOptions
+from tactile_core.sensors import COUNT_MAX, REST_COUNTS, SAMPLE_RATE, SOURCE, TARGET, divider
+from tactile_core.sensors.readout import NOISE, converted
+from tactile_core.simulation.pair_sampling import draw_place, paired
+from tactile_core.simulation.scene import Scene, load_scene
+from tactile_core.translation.translate import PreparedRows, translated
+from tactile_core.translation.translator import Translator
+
+from .noise import GAIN
+
+SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training"
+# Over the typical unit's: films and conductivities of five real units and some room (shared/design/finger.md),
+# stiffnesses between the quartiles of real pressures over simulated ones (descriptor of the BioTac).
+FILMS, CONDUCTIVITIES, STIFFNESSES = (0.35, 1.25), (0.45, 1.3), (0.58, 1.05)
+UNITS, PRESSES, CONTACTS = 6, 10, 6  # 360 contacts
+FORCES = 0.2, 2.0  # N, log-uniform: a typical skin's at the deepest contact of a press
+HELD, STILL = 8, 6  # frames at the deepest contact, and without one before the next
+AT_FIRST = 60  # frames without contact
+SEED = 17
+
+
+@dataclasses.dataclass(frozen=True)
+class Unit:
+    """A finger whose film, fluid and skin are so thick, conducting and stiff over a typical one's."""
+
+    film: float = 1.0
+    conductivity: float = 1.0
+    stiffness: float = 1.0
+
+    @property
+    def skin(self) -> Compliance:
+        """The skin, over a core as near as the film is thin."""
+        return _skin(self.film)
+
+    @property
+    def sheet(self) -> BiotacSheet:
+        """The fluid at the typical conductivity."""
+        return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
+
+    def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
+        """An indenter in front of the finger; its forces are a typical skin's."""
+        pose = pose_at(SOURCE, indenter, place)
+        limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
+        return CorrectedPress(self.skin, indenter, pose, limit, friction)
+
+    def rest(self) -> np.ndarray:
+        """Counts (19,) at rest."""
+        return self._counts(np.full(len(REST_COUNTS), 1 / self.film))
+
+    def readings(self, contacts: Sequence[Contact]) -> np.ndarray:
+        """Counts (T, 19), not rounded, in contacts of ``press``."""
+        skin, sheet, typical = self.skin, self.sheet, biotac_sheet()
+        moved = ((each.sensing_gaps - skin.watch_gap)[skin.feet :] for each in contacts)
+        found = np.stack([sheet.resistances(sheet.films_of(each)) for each in moved])
+        return self._counts(found / typical.resistances(typical.film))
+
+    def _counts(self, resistance: np.ndarray) -> np.ndarray:
+        """Counts (..., 19) for the film's resistances (..., 19) over a typical unit's at rest, but for the fluid."""
+        film = divider.film_impedance(REST_COUNTS)
+        series = COUNT_MAX / REST_COUNTS - 1 - film
+        return COUNT_MAX / (1 + series + film * resistance / self.conductivity)
+
+    def file(self) -> ElectrodeGains:
+        """Return it in the form of `tactile adapt`, with the gains left open."""
+        ones, rest = [1.0] * len(REST_COUNTS), self.rest().tolist()
+        return ElectrodeGains("given", ones, [0.0] * len(ones), rest, film=self.film, stiffness=self.stiffness)
+
+
+@functools.cache
+def _skin(film: float) -> Compliance:
+    skin = compliance_of(SOURCE)
+    return dataclasses.replace(skin, watch_gap=film * skin.watch_gap)
+
+
+@dataclasses.dataclass(frozen=True)
+class Played:
+    """A recording of a unit; frames : (C,) of its contacts; force : (C,) N; gel : (C, M, 3) m, the truth there."""
+
+    unit: Unit
+    recording: Recording
+    frames: np.ndarray
+    force: np.ndarray
+    gel: np.ndarray
+
+
+def played(number: int, unit: Unit, presses: int = PRESSES) -> Played:
+    """Press a unit again and again, with rest in between, and record it; number : of the presses, the only seed."""
+    random, (scene, _) = np.random.default_rng([SEED, number, 1]), load_scene(SCENE)
+    counts, frames, force, gel = [np.tile(unit.rest(), (AT_FIRST, 1))], [], [], []
+    for _ in range(presses):
+        read, sizes, gels = _one_press(unit, scene, random)
+        start = sum(map(len, counts))
+        frames.append(start + np.arange(len(read)))
+        still = np.tile(unit.rest(), (STILL, 1))
+        counts += [read, np.repeat(read[-1:], HELD, axis=0), read[-2::-1], still]
+        force.append(sizes)
+        gel.append(gels)
+    every = np.concatenate(counts)
+    gain = 1 + GAIN * random.standard_normal(every.shape[1])
+    noisy = unit.rest() + gain * (every - unit.rest()) + NOISE * random.standard_normal(every.shape)
+    stamps = np.arange(len(every)) / SAMPLE_RATE
+    recording = assemble("unit.npz", "NPZ", electrodes=converted(noisy), stamps=stamps)
+    return Played(unit, recording, *map(np.concatenate, (frames, force, gel)))
+
+
+def _one_press(unit: Unit, scene: Scene, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Counts (C, 19), force (C,) N and gels (C, M, 3) m of contacts that deepen; drawn again where none is found."""
+    spec = paired(scene)
+    while True:
+        indenter = scene.indenters[int(random.integers(len(scene.indenters)))].build()
+        place, deepest = draw_place(random, spec), float(np.exp(random.uniform(*np.log(FORCES))))
+        sizes = deepest * np.arange(1, CONTACTS + 1) / CONTACTS
+        try:
+            press = unit.press(indenter, place, spec.friction)
+            contacts = [press.at_force(each) for each in sizes]
+            steps = [Step(force=unit.stiffness * each) for each in sizes.tolist()]
+            gels = list(solve_path(TARGET, indenter, place, steps, friction=spec.friction))
+        except TactileError:  # an edge sinks in, or no such force
+            continue
+        known = [each for each in contacts if each is not None]
+        if len(known) == CONTACTS and all(each.converged and each.contact_patch.any() for each in gels):
+            force = unit.stiffness * np.array([np.linalg.norm(each.force) for each in known])
+            return unit.readings([each.linear for each in known]), force, np.stack([each.displacement for each in gels])
+
+
+# How a unit is taken -> options and the unit's file, of what is given.
+TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | None]]] = {
+    "given": lambda unit: (None, unit.file()),
+    "found": lambda unit: (None, None),
+    "unknown": lambda unit: (PrepareOptions(film=1.0), None),
+}
+
+
+def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
+    """Medians over contacts of units given, found and taken as typical, beside those of as many typical units.
+
+    found : by the recording itself, its rest and contacts, as `tactile convert` does; stiffness cannot be
+    """
+    drawn = []
+    for number in range(units):
+        random = np.random.default_rng([SEED, number, 0])
+        ranges = (FILMS, CONDUCTIVITIES, STIFFNESSES)
+        drawn.append(Unit(*(float(np.exp(random.uniform(*np.log(each)))) for each in ranges)))
+    made, typical = ([played(*each, presses) for each in enumerate(every)] for every in (drawn, [Unit()] * units))
+    beside = _errors(network, typical, "unknown")
+    of = f"{sum(len(each.frames) for each in made)} contacts of {units} units; baseline: of a typical unit"
+    return [
+        row(f"unit_{taken}_{name}", value, metric, baseline=beside[name], of=of)
+        for taken in TAKEN
+        for (name, value), metric in zip(_errors(network, made, taken).items(), ("%", "mm", "1", "ms"), strict=True)
+    ]
+
+
+def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
+    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact."""
+    began = time.process_time()
+    answers = []
+    for each in made:
+        options, unit = TAKEN[taken](each.unit)
+        prepared = PreparedRows(each.recording, each.frames, network.answer, options, unit)
+        answers.append(translated(network, prepared, each.frames))
+    spent = time.process_time() - began
+    force, place, gel = (
+        np.concatenate([getattr(each, name) for each in answers])
+        for name in ("force", "contact_center", "displacement_digit")
+    )
+    true_force, true_gel = (np.concatenate([getattr(each, name) for each in made]) for name in ("force", "gel"))
+    away = accuracy.lengths(place - accuracy.dent_center(true_gel, sensors.digit_surface().rest))
+    return {
+        "force": float(np.median(100 * np.abs(accuracy.lengths(force) / true_force - 1))),
+        "place": 1e3 * float(np.median(np.where(np.isfinite(away), away, np.inf))),  # a lost contact is not near
+        "gel": float(np.linalg.norm(gel - true_gel) / np.linalg.norm(true_gel)),
+        "ms": 1e3 * spent / len(force),
+    }

@@ -1,0 +1,35 @@
+"""Made-up units: the typical one reads as the simulated law has it; film and fluid show at rest; the rows."""
+
+import numpy as np
+import pytest
+from benchmarks.translation import made_up_units
+from benchmarks.translation.made_up_units import Unit
+
+from tactile_core.geometry.indenters import Sphere
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
+from tactile_core.mechanics.placement import Placement
+from tactile_core.sensors import REST_COUNTS
+from tactile_core.translation.translate import load_translator
+
+
+def test_a_typical_unit_reads_as_the_law_has_it():
+    contact = Unit().press(Sphere(4e-3), Placement(-8e-3, 1e-3), 0.5).at_depth(0.6e-3).linear
+    rest, (pressed,) = Unit().rest(), Unit().readings([contact])
+    np.testing.assert_allclose(rest, REST_COUNTS)
+    change = signal_of(contact)
+    assert np.linalg.norm(pressed - rest - change) < 0.1 * np.linalg.norm(change)  # the reduced sheet leaves .06 here
+
+
+@pytest.mark.parametrize(("film", "conductivity"), [(0.5, 1.0), (1.0, 0.5)])
+def test_a_thin_film_and_a_weak_fluid_raise_the_impedance_at_rest_alike(film, conductivity):
+    np.testing.assert_allclose(Unit(film, conductivity).rest(), Unit(0.5).rest())
+    assert (Unit(0.5).rest() < REST_COUNTS).all()
+
+
+def test_rows_of_units_given_found_and_unknown():
+    found = made_up_units.rows(load_translator(), units=2, presses=2)
+    names = [
+        f"unit_{taken}_{name}" for taken in ("given", "found", "unknown") for name in ("force", "place", "gel", "ms")
+    ]
+    assert [each["name"] for each in found] == names
+    assert all(np.isfinite(each["value"]) for each in found)
