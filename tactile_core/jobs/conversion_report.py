@@ -77,9 +77,9 @@ class ConversionReport:
         """Return warnings for the user: of the recording, and of its translated frames."""
         translator, drawer = self._tools.translator, self._tools.drawer
         found = [
+            *filter(None, [doubt(translator.card)]),
             *self._rows.signals.warnings,
             *translator.answer.describe_shift(),
-            *filter(None, [doubt(translator.card)]),
         ]
         found += drawer.describe_gel()
         for flag, words in SENTENCES.items():

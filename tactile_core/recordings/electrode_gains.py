@@ -185,7 +185,8 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
         "tactile convert RECORDING --sensor THIS_FILE",
     )
     if typical_rest(sensor.sensor) is None:
-        head = (f"Rest of a {name}, E1 to {last}, in counts. Used by: tactile info RECORDING --sensor THIS_FILE",)
+        words = f"Rest of a {name}, E1 to {last}, in counts; film over a typical unit's."
+        head = (words, "Used by: tactile convert RECORDING --sensor THIS_FILE")
     lines = [*(f"# {line}" for line in head), *_lines({"format": sensor.format, "sensor": sensor.sensor})]
     for section, unit in sensor.sections().items():
         table = f"topics.{toml_quoted(section)}" if "/" in section else section

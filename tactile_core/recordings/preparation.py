@@ -94,9 +94,9 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
 def _film(
     recording: Recording, change: Changes, rest: Baseline, pdc: np.ndarray, options: PrepareOptions, *, own_rest: bool
 ) -> film.Film | None:
-    """Return the fluid film of a raw recording whose rest is known; None of a sensor without simulated contacts."""
+    """Return the film of a raw recording whose rest is known; of a sensor without simulated contacts only as given."""
     if contacts_of(recording.sensor) is None:
-        return None
+        return None if options.film is None else film.Film.given(options.film)
     pressure = of_kind(recording.sensor, Fluid).readout.pressure * pdc if np.isfinite(pdc).any() else None
     return film.find(
         change, Changes(len(recording), rest.at), recording.time, pressure, recording.sensor,

@@ -21,9 +21,11 @@ from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
 from ..recordings.unit.gain_matching import PRIOR, Match, match
 from ..sensors import PRESSURE_PER_COUNT, title, typical_rest
-from . import reference_signals
+from . import networks, reference_signals
+from .card import REST
 from .reference_signals import ReferenceSignals
-from .unit_rest import UnitRest, find_rest, find_rest_sp
+from .unit_rest import Simulated, UnitRest, find_rest, find_rest_sp
+from .weights import read_card
 
 FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
 MOST_FRAMES = 3_000  # looked at, evenly spread; neighbours at 100 Hz say the same
@@ -109,7 +111,7 @@ def adapt_hand(
     if typical_rest(sensor) is None:
         rests = {unit: _rest_of_files(files, sensor) for unit, files in units.items()}
         return units_file(rests, sensor), (
-            f"no gains are fitted to a {title(sensor)}: its recordings give its rest alone",
+            f"no gains are fitted to a {title(sensor)}: its recordings give its rest and film",
         )
     fitted: dict[str, ElectrodeGains] = {}
     warnings: list[str] = []
@@ -135,9 +137,11 @@ def _units(every: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
-    """Rest of a unit of a sensor that has no gains."""
-    rest = find_rest_sp([read(path, sensor=sensor) for path in files])
-    return _rest_alone(rest, f"median of each electrode's least loaded tenth, {rest.recordings} contacts")
+    """Rest and film of a unit of a sensor that has no gains."""
+    folder = networks.shipped_folder(sensor)
+    simulated = Simulated(reference_signals.read(folder).typical, np.array(read_card(folder)[0][REST]))
+    rest = find_rest_sp([read(path, sensor=sensor) for path in files], simulated)
+    return _rest_alone(rest, f"rest and film that bring {rest.recordings} contacts nearest to simulated ones")
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
@@ -171,7 +175,8 @@ def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
 def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
     counts, spread = ([round(value, 4) for value in each.tolist()] for each in (rest.counts, rest.spread))
     ones, zeros = [1.0] * len(counts), [0.0] * len(counts)
-    return ElectrodeGains(note, ones, zeros, counts, spread, None if rest.pdc is None else round(rest.pdc, 4))
+    pdc = None if rest.pdc is None else round(rest.pdc, 4)
+    return ElectrodeGains(note, ones, zeros, counts, spread, pdc, rest.film)
 
 
 def _fitted(

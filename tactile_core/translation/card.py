@@ -107,6 +107,7 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = 
 
 
 NODES = "_nodes_sha256"  # after a sensor's name in a card, the hash of its surface
+DOUBT = "doubt"  # in a card: a sentence on what no real sensor has shown of its translations
 REST = "rest_counts"  # in a card: counts at rest that changes are those of, where the sensor's table holds none
 
 ROW, SET = "chain_rms_um", "test presses"  # BioTac signals to the gel's displacement, rms over its nodes
@@ -143,7 +144,12 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate."""
+    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate.
+
+    Or return the card's own, under ``DOUBT``.
+    """
+    if isinstance(card.get(DOUBT), str):
+        return card[DOUBT]
     found = chain_error(card)
     if found is None or found[0] <= WORSE * found[1]:
         return ""

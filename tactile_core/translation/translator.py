@@ -15,7 +15,7 @@ from ..recordings.flags import Flag
 from ..sensors import unrolling as surface
 from . import gel_place
 from .answer import MEAN, Answer
-from .card import KINDS, PLACE, REST, STATE, SURFACES, doubt, error_bound
+from .card import DOUBT, KINDS, PLACE, REST, STATE, SURFACES, doubt, error_bound
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence
 from .layers import COMPRESSED_LIMIT, DISTANCES
@@ -192,6 +192,7 @@ class Translator:
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         shares = residual_shares(change, rectified, self._patterns)
         flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
+        flags[~silent & (DOUBT in self.card)] |= np.uint16(Flag.LAW_DOUBTED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)
         flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)

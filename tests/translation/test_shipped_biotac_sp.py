@@ -1,5 +1,6 @@
 """The networks that ship for a BioTac SP: taken for its recordings, small, and better than the baselines they state."""
 
+import json
 import subprocess
 import sys
 
@@ -8,9 +9,11 @@ import numpy as np
 import pytest
 
 from tactile_core.cli.main import main
+from tactile_core.recordings.flags import Flag
 from tactile_core.translation import networks, reference_signals
 from tactile_core.translation.card import chain_error, doubt
 from tactile_core.translation.translate import load_translator
+from tactile_core.translation.trust_words import LOW_CONFIDENCE
 
 NAME, MOST = "biotac_sp", 8e6  # bytes
 
@@ -26,7 +29,7 @@ def test_they_are_its_own_small_and_worth_something(network):
     assert folder != networks.WEIGHTS_FOLDER and networks.shipped_folder("biotac") == networks.WEIGHTS_FOLDER
     assert sum(file.stat().st_size for file in folder.iterdir()) < MOST
     error, baseline = chain_error(network.card)
-    assert error < 0.8 * baseline and not doubt(network.card)
+    assert error < 0.8 * baseline and doubt(network.card).startswith("these are guesses")
 
 
 def test_its_recordings_are_converted_by_them_and_a_biotac_s_beside_is_refused(network, tmp_path, slide_csv, capsys):
@@ -42,6 +45,9 @@ def test_its_recordings_are_converted_by_them_and_a_biotac_s_beside_is_refused(n
     with h5py.File(tmp_path / "out/slip/frames.h5") as file:
         moved, force = file["displacement_digit"][:], np.linalg.norm(file["force"][:], axis=1)
         assert file[f"displacement_{NAME}"].shape[0] == len(moved) == 40
+        guesses, flags = file["confidence"][:] < LOW_CONFIDENCE, file["flags"][:]
+    assert json.loads((tmp_path / "out/slip/note.json").read_text())["warnings"][0].startswith("these are guesses")
+    assert guesses[22:].all() and (flags[22:] & Flag.LAW_DOUBTED).all() and not (flags[:18] & Flag.LAW_DOUBTED).any()
     assert not moved[:18].any() and not force[:18].any()
     assert np.abs(moved[22:]).max() > 20e-6 and (force[22:] > 0).all()
 

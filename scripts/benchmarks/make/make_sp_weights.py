@@ -4,7 +4,7 @@
     TACTILE_SENSORS=own python scripts/benchmarks/make/make_sp_weights.py sp.h5 --out sp
 
 own/biotac_sp/ holds the table of electrodes (docs/extend.md). Five minutes of CPU; sp/weights then goes to
-tactile_core/data/weights/biotac_sp. Needs torch.
+tactile_core/data/weights/biotac_sp, where the card's `doubt` is kept. Needs torch.
 """
 
 from __future__ import annotations

@@ -55,6 +55,11 @@ class Film:
     frames: np.ndarray
     conductivity: np.ndarray
 
+    @classmethod
+    def given(cls, thickness: float) -> Film:
+        """Return a film of known thickness over a fluid that does not drift."""
+        return cls(thickness, "given", np.zeros(1), np.zeros(1))
+
     def changes(self, change: Changes, rest: Baseline) -> Changes:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
