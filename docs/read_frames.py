@@ -17,5 +17,5 @@ while True:
         arrays[name] = np.frombuffer(raw, dtype, count=np.prod(shape, dtype=int)).reshape(shape)
         raw = raw[arrays[name].nbytes :]
     print(
-        frame["frame"], frame["force_n"], arrays["picture"].mean(axis=(0, 1)), flush=True
+        frame["frame"], frame["force_n"], frame["confidence"], arrays["picture"].mean(axis=(0, 1)), flush=True
     )  # levels of red, green, blue

@@ -16,6 +16,7 @@ PROPERTIES = {  # custom ones of a sensor, keyframed: for drivers of the user's 
     "confidence": "1: signals like those of the training, 0: far from them",
     "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres;"
     " below 0 where it is not known",
+    "dent_um": "Largest displacement of a node of this surface, micrometres",
     "flags": "What is remarkable about the frame, as bits; the tab Tactile says it in words",
 }
 

@@ -10,6 +10,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import results
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
@@ -38,6 +39,7 @@ class Translated:
             "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
             "confidence": translation.confidence,
             "expected_error_um": 1e6 * translation.expected_error_biotac,
+            "dent_um": 1e6 * accuracy.lengths(translation.displacement_biotac).max(axis=1),
             "flags": translation.flags,
         }
         if self.recording.pdc is not None:

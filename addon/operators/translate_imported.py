@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 
+from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import gel_place
 from ..objects import curves, digit_body, digit_objects
@@ -77,6 +78,7 @@ class TACTILE_OT_translate(JobOperator):
         values = self._found.columns()
         told = {name: values[name] for name in ("force", "confidence")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
+        told |= {"dent_um": 1e6 * accuracy.lengths(self._moved).max(axis=1)}
         summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)
         if new:
             set_style.take_over(gel, skin)

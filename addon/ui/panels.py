@@ -1,6 +1,7 @@
 """The tab "Tactile" in the 3D view's sidebar."""
 
 import json
+import math
 import textwrap
 
 import bpy
@@ -88,8 +89,9 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
     shown = gel if gel is not None and "expected_error_um" in gel else skin
     if "expected_error_um" not in shown:
         return "", False
-    trust = shown["confidence"], int(shown.get("flags", 0))
-    words = trust_words.in_words(*trust, 1e-6 * shown["expected_error_um"], skin["force"])
+    error, dent = (1e-6 * shown.get(name, math.nan) for name in ("expected_error_um", "dent_um"))
+    trust = shown["confidence"], int(shown.get("flags", 0)), error, dent
+    words = trust_words.in_words(*trust, skin["force"])
     return words, trust_words.is_guess(*trust)
 
 

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import accuracy
 from ..files import atomic
 from ..recordings import flags
-from ..sensors import PRESSURE_PER_COUNT, SOURCE, title
+from ..sensors import SOURCE, title
 from ..sensors.camera import Camera
 from ..translation.card import doubt
 from ..translation.trust_words import LOW_CONFIDENCE, SENTENCES
@@ -139,7 +140,7 @@ class ConversionReport:
             mount_shift=self._tools.translator.answer.mount_shift,
             pressure=np.concatenate(self._pressure),
             explained=np.concatenate(self._explained),
-            pressure_measured=PRESSURE_PER_COUNT * signals.pdc[rows],
+            pressure_measured=signals.pressure_measured[rows],
             warnings=self.warnings(),
             source=self._tools.translator.source,
             **columns,
@@ -251,7 +252,8 @@ def _drawn(shown: Contents) -> SheetFigure:
     gel = title(shown.camera.sensor)
     figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, shown.contact_center)
     figure.picture_row(f"{gel} picture", shown.pictures)
-    figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit)
+    dent = accuracy.lengths(shown.displacement_digit).max(axis=1)
+    figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit, dent)
     return figure
 
 

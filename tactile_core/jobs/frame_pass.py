@@ -11,7 +11,6 @@ import numpy as np
 
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import folds_counted
-from ..sensors import PRESSURE_PER_COUNT
 from ..translation.gel_place import beyond_picture
 from ..translation.translate import CHUNK, Read, RecordingPass
 from .drawer import Drawer
@@ -103,7 +102,7 @@ class FramePass:
         arrays, signals = dict(vars(found.translation)), found.signals
         if self._translator.answer.samples:
             arrays |= self._translator.plausible(found.evidence, frames, signals.stiffness)
-        arrays |= {"electrodes": signals.electrodes, "pressure_measured": PRESSURE_PER_COUNT * signals.pdc}
+        arrays |= {"electrodes": signals.electrodes, "pressure_measured": signals.pressure_measured}
         arrays["flags"] = (
             arrays["flags"] | signals.flags | beyond_picture(arrays["contact_center"], self._drawer.camera)
         )

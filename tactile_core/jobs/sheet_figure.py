@@ -252,17 +252,23 @@ class SheetFigure:
         self.top += height
 
     def captions(
-        self, force: np.ndarray, confidence: np.ndarray, flags: np.ndarray, expected_error: np.ndarray
+        self,
+        force: np.ndarray,
+        confidence: np.ndarray,
+        flags: np.ndarray,
+        expected_error: np.ndarray,
+        dent: np.ndarray,
     ) -> None:
         """Write below each column its force (k, 3) N and how far it is to be trusted, and how to read the maps.
 
-        confidence (k,) 0..1, flags (k,), expected_error (k,) m : for `trust_words.in_words`
+        confidence (k,) 0..1, flags (k,), expected_error (k,) m, dent (k,) m : for `trust_words.in_words`
         """
         for k in range(self.columns):
-            trust = in_words(confidence[k], flags[k], expected_error[k], force[k])
+            shape = confidence[k], flags[k], expected_error[k], dent[k]
+            trust = in_words(*shape, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *trust.replace(", ", ",\n").split("\n")]
             text = "\n".join(textwrap.fill(line, CAPTION_LETTERS) for line in lines)
-            color = MARK if is_guess(confidence[k], flags[k]) else "black"
+            color = MARK if is_guess(*shape) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION
         tip, along = "up" if self.camera.down_x > 0 else "down", "left" if self.camera.right_z < 0 else "right"

@@ -1,16 +1,17 @@
-"""Detect faulty electrodes: readings at an end of the converter's range, and dead channels."""
+"""Find faulty electrodes and rows, and interpolate: glitches, rows that came twice, dead channels, strange rests."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import COUNT_MAX, typical_rest
+from ..sensors import COUNT_MAX, divider, typical_rest
 from .flags import Flag
 from .recording import Recording
-from .repair import END, SHORT
+from .repair import END, SHORT, fill, find_glitches, is_time_series
 from .signal_kind import FULL_SCALES, RAW_LEVEL, full_scale
 
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
@@ -20,6 +21,10 @@ STEADY = 6.0
 NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
 ALIKE = 0.75  # of the electrodes that read the same where a finger does not answer: a dead one may differ (assumed)
 FROZEN = 50  # frames, half a second, of noise that stops in all electrodes (assumed)
+SHOWN = 8  # bad places spelled out one by one in the warnings
+STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
+# Impedance at rest over a typical unit's, or below it, that no unit's film and fluid give: .9 to 3.3 are seen (assumed)
+STRANGE_REST = 8.0
 MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 
 
@@ -103,6 +108,89 @@ def _frozen(change: np.ndarray) -> np.ndarray:
     if not long or found.all() or np.median(change[~found[1:]].mean(axis=0)) < NOISY:
         return np.zeros(len(still), bool)
     return found
+
+
+def mended(
+    recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], *, repair: bool
+) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
+    """Interpolate what was not read: return readings (T, 19), flags (T,), and what was repaired, for the report.
+
+    repair : also glitches and rows that came twice; findings are added to the warnings
+    """
+    unreadable = ~np.isfinite(recording.electrodes)
+    glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
+    if repair:
+        again, long = _stale(recording, readings, warnings)
+        flags = flags | np.where(again, Flag.REPAIRED, 0).astype(np.uint16)
+        flags |= np.where(long, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
+        unreadable |= again[:, None]
+        glitches = _glitches(recording, fill(readings, unreadable), warnings)
+    flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
+    bad = glitches | unreadable
+    return fill(readings, bad), flags, {
+        "samples_interpolated": interpolated,
+        "samples_glitch": int(glitches.sum()),
+        "rows_repaired": recording.rows[bad.any(axis=1)].tolist(),
+    }  # fmt: skip
+
+
+def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Mark the frames (T,) bool that repeat the row before them, and those of runs too long to be interpolated.
+
+    A packet was lost, or the driver stood still, where `STALE` rows and more are equal although most electrodes are
+    noisy. electrodes : (T, e) counts; findings are added to the warnings
+    """
+    change = electrodes[1:] != electrodes[:-1]
+    found, long = np.zeros((2, len(electrodes)), bool)
+    noisy = len(change) > 0 and np.median(change.mean(axis=0)) >= NOISY
+    same = np.r_[False, ~change.any(axis=1)]
+    runs = [(first, last) for first, last in _runs(same) if last - first >= STALE - 1] if noisy else []
+    for first, last in runs:
+        found[first:last] = True
+        long[first:last] = last - first > SHORT
+    if runs:
+        longest = max(last - first for first, last in runs)
+        warnings.append(
+            f"{found.sum()} frames repeat the row before, up to {longest} in a run, first in {recording.row_word} "
+            f"{recording.rows[runs[0][0]]}: lost packets, or a driver that stood still; interpolated"
+        )
+    return found, long
+
+
+def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
+    """Mark samples (T, 19) bool to repair, and report them in the warnings."""
+    found = find_glitches(readings)
+    if not is_time_series(found):
+        warnings.append(
+            f"{found.any(axis=1).mean():.0%} of the frames look like glitches: neighbouring rows seem not to belong"
+            " together, nothing was repaired"
+        )
+        return np.zeros(readings.shape, bool)
+    frames = np.flatnonzero(found.any(axis=1))
+    for frame in frames[:SHOWN]:
+        cells = [f"E{j + 1} {recording.electrodes[frame, j]:g}" for j in np.flatnonzero(found[frame])]
+        warnings.append(f"{recording.row_word} {recording.rows[frame]}: glitch in {', '.join(cells)}; interpolated")
+    if len(frames) > SHOWN:
+        warnings.append(
+            f"{len(frames) - SHOWN} more frames with glitches, the last in {recording.row_word}"
+            f" {recording.rows[frames[-1]]}"
+        )
+    return found
+
+
+def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
+    """Return whether no unit of a sensor rests at counts (e,), which is then added to the warnings."""
+    typical = typical_rest(sensor)
+    if typical is None:
+        return False
+    ratio = float(np.median(divider.film_impedance(rest) / divider.film_impedance(typical)))
+    if 1 / STRANGE_REST <= ratio <= STRANGE_REST:
+        return False
+    warnings.append(
+        f"electrodes rest at {np.median(rest):.0f} counts, an impedance {ratio:.2g} times a typical unit's, which no "
+        "film gives: counts of another number of bits? (--counts-per-unit)"
+    )
+    return True
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:

@@ -13,7 +13,7 @@ class Flag(enum.IntFlag):
     RECTIFIED = 4  # the recording holds absolute changes: their sign is lost
     NO_QUIET_PART = 8  # no part without contact was found, so the tare is a guess
     SATURATED = 16  # an electrode is at an end of its 12-bit range
-    DEAD_CHANNEL = 32  # an electrode never changes in the whole recording
+    DEAD_CHANNEL = 32  # an electrode, or all of them, stands still for long
     OUT_OF_RANGE = 64  # the signals lie outside those the networks were trained on
     BEYOND_DIGIT = 128  # the contact has no counterpart on the DIGIT's gel
     POLARITY_ASSUMED = 256  # whether counts fall or rise where a film thins is not shown: taken to fall, as raw ones do
@@ -23,7 +23,7 @@ class Flag(enum.IntFlag):
     GEL_NOT_SOLVED = 4096  # no contact was solved on the DIGIT (``--gel solved``): its gel is the networks'
     TWO_CONTACTS = 8192  # the signals look like those of two contacts at once; the translation shows one
     LAW_DOUBTED = 16384  # the recording's contacts together resemble no simulated ones: gains, order, rest or skin
-    UNEXPLAINED = 32768  # the signals resemble no simulated contact's: rest may have been taken under load
+    UNEXPLAINED = 32768  # the signals resemble no simulated contact's, or PDC denies it: drift, or rest under load
 
 
 def names() -> dict[str, int]:

@@ -12,12 +12,12 @@ from ..sensors import COUNT_MAX, contacts_of
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, Fluid
 from .doubt import LAW, Doubt, Reason, without
-from .electrode_faults import dead, saturated
+from .electrode_faults import dead, mended, saturated, strange_rest
 from .flags import Flag
 from .polarity import Polarity, choose, polarity_of, polarity_of_sensor
 from .quiet import TARED_PDC, Quiet, calmest, find_quiet, tare_frames, window_frames
 from .recording import Recording
-from .repair import fill, find_glitches, is_time_series, smooth
+from .repair import fill, smooth
 from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
 from .signal_kind import detect, full_scale
 from .signals import EVERY, PrepareOptions, Rest, Signals, typical
@@ -28,7 +28,6 @@ from .unit import contact_law, film
 RECTIFIED, SIGNED = 3, 1
 # Counts that the 95th percentile of a scaled recording's largest changes is stretched to (docs/sources.md, Networks).
 SCALED_PEAK = 150.0
-SHOWN = 8  # bad places spelled out one by one in the warnings
 
 
 def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
@@ -44,7 +43,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         pdc = recording.pdc if kind == "raw" else None
         if pdc is not None and (COUNT_MAX if unit < 1 else 0) < np.nanmax(pdc) <= 1.01 * COUNT_MAX / unit:
             recording = replace(recording, pdc=unit * pdc)
-    readings, flags, repaired = _repaired(recording, readings, flags, options, warnings)
+    readings, flags, repaired = mended(recording, readings, flags, warnings, repair=options.repair)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
         warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
@@ -58,6 +57,8 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         rest = Baseline.constant(np.array(unit_rest.counts))
         quiet = Quiet(np.zeros(len(readings), bool), (), "the unit's own rest: no calm part near it")
     flags |= saturated(recording, readings, kind, warnings) | dead(recording, readings, warnings)
+    if kind == "raw" and strange_rest(rest.at(np.array([0]))[0], recording.sensor, warnings):
+        flags |= np.uint16(Flag.OUT_OF_RANGE)
     at_start, at_end = rest.at(np.array([0, len(recording) - 1]))
     slope = (at_end - at_start) / recording.duration if recording.duration > 0 else np.zeros(len(at_start))
     window = options.smooth or (RECTIFIED if kind == "rectified" else SIGNED)
@@ -196,44 +197,6 @@ def _counts_per_unit(
         " for volts of 3.3 V"
     )
     return factor
-
-
-def _repaired(
-    recording: Recording, readings: np.ndarray, flags: np.ndarray, options: PrepareOptions, warnings: list[str]
-) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Return the readings (T, 19) without glitches, the flags (T,), and what was repaired, for the report."""
-    glitches, unreadable = _glitches(recording, readings, options, warnings), ~np.isfinite(recording.electrodes)
-    flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
-    bad = glitches | unreadable
-    return fill(readings, bad), flags, {
-        "samples_interpolated": int(unreadable.sum()),
-        "samples_glitch": int(glitches.sum()),
-        "rows_repaired": recording.rows[bad.any(axis=1)].tolist(),
-    }  # fmt: skip
-
-
-def _glitches(recording: Recording, readings: np.ndarray, options: PrepareOptions, warnings: list[str]) -> np.ndarray:
-    """Mark samples (T, 19) bool to repair, and report them in the warnings."""
-    none = np.zeros(readings.shape, bool)
-    if not options.repair:
-        return none
-    found = find_glitches(readings)
-    if not is_time_series(found):
-        warnings.append(
-            f"{found.any(axis=1).mean():.0%} of the frames look like glitches: neighbouring rows seem not to belong"
-            " together, nothing was repaired"
-        )
-        return none
-    frames = np.flatnonzero(found.any(axis=1))
-    for frame in frames[:SHOWN]:
-        cells = [f"E{j + 1} {recording.electrodes[frame, j]:g}" for j in np.flatnonzero(found[frame])]
-        warnings.append(f"{recording.row_word} {recording.rows[frame]}: glitch in {', '.join(cells)}; interpolated")
-    if len(frames) > SHOWN:
-        warnings.append(
-            f"{len(frames) - SHOWN} more frames with glitches, the last in {recording.row_word}"
-            f" {recording.rows[frames[-1]]}"
-        )
-    return found
 
 
 def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions) -> Quiet:

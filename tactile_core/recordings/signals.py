@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import TactileError
 from ..sensors import SOURCE, divider, typical_rest
-from ..sensors.fluid_sensor import POLARITIES
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import POLARITIES, Fluid
 from .polarity import AUTO
 from .quiet import TARED_PDC
 from .rest_level import Changes
@@ -121,6 +122,11 @@ class Signals:
     def at(self, frames: np.ndarray | slice) -> Signals:
         """Return the signals of some frames alone; rest and drift stay those of the recording."""
         return replace(self, **{name: getattr(self, name)[frames] for name in FRAMEWISE})
+
+    @property
+    def pressure_measured(self) -> np.ndarray:
+        """Rise (T,) Pa of the fluid's pressure over that at rest, by PDC; NaN where it was not recorded."""
+        return of_kind(self.sensor, Fluid).readout.pressure * self.pdc
 
     @property
     def typical(self) -> np.ndarray:

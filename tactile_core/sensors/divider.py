@@ -22,7 +22,7 @@ _ENDS = 0.4, COUNT_MAX - 0.4  # counts, which round to the converter's ends: the
 _RESTS = 500.0, 3900.0
 
 
-def reading(growth: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
+def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
     """Return the counts (..., 19), not rounded, after impedances grew by factors (..., 19) from rest counts (19,)."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 

@@ -20,7 +20,7 @@ from ..recordings.recording import FINGERS, short_of, split
 from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
 from ..recordings.unit.gain_matching import PRIOR, Match, match
-from ..sensors import PRESSURE_PER_COUNT, title, typical_rest
+from ..sensors import title, typical_rest
 from . import networks, reference_signals
 from .card import REST
 from .reference_signals import ReferenceSignals
@@ -160,7 +160,7 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
     rest = np.concatenate([np.broadcast_to(one.rest, one.change.shape) for one in every])
     starts = np.cumsum([0.0, *(one.duration + BETWEEN for one in recordings[:-1])])
     time = np.concatenate([start + one.time for start, one in zip(starts, recordings, strict=True)])
-    pressure = PRESSURE_PER_COUNT * np.concatenate([one.pdc for one in every])
+    pressure = np.concatenate([one.pressure_measured for one in every])
     return film.find(change, rest, time, pressure, recordings[0].sensor, own_rest=False).thickness
 
 

@@ -6,7 +6,8 @@ strengths. Two always fit better; what counts is that they leave little where on
 the simulated one are fitted badly by both, and not marked. A second contact near the first, or much lighter, looks like
 one.
 
-A signal unlike even the most similar simulated contact comes from a wrong rest, polarity or order of channels.
+A signal unlike even the most similar simulated contact comes from a wrong rest, polarity or order of channels. One
+that is more like a change of the fluid's conductivity, which moves all electrodes alike, comes from drift.
 Rectified signals are not judged: without signs, two contacts look like one (5 % of pairs were found).
 
 The signs of rectified changes are recovered where they match one simulated contact closely.
@@ -23,8 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..recordings.polarity import TOUCHING, contact_signals
-from ..sensors import SOURCE
+from ..recordings.polarity import contact_signals
+from ..sensors import SOURCE, divider, places_of
+from ..sensors.readout import NOISE
 from .layers import compress
 
 # Shares of the signal's length: what two contacts leave at most, and how much more one leaves. Chosen on 4,000 contacts
@@ -41,60 +43,84 @@ ALIKE = 0.6
 # of the posterior left to R2MPN the quartile falls to .86 at .28, to .81 at .33. Of the test contacts half are within,
 # of those from 0.3 mm two in three.
 LEFT = 0.25
+# Length, counts, below which a change is noise: 19 electrodes of 1.5 have 6.5 (assumed).
+FAINT = 8.0
+# Most of the estimated pressure over the fluid's own, and of that over it: .24 to 1.7 on real grips and slides.
+# FELT, FELT_ALONE : Pa, some 4 and 12 counts of PDC, its noise and its own drift (assumed).
+MOST_OVER, MOST_BELOW, FELT, FELT_ALONE = 3.0, 5.0, 150.0, 450.0
+DRIFT = 1.1  # of the impedance, by which its pattern is drawn (assumed; it hardly depends on it)
 FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
 
 
 @dataclass(frozen=True)
 class Patterns:
-    """Simulated contacts: signals (P, e) float64 counts; units (P, e), of length one; alike (P, P), their cosines."""
+    """Simulated contacts: signals (P, e) float64 counts; units (P, e), of length one; alike (P, P), their cosines.
+
+    drift : (e,), of length one: the change where the fluid's conductivity changes
+    """
 
     signals: np.ndarray
     units: np.ndarray
     alike: np.ndarray
+    drift: np.ndarray
 
 
-def patterns_of(signals: np.ndarray) -> Patterns:
-    """Return the patterns of simulated contacts whose signals are (P, e) counts."""
+def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
+    """Return the patterns of simulated contacts whose signals are (P, e) counts, of a unit at rest counts (e,)."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
-    return Patterns(signals, units, units @ units.T)
+    drift = divider.reading(DRIFT, rest) - rest
+    return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))
 
 
 @functools.cache
 def shipped_patterns(sensor: str = SOURCE) -> Patterns:
     """Return the patterns of the simulated contacts that lie beside a sensor's descriptor."""
-    return patterns_of(contact_signals(sensor))
+    return patterns_of(contact_signals(sensor), places_of(sensor).rest_counts)
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
-    """Return the shares (T, 2) of changes (T, 19) counts that the best one and the best two patterns do not explain.
+    """Return the shares (T, 3) of changes (T, 19) counts that the best pattern, the best two, and drift do not explain.
 
     change : of a typical unit; patterns : of the sensor, None for a BioTac's
-    rectified : (T,) bool; these frames and those that hardly change are not judged: NaN
+    rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN
     """
-    found = np.full((len(change), 2), np.nan)
+    patterns = patterns or shipped_patterns()
+    found = np.full((len(change), 3), np.nan)
     length = np.sqrt(np.square(change, dtype=np.float64).sum(axis=1))
-    rows = np.flatnonzero((length >= TOUCHING) & ~rectified)
-    found[rows] = np.stack(residual_lengths(change[rows] / length[rows, None], patterns), axis=1)
+    rows = np.flatnonzero((length >= FAINT) & ~rectified)
+    signals = change[rows] / length[rows, None]
+    by_drift = np.sqrt(np.maximum(1 - np.square(signals @ patterns.drift), 0))
+    found[rows] = np.stack([*residual_lengths(signals, patterns), by_drift], axis=1)
     return found
 
 
 def two_contacts(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that two contacts explain and one does not, by their ``residual_shares`` (T, 2)."""
-    one, two = shares.T
+    """Mark (T,) bool the frames that two contacts explain and one does not, by their ``residual_shares`` (T, 3)."""
+    one, two, _ = shares.T
     return (two < LEFT_BY_TWO) & (one - two > MORE_BY_ONE)
 
 
-def unlike(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that resemble no simulated contact, by their ``residual_shares`` (T, 2)."""
-    return shares[:, 0] > UNLIKE
+def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Mark (T,) bool the frames that resemble no simulated contact, or drift more, by ``residual_shares`` (T, 3).
+
+    change : (T, 19) counts; of a faint one, noise leaves a larger share
+    """
+    one, _, by_drift = shares.T
+    square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)
+    return one > np.minimum(np.sqrt(UNLIKE**2 + change.shape[1] * NOISE**2 / square), by_drift)
 
 
-def residual_lengths(signals: np.ndarray, patterns: Patterns | None = None) -> tuple[np.ndarray, np.ndarray]:
+def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    """Mark (T,) bool the frames whose estimated pressure (T,) Pa is not the measured one, NaN where none was."""
+    measured = np.maximum(measured, 0)
+    return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + FELT_ALONE)
+
+
+def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarray, np.ndarray]:
     """Return the residual lengths (T,) of unit signals (T, 19) after fitting the best pattern, and the best two.
 
     Two are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal.
     """
-    patterns = patterns or shipped_patterns()
     alike, near = patterns.alike, signals @ patterns.units.T
     one = np.sqrt(np.maximum(1 - np.square(near.max(axis=1, initial=0)), 0))
     two = one.copy()

@@ -16,7 +16,7 @@ from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
 from . import networks, reference_signals
 from .answer import Answer
-from .card import NODES, check_pair, check_tables
+from .card import NODES, REST, check_pair, check_tables
 from .contact_track import Evidence, Tracker, needed
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
@@ -189,7 +189,8 @@ def load_translator(
                 f"{here[:12]}..., the surface of this version", "Use weights trained with this version of the sensors",
             )  # fmt: skip
     if sensors.contacts_of(nets.source) is None:
-        known = patterns_of(reference_signals.read(place).typical)
+        rest = np.array(nets.card.get(REST, sensors.typical_rest(nets.source)))
+        known = patterns_of(reference_signals.read(place).typical, rest)
     else:
         known = shipped_patterns(nets.source)
     return Translator(nets, answer, known)

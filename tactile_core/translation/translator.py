@@ -12,6 +12,7 @@ from ..errors import TactileError
 from ..files.short_text import Summary
 from ..recordings import Signals
 from ..recordings.flags import Flag
+from ..recordings.polarity import TOUCHING
 from ..sensors import unrolling as surface
 from . import gel_place
 from .answer import MEAN, Answer
@@ -21,7 +22,7 @@ from .contact_track import Evidence
 from .layers import COMPRESSED_LIMIT, DISTANCES
 from .networks import Networks
 from .posterior import FORCE_SCALE, Posterior, touches
-from .simulated_likeness import Patterns, recovered, residual_shares, two_contacts, unlike
+from .simulated_likeness import Patterns, contradicted, recovered, residual_shares, two_contacts, unlike
 
 # Frames that differ from training in kind, not in degree, are worth little.
 UNTRAINED = Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE
@@ -184,14 +185,15 @@ class Translator:
         if self._shift is not None:
             gel = self._shift(gel)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
-        center = contact_center(
-            gel, sensors.sensor_surface(self.target).rest, self.silent("digit_m") if alone else STILL
-        )
+        least = self.silent("digit_m") if alone else STILL
+        center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         shares = residual_shares(change, rectified, self._patterns)
-        flags[unlike(shares)] |= np.uint16(Flag.UNEXPLAINED)
+        pressure = np.where(silent, np.float32(0), signals.stiffness * nets.pressure(change, rectified))
+        strange = unlike(shares, change) & (~silent | (accuracy.lengths(change) >= TOUCHING))
+        flags[strange | contradicted(pressure, signals.pressure_measured)] |= np.uint16(Flag.UNEXPLAINED)
         flags[~silent & (DOUBT in self.card)] |= np.uint16(Flag.LAW_DOUBTED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)
@@ -201,9 +203,8 @@ class Translator:
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
-            pressure=np.where(silent, np.float32(0), signals.stiffness * nets.pressure(change, rectified)),
-            contact_center=center,
-            confidence=confidence, **self._errors(change, rectified, center[:, 0]), flags=flags,
+            pressure=pressure, contact_center=center, confidence=confidence, flags=flags,
+            **self._errors(change, rectified, center[:, 0]),
             explained=np.where(silent, np.float32(np.nan), self._explained(signals, change, latent_source, rectified)),
         )  # fmt: skip
 

@@ -9,11 +9,12 @@ import numpy as np
 from ..recordings.flags import Flag
 
 LOW_CONFIDENCE = 0.5  # assumed: frames of less are guesses
+MOST_OF_DENT = 0.5  # expected error beyond which a dent's shape is a guess (assumed)
 _REASONS = 2  # at most in a line, the gravest first
 _UNLIKE, _SILENT = "signals unlike training", "no contact"
 # What makes a frame a guess, the gravest first; then what is only worth saying.
 _DOUBTS = {
-    Flag.UNEXPLAINED: "rest perhaps under load",
+    Flag.UNEXPLAINED: "unlike any contact",
     Flag.LAW_DOUBTED: "gains, order or skin doubted",
     Flag.POLARITY_DOUBTED: "polarity doubted",
     Flag.OUT_OF_RANGE: _UNLIKE,
@@ -40,31 +41,42 @@ SENTENCES = {
     Flag.BEYOND_PICTURE: "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
     Flag.UNDECIDED_PLACE: "by its own signals the contact may as well lie elsewhere",
     Flag.TWO_CONTACTS: "the signals look like two contacts at once; the translation shows one",
-    Flag.UNEXPLAINED: "the signals resemble no contact's: rest was perhaps taken under load (--tare, --sensor)",
+    Flag.UNEXPLAINED: "the signals resemble no contact's, or the fluid's pressure denies it: drift, or a loaded rest?",
     Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
 
 
-def is_guess(confidence: float, flags: int) -> bool:
-    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags."""
-    return bool(confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS))
+def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: float = 0.0) -> bool:
+    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags, or its shape is.
+
+    expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where it is not known
+    """
+    doubted = confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS)
+    return bool(doubted or expected_error > MOST_OF_DENT * dent)
 
 
-def in_words(confidence: float, flags: int, expected_error: float, force: Sequence[float] | np.ndarray) -> str:
-    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm", or "no contact".
+def in_words(
+    confidence: float, flags: int, expected_error: float, dent: float, force: Sequence[float] | np.ndarray
+) -> str:
+    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm of 1.20", or "no contact".
 
-    confidence : 0..1; flags : bits of ``Flag``; expected_error : m, of the largest node, NaN where it is not known
+    confidence, flags, expected_error, dent : see `is_guess`
     force : (3,) N of the translation, zero where it finds no contact; of a gel at rest no error is told
     """
     reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
-    guess, touching = is_guess(confidence, flags), bool(np.any(force))
-    if guess and not any(flags & bit for bit in _DOUBTS):
+    touching = bool(np.any(force))
+    guess = is_guess(confidence, flags, expected_error if touching else 0.0, dent)
+    if confidence < LOW_CONFIDENCE and not any(flags & bit for bit in _DOUBTS):
         reasons.insert(0, _UNLIKE)
     reasons = reasons[:_REASONS]
     if guess and not touching:
         reasons.insert(0, _SILENT)
     verdict = "guess" if guess else "as in training" if touching else _SILENT
+    if touching and expected_error > dent:
+        verdict = "nothing but a touch is known"
     line = ": ".join([verdict, *filter(None, [", ".join(reasons)])])
     if not touching:
         return line
-    return f"{line}, " + (f"expected error {1e3 * expected_error:.2f} mm" if expected_error >= 0 else "error not known")
+    if not expected_error >= 0:
+        return f"{line}, error not known"
+    return f"{line}, expected error {1e3 * expected_error:.2f} mm" + (f" of {1e3 * dent:.2f}" if dent >= 0 else "")

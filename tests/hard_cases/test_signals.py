@@ -47,7 +47,7 @@ translator = functools.cache(load_translator)
 def translated(signals: Signals) -> tuple[Translation, np.ndarray]:
     """Some frames, and which."""
     frames = np.arange(0, len(signals.change), EVERY)
-    part = {name: getattr(signals, name)[frames] for name in ("change", "electrodes", "quiet", "flags")}
+    part = {name: getattr(signals, name)[frames] for name in ("change", "electrodes", "quiet", "flags", "pdc")}
     return translator()(dataclasses.replace(signals, **part)), frames
 
 

@@ -1,10 +1,14 @@
-"""Glitches are found, fast contacts are left alone."""
+"""Glitches and rows that came again are found, fast contacts are left alone."""
 
 import numpy as np
 import pytest
 
+from tactile_core import recordings
 from tactile_core.recordings import repair
+from tactile_core.recordings.assemble import assemble
+from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.repair import fill, find_glitches, is_time_series
+from tactile_core.sensors import typical_rest
 
 
 def marked(values):
@@ -107,3 +111,41 @@ def test_a_noisy_electrode_is_judged_in_few_pairs_of_jumps(press, monkeypatch):
     values[:, 3] = np.random.default_rng(0).uniform(1800, 3600, len(values))
     find_glitches(values)
     assert len(judged) < 5 * len(values)
+
+
+def held(values: np.ndarray, rows: slice) -> np.ndarray:
+    """Repeat the row before in place of some."""
+    values = values.copy()
+    values[rows] = values[rows.start - 1]
+    return values
+
+
+def noisy(noise: float, size: float = 15.0) -> np.ndarray:
+    ramp = size * np.sin(np.linspace(0, 6, 400))[:, None] * np.linspace(1, 3, 19)
+    return np.rint(3300 + ramp + noise * np.random.default_rng(0).standard_normal((400, 19)))
+
+
+@pytest.mark.parametrize(("frames", "flag"), [(3, 0), (20, Flag.DEAD_CHANNEL)])
+def test_rows_that_came_again_are_interpolated_and_long_runs_doubted(frames, flag):
+    true, rows = noisy(1.2), slice(150, 150 + frames)
+    signals = recordings.prepare(assemble("a", "text", electrodes=held(true, rows), stamps=None))
+    assert np.flatnonzero(signals.flags & Flag.REPAIRED).tolist() == list(range(150, 150 + frames))
+    assert (signals.flags[rows] & Flag.DEAD_CHANNEL == flag).all()
+    assert np.abs(signals.electrodes[rows] - true[rows]).mean() < np.abs(held(true, rows) - true)[rows].mean()
+    assert any(f"{frames} frames repeat the row before" in text for text in signals.warnings)
+
+
+@pytest.mark.parametrize(
+    "values", [held(noisy(1.2), slice(150, 151)), held(noisy(0.0, size=5.0), slice(150, 160)), noisy(1.2)]
+)
+def test_a_row_that_came_twice_and_a_finger_without_noise_are_no_fault(values):
+    signals = recordings.prepare(assemble("a", "text", electrodes=values, stamps=None))
+    assert not (signals.flags & (Flag.REPAIRED | Flag.DEAD_CHANNEL)).any()
+
+
+@pytest.mark.parametrize(("factor", "strange"), [(0.5, True), (1.0, False), (1.15, True)])
+def test_electrodes_that_rest_where_no_unit_s_do_are_doubted(factor, strange):
+    counts = np.rint(factor * (np.array(typical_rest("biotac")) + np.random.default_rng(0).normal(0, 1.2, (400, 19))))
+    signals = recordings.prepare(assemble("a", "text", electrodes=counts, stamps=None))
+    assert ((signals.flags & Flag.OUT_OF_RANGE > 0) == strange).all()
+    assert any("which no film gives" in text for text in signals.warnings) == strange

@@ -30,7 +30,7 @@ def test_two_patterns_are_two_and_each_alone_is_one():
     second = int(alike[first].argmin())
     change = 100 * np.stack([patterns[first], patterns[second], patterns[first] + 0.7 * patterns[second]])
     assert two_contacts(residual_shares(change, signed(3))).tolist() == [False, False, True]
-    one, two = residual_lengths(change[2:] / np.linalg.norm(change[2]))
+    one, two = residual_lengths(change[2:] / np.linalg.norm(change[2]), known)
     assert two[0] == pytest.approx(0, abs=1e-6) and one[0] > module.MORE_BY_ONE
 
 
@@ -38,14 +38,24 @@ def test_what_is_not_judged_is_not_marked():
     known = module.shipped_patterns()
     patterns, alike = known.units, known.alike
     both = patterns[0] + patterns[int(alike[0].argmin())]
-    light = both * (0.9 * module.TOUCHING / np.linalg.norm(both))
+    light = both * (0.9 * module.FAINT / np.linalg.norm(both))
     assert not two_contacts(residual_shares(np.stack([light, 100 * both]), np.array([False, True]))).any()
-    assert not unlike(residual_shares(np.stack([-light, -100 * both]), np.array([False, True]))).any()
+    loaded = np.stack([-light, -100 * both])
+    assert not unlike(residual_shares(loaded, np.array([False, True])), loaded).any()
     assert two_contacts(residual_shares(np.empty((0, 19)), signed(0))).shape == (0,)
     # A unit that resembles no simulated one: noise as large as the signal.
-    random = np.random.default_rng(0).standard_normal((50, 19))
-    assert not two_contacts(residual_shares(100 * random, signed(50))).any()
-    assert unlike(residual_shares(100 * random, signed(50))).all()
+    random = 100 * np.random.default_rng(0).standard_normal((50, 19))
+    assert not two_contacts(residual_shares(random, signed(50))).any()
+    assert unlike(residual_shares(random, signed(50)), random).all()
+
+
+def test_a_change_of_conductivity_resembles_no_contact(pairs):
+    known = module.shipped_patterns()
+    drift = known.drift * np.array([[20.0], [-20.0], [100.0]])
+    noise = 1.5 * np.random.default_rng(0).standard_normal(drift.shape)
+    assert unlike(residual_shares(drift + noise, signed(3)), drift + noise).all()
+    one, _, by_drift = residual_shares(pairs.signal.astype(float), signed(len(pairs.signal))).T
+    assert not (one > by_drift).any()  # of simulated contacts, none
 
 
 def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):

@@ -93,7 +93,7 @@ def test_silence_stays_silent(shipped, translation):
 
 def test_a_frame_does_not_depend_on_its_neighbours(translator, signals, translation):
     few = [100, 80, 200]
-    part = {name: getattr(signals, name)[few] for name in ("change", "electrodes", "quiet", "flags")}
+    part = {name: getattr(signals, name)[few] for name in ("change", "electrodes", "quiet", "flags", "pdc")}
     alone = translator(dataclasses.replace(signals, **part))
     # networks.py states bit equality where the BLAS does not split work otherwise, and 1e-5 relative everywhere
     scale = np.abs(translation.displacement_digit).max()

@@ -7,20 +7,20 @@ from tactile_core.translation.trust_words import in_words, is_guess
 @pytest.mark.parametrize(
     ("confidence", "flags", "words"),
     [
-        (1.0, 0, "as in training, expected error 0.37 mm"),
-        (1.0, Flag.RECTIFIED, "guess: rectified recording, expected error 0.37 mm"),
-        (0.2, 0, "guess: signals unlike training, expected error 0.37 mm"),
-        (0.2, Flag.REPAIRED, "guess: signals unlike training, repaired sample, expected error 0.37 mm"),
-        (1.0, Flag.REPAIRED, "as in training: repaired sample, expected error 0.37 mm"),
+        (1.0, 0, "as in training, expected error 0.37 mm of 0.90"),
+        (1.0, Flag.RECTIFIED, "guess: rectified recording, expected error 0.37 mm of 0.90"),
+        (0.2, 0, "guess: signals unlike training, expected error 0.37 mm of 0.90"),
+        (0.2, Flag.REPAIRED, "guess: signals unlike training, repaired sample, expected error 0.37 mm of 0.90"),
+        (1.0, Flag.REPAIRED, "as in training: repaired sample, expected error 0.37 mm of 0.90"),
         (
             0.2,
             Flag.REPAIRED | Flag.RECTIFIED | Flag.UNEXPLAINED | Flag.OUT_OF_RANGE,
-            "guess: rest perhaps under load, signals unlike training, expected error 0.37 mm",
+            "guess: unlike any contact, signals unlike training, expected error 0.37 mm of 0.90",
         ),
     ],
 )
 def test_trust_is_one_line_of_plain_words(confidence: float, flags: int, words: str) -> None:
-    assert in_words(confidence, flags, 370e-6, (0.0, 0.2, 0.0)) == words
+    assert in_words(confidence, flags, 370e-6, 900e-6, (0.0, 0.2, 0.0)) == words
 
 
 @pytest.mark.parametrize(
@@ -28,16 +28,24 @@ def test_trust_is_one_line_of_plain_words(confidence: float, flags: int, words: 
     [
         (1.0, 0, "no contact"),
         (1.0, Flag.POLARITY_ASSUMED, "no contact: polarity assumed"),
-        (1.0, Flag.UNEXPLAINED, "guess: no contact, rest perhaps under load"),
+        (1.0, Flag.UNEXPLAINED, "guess: no contact, unlike any contact"),
         (0.2, 0, "guess: no contact, signals unlike training"),
     ],
 )
 def test_a_silent_frame_is_said_to_be_one_and_told_no_error(confidence: float, flags: int, words: str) -> None:
-    assert in_words(confidence, flags, 0.0, (0.0, 0.0, 0.0)) == words
+    assert in_words(confidence, flags, 370e-6, 0.0, (0.0, 0.0, 0.0)) == words
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.2, 0.0), (0.0, 0.0, 0.0)])
 @pytest.mark.parametrize("flag", Flag)
 def test_every_flag_is_said(flag: Flag, force: tuple[float, ...]) -> None:
-    assert in_words(1.0, flag, 0.0, force) != in_words(1.0, 0, 0.0, force)
-    assert is_guess(1.0, flag) == in_words(1.0, flag, 0.0, force).startswith("guess: ")
+    assert in_words(1.0, flag, 0.0, 1e-3, force) != in_words(1.0, 0, 0.0, 1e-3, force)
+    assert is_guess(1.0, flag) == in_words(1.0, flag, 0.0, 1e-3, force).startswith("guess: ")
+
+
+def test_a_dent_whose_error_is_as_large_is_no_shape() -> None:
+    force = (0.0, 0.2, 0.0)
+    assert in_words(1.0, 0, 4e-4, 7e-4, force) == "guess, expected error 0.40 mm of 0.70"
+    assert in_words(1.0, 0, 4e-4, 3e-4, force) == "nothing but a touch is known, expected error 0.40 mm of 0.30"
+    assert in_words(1.0, 0, float("nan"), 3e-4, force) == "as in training, error not known"
+    assert is_guess(1.0, 0, 4e-4, 7e-4) and not is_guess(1.0, 0, 3e-4, 7e-4) and not is_guess(1.0, 0, -1e-6, 7e-4)

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from tactile_core import recordings
-from tactile_core.accuracy import Row, row
+from tactile_core.accuracy import Row, lengths, row
 from tactile_core.errors import TactileError
 from tactile_core.recordings import Recording
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.polarity import TOUCHING
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.signals import Signals
@@ -87,8 +88,9 @@ def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
 
 def unexplained(several: list[Signals]) -> float:
     """Share of all recordings' frames with a change that are called unexplained."""
-    shares = np.concatenate([residual_shares(each.typical, np.zeros(len(each.change), bool)) for each in several])
-    return float(unlike(shares[np.isfinite(shares[:, 0])]).mean())
+    change = np.concatenate([each.typical for each in several])
+    shares = residual_shares(change, np.zeros(len(change), bool))
+    return float(unlike(shares, change)[lengths(change) >= TOUCHING].mean())
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:

@@ -113,7 +113,7 @@ def measured() -> list[Row]:
     rows = []
     for name, law in ({"right": right} | WRONG).items():
         seen = np.concatenate([each for each, _ in recordings(FRAMES, law, seed=3)])
-        share = unlike(residual_shares(seen, np.zeros(len(seen), bool))).mean()
+        share = unlike(residual_shares(seen, np.zeros(len(seen), bool)), seen).mean()
         of = f"{len(seen)} frames, each judged alone"
         rows.append(row(f"unexplained_{name}", 100 * float(share), "%", of=of))
     for contacts in CONTACTS:

@@ -94,15 +94,18 @@ class FrameServer:
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
     """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
 
-    Of the header: frame, its index; force_n; flags, bits of
-    ``recordings.flags``; latency_s, from the newest row to the picture; arrays, a name, a type of
-    numpy's and a shape each.
+    Of the header: frame, its index; force_n and confidence 0..1, null where they are not known; flags, bits of
+    ``recordings.flags``; trust, what they say in words; latency_s, from the newest row to the picture; arrays, a name,
+    a type of numpy's and a shape each.
     """
+    known = math.isfinite(shown.newtons + shown.confidence)  # JSON has no NaN
     header = {
         "format": FORMAT,
         "frame": shown.frame,
-        "force_n": shown.newtons if math.isfinite(shown.newtons) else None,  # JSON has no NaN
+        "force_n": shown.newtons if known else None,
+        "confidence": shown.confidence if known else None,
         "flags": shown.flags,
+        "trust": shown.words,
         "latency_s": shown.latency,
         "arrays": [[name, array.dtype.str, array.shape] for name, array in arrays.items()],
     }

@@ -116,7 +116,7 @@ class LiveSignals:
         """Return the signals of frames (T, 19) counts; raises ValueError before rest is known."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
-        flags = np.full(count, Flag.RECTIFIED if kind == "rectified" else 0, np.uint16)
+        flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
         electrodes = electrodes * self._factor
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)

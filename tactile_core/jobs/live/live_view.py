@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ... import accuracy
 from ...pictures.height_map import folds_counted
 from ...recordings.recording import Recording
 from ...recordings.signals import PrepareOptions, Signals
 from ...translation.contact_track import ForwardTracker
 from ...translation.translator import Translation
+from ...translation.trust_words import in_words
 from ..frame_pass import Tools
 from .live_signals import LiveSignals
 
@@ -27,7 +29,7 @@ REMEMBERED = 1000  # latencies whose quantiles are reported
 class Shown:
     """Picture on display.
 
-    frame : its index; flags : bits of ``recordings.flags.Flag``
+    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : what both say of it
     picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
     latency : s from rows to picture; work : s of them
     """
@@ -37,7 +39,9 @@ class Shown:
     force: np.ndarray
     latency: float
     work: float
-    flags: int = 0
+    confidence: float
+    flags: int
+    words: str
 
     @property
     def newtons(self) -> float:
@@ -77,8 +81,10 @@ class View:
             heights = drawer.height_map(gel)
         picture = drawer.draw(heights[0], gel[0])
         latency, work = time.perf_counter() - came, time.thread_time() - began
-        flags = int(translation.flags[0] | signals.flags[0])
-        shown = Shown(self.frames - 1, picture, translation.force[0], latency, work, flags)
+        force, confidence = translation.force[0], float(translation.confidence[0])
+        flags = int(translation.flags[0])
+        words = in_words(confidence, flags, translation.expected_error_digit[0], accuracy.lengths(gel[0]).max(), force)
+        shown = Shown(self.frames - 1, picture, force, latency, work, confidence, flags, words)
         self.latencies.append((latency, work))
         return shown
 

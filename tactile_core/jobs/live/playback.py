@@ -128,7 +128,7 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
                 say("the camera gives no more pictures; watching goes on without it")
             if time.perf_counter() - reported >= REPORT_EVERY:
                 reported = time.perf_counter()
-                say(view.describe_latency() + (f"; force {shown.newtons:.2f} N" if shown else ""))
+                say(view.describe_latency() + (f"; force {shown.newtons:.2f} N, {shown.words}" if shown else ""))
     except TactileError:
         failed = not view.frames
         raise

@@ -27,7 +27,7 @@ PICTURE = np.arange(4 * 3 * 3, dtype=np.uint8).reshape(4, 3, 3)
 
 
 def shown(frame: int = 7, force: float = 1.5) -> Shown:
-    return Shown(frame, PICTURE, np.array([0.0, force, 0.0]), 0.01, 0.008)
+    return Shown(frame, PICTURE, np.array([0.0, force, 0.0]), 0.01, 0.008, 0.25, 64, "guess")
 
 
 @pytest.fixture
@@ -40,6 +40,7 @@ def test_a_message_is_a_line_of_json_and_the_arrays_bytes():
     header, _, raw = message(shown(), {"picture": PICTURE, "heights": heights}).partition(b"\n")
     found = json.loads(header)
     assert (found["format"], found["frame"], found["force_n"], found["latency_s"]) == (FORMAT, 7, 1.5, 0.01)
+    assert (found["confidence"], found["flags"], found["trust"]) == (0.25, 64, "guess")
     assert found["arrays"] == [["picture", "|u1", [4, 3, 3]], ["heights", "<f4", [4, 3]]]
     assert raw == PICTURE.tobytes() + np.ascontiguousarray(heights).tobytes()
     assert json.loads(message(shown(force=np.nan), {}))["force_n"] is None
@@ -62,8 +63,8 @@ def test_the_page_s_reader_reads_what_is_served_on_this_machine_alone(zmq):
         sending.join()
         reader.kill()
     server.close()
-    frame, force, levels = line.split(maxsplit=2)
-    assert (frame, force) == ("7", "1.5")
+    frame, force, confidence, levels = line.split(maxsplit=3)
+    assert (frame, force, confidence) == ("7", "1.5", "0.25")
     np.testing.assert_allclose(np.array(levels.strip("[]\n ").split(), float), PICTURE.mean(axis=(0, 1)))
 
 
@@ -80,7 +81,7 @@ print(server.address, flush=True)
 try:
     with stopping():
         for frame in range(10**9):
-            server.send(Shown(frame, picture, np.zeros(3), 0.01, 0.008), {"picture": picture})
+            server.send(Shown(frame, picture, np.zeros(3), 0.01, 0.008, 1.0, 0, ""), {"picture": picture})
             time.sleep(0.01)
 except KeyboardInterrupt as stop:
     server.close()

@@ -1,0 +1,263 @@
+"""Break recordings as sensors, cables and drivers do, and count the frames that are translated wrongly and confidently.
+
+    python scripts/benchmarks/translation/sensor_faults.py [--phac FOLDER] [--sensor REST.toml] --json FILE
+
+Each fault is put into the shipped recording, into an idle finger with that recording's rest, and into grips of
+``--phac`` (trials 01 to 03), whose rest ``tactile adapt`` found (``--sensor``). A frame is wrong where its force is not
+that of the unbroken recording, by half of it or, where there is none, by `NOTHING`; it counts where it is confident and
+unflagged all the same. The row ``clean`` is the share of unbroken frames that are not.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+
+import numpy as np  # noqa: E402
+
+from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
+from tactile_core import accuracy  # noqa: E402
+from tactile_core.accuracy import Row, row  # noqa: E402
+from tactile_core.errors import TactileError  # noqa: E402
+from tactile_core.recordings import Recording, electrode_gains, read  # noqa: E402
+from tactile_core.sensors import COUNT_MAX  # noqa: E402
+from tactile_core.translation.translate import translate  # noqa: E402
+from tactile_core.translation.translator import Translation  # noqa: E402
+from tactile_core.translation.trust_words import is_guess  # noqa: E402
+
+SHIPPED = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+QUIET = 50  # frames at the shipped recording's start without contact
+NOTHING, HALF = 0.05, 0.5  # N; share of the force
+TARGET, TRIALS = 2.0, ("01", "02", "03")  # % of the frames; of PHAC, those to choose by
+Rng = np.random.Generator
+Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19), rest (19,) counts; broken ones
+
+
+@dataclass(frozen=True)
+class Base:
+    """A recording to break, its rest (19,) counts, its unit's file or None, and every how many frames are judged."""
+
+    name: str
+    recording: Recording
+    rest: np.ndarray
+    sensor: str | None
+    every: int
+
+    def translated(self, electrodes: np.ndarray) -> Translation | None:
+        """Translate it with other electrodes (T, 19); None where it is refused."""
+        broken = replace(self.recording, electrodes=electrodes)
+        try:
+            return translate(broken, sensor=self.sensor, frames=slice(None, None, self.every))
+        except TactileError:
+            return None
+
+
+def _from(electrodes: np.ndarray, share: float = 0.3) -> slice:
+    return slice(int(share * len(electrodes)), None)
+
+
+def _some(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
+    return random.choice(electrodes.shape[1], count, replace=False)
+
+
+def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Let one electrode keep its reading from some frame on."""
+    (one,), rows = _some(electrodes, random, 1), _from(electrodes)
+    electrodes[rows, one] = electrodes[rows, one][0]
+    return electrodes
+
+
+def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Let one electrode read the same throughout, a count among those it has."""
+    (one,) = _some(electrodes, random, 1)
+    electrodes[:, one] = random.choice(electrodes[:, one])
+    return electrodes
+
+
+def stepped(count: int, by: float) -> Fault:
+    """Move some electrodes by so many counts from some frame on."""
+
+    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+        electrodes[_from(electrodes), _some(electrodes, random, count)[:, None]] += by
+        return electrodes
+
+    return broken
+
+
+def drifting(count: int, by: float) -> Fault:
+    """Let some electrodes drift by so many counts to the end."""
+
+    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+        electrodes[:, _some(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
+        return electrodes
+
+    return broken
+
+
+def noisy(count: int, counts: float) -> Fault:
+    """Add so many counts of noise to some electrodes."""
+
+    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+        electrodes[:, _some(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
+        return electrodes
+
+    return broken
+
+
+def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Let an amplifier end within the range that the electrodes use, a third of it from below."""
+    low, high = electrodes.min(axis=0), electrodes.max(axis=0)
+    return np.maximum(electrodes, low + (high - low) / 3)
+
+
+def swapped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Swap two electrodes' plugs."""
+    two = _some(electrodes, random, 2)
+    electrodes[:, two] = electrodes[:, two[::-1]]
+    return electrodes
+
+
+def louder(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Double four electrodes' gains."""
+    some = _some(electrodes, random, 4)
+    electrodes[:, some] += electrodes[:, some] - rest[some]
+    return electrodes
+
+
+def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Let each reading lag: a tenth of all changes comes a second late (a skin that creeps)."""
+    slow, late = electrodes[0].copy(), np.empty_like(electrodes)
+    for frame, reading in enumerate(electrodes):
+        slow += (reading - slow) / 100
+        late[frame] = slow
+    return 0.9 * electrodes + 0.1 * late
+
+
+def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat."""
+    return electrodes + 5 * np.sin(2 * np.pi * 50 * np.arange(len(electrodes)) / 100.3)[:, None]
+
+
+def held(share: float) -> Fault:
+    """Repeat the last row in place of so many lost ones, in bursts of up to eight."""
+
+    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+        lost = np.zeros(len(electrodes), bool)
+        while lost.mean() < share:
+            start = random.integers(1, len(lost))
+            lost[start : start + random.integers(1, 9)] = True
+        last = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
+        return electrodes[last]
+
+    return broken
+
+
+def frozen(frames: int) -> Fault:
+    """Repeat the row of the largest change for so many frames."""
+
+    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+        first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
+        electrodes[first : first + frames] = electrodes[first]
+        return electrodes
+
+    return broken
+
+
+def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Send each second row twice."""
+    return electrodes[np.arange(len(electrodes)) // 2 * 2]
+
+
+def bits(by: float) -> Fault:
+    """Read counts of another number of bits."""
+    return lambda electrodes, rest, random: np.clip(np.floor(electrodes * by), 0, COUNT_MAX)
+
+
+def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Begin and end within the largest contact."""
+    first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
+    electrodes[:QUIET] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
+    electrodes[-QUIET:] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
+    return electrodes
+
+
+def inverted(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
+    """Let counts rise where they should fall."""
+    return 2 * rest - electrodes
+
+
+FAULTS: dict[str, Fault] = {
+    "stuck": stuck, "dead": dead, "one_low": stepped(1, -25), "three_low": stepped(3, -30), "one_high": stepped(1, 25),
+    "drift_one": drifting(1, 60), "drift_all": drifting(19, -20), "noise_one": noisy(1, 15), "noise_all": noisy(19, 6),
+    "clipped": clipped, "swapped": swapped, "gains_doubled": louder, "creep": creeping, "hum": hum,
+    "held_tenth": held(0.1), "held_third": held(0.3), "frozen_short": frozen(30), "frozen_long": frozen(500),
+    "duplicated": duplicated, "ten_bits": bits(0.25), "half_gain": bits(0.5), "rest_off": stepped(19, 40),
+    "rest_under_load": under_load, "inverted": inverted,
+}  # fmt: skip
+
+
+def bases(phac: Path | None, sensor: str | None) -> list[Base]:
+    """Return the recordings that are broken."""
+    shipped, random = read(SHIPPED), np.random.default_rng(0)
+    at_rest = np.asarray(shipped.electrodes[:QUIET], float).mean(axis=0)
+    idle = replace(
+        shipped, electrodes=np.rint(at_rest + random.normal(0, 1.2, shipped.electrodes.shape)),
+        pdc=None if shipped.pdc is None else shipped.pdc[0] + random.normal(0, 0.5, len(shipped)),
+    )  # fmt: skip
+    found = [Base("idle", idle, at_rest, None, 2), Base("shipped", shipped, at_rest, None, 2)]
+    for file in [] if phac is None else sorted(phac.glob("*_HOLD.mat")):
+        if file.stem.split("_")[-2] in TRIALS:
+            grip = read(f"{file}#0")
+            rest = np.array(electrode_gains.read(sensor).gains_for(grip.path, grip.section, sensor).rest().counts)
+            found.append(Base(file.stem, grip, rest, sensor, 25))
+    return found
+
+
+def confident(found: Translation) -> np.ndarray:
+    """Mark (T,) bool the frames that neither flags nor confidence call a guess."""
+    return ~np.array([is_guess(*each) for each in zip(found.confidence, found.flags, strict=True)])
+
+
+def wrong(found: Translation, true: Translation) -> np.ndarray:
+    """Mark (T,) bool the frames whose force is not the true one's."""
+    seen, force = accuracy.lengths(found.force), accuracy.lengths(true.force)
+    return np.abs(seen - force) > np.maximum(NOTHING, HALF * force)
+
+
+def measured(recordings: list[Base]) -> list[Row]:
+    """Shares of frames, %: of unbroken ones that are guesses, and of broken ones that are wrong and confident."""
+    true = [base.translated(np.asarray(base.recording.electrodes, float)) for base in recordings]
+    kept = [(base, found) for base, found in zip(recordings, true, strict=True) if found is not None]
+    rows = []
+    for base, found in kept:
+        rows.append(row(f"clean_{base.name}_guesses", 100 * float(1 - confident(found).mean()), "%", None, of="frames"))
+    for name, fault in FAULTS.items():
+        shares = {base.name: share(base, found, fault) for base, found in kept}
+        of = ", ".join(f"{base} {each:.0f}" for base, each in shares.items() if each >= 0.5)
+        rows.append(row(f"fault_{name}_confident_and_wrong", float(np.mean(list(shares.values()))), "%", TARGET, of=of))
+    return rows
+
+
+def share(base: Base, true: Translation, fault: Fault) -> float:
+    """Share of frames, %, that are wrong and confident where a recording is broken."""
+    electrodes = fault(np.array(base.recording.electrodes, float), base.rest, np.random.default_rng(1))
+    found = base.translated(np.rint(electrodes))
+    return 0.0 if found is None else 100 * float((wrong(found, true) & confident(found)).mean())
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print and write the results; returns the exit status."""
+    parser = parser_of(__doc__)
+    parser.add_argument("--phac", type=Path, help="folder of grips, NAME_OBJECT_TRIAL_HOLD.mat")
+    parser.add_argument("--sensor", help="file of tactile adapt for the grips' finger")
+    options = parser.parse_args(arguments)
+    return finished(printed(measured(bases(options.phac, options.sensor))), options.json)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
