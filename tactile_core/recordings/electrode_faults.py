@@ -144,15 +144,15 @@ def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) ->
     found, long = np.zeros((2, len(electrodes)), bool)
     noisy = len(change) > 0 and np.median(change.mean(axis=0)) >= NOISY
     same = np.r_[False, ~change.any(axis=1)]
-    runs = [(first, last) for first, last in _runs(same) if last - first >= STALE - 1] if noisy else []
-    for first, last in runs:
+    again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
+    for first, last in again:
         found[first:last] = True
         long[first:last] = last - first > SHORT
-    if runs:
-        longest = max(last - first for first, last in runs)
+    if again:
+        longest = max(last - first for first, last in again)
         warnings.append(
             f"{found.sum()} frames repeat the row before, up to {longest} in a run, first in {recording.row_word} "
-            f"{recording.rows[runs[0][0]]}: lost packets, or a driver that stood still; interpolated"
+            f"{recording.rows[again[0][0]]}: lost packets, or a driver that stood still; interpolated"
         )
     return found, long
 
