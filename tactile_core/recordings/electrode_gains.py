@@ -17,7 +17,6 @@ from ..files.outside import read_toml_text, toml_quoted
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
-from .answers import unanswered
 from .preparation import doubt_law
 from .recording import FINGERS, short_of
 from .signals import Rest, Signals
@@ -120,7 +119,7 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
     rest = typical_rest(signals.sensor)
     if signals.kind == "raw" and rest is not None:
         change = divider.of_unit(change, signals.rest, rest)
-    change[unanswered(signals)] = 0.0
+    change[~signals.change.any(axis=1)] = 0.0  # no contact
     report = {**signals.report, "sensor": applied}
     return doubt_law(dataclasses.replace(signals, change=change, report=report, stiffness=stiffness))
 

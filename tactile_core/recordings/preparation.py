@@ -73,7 +73,9 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     if kind == "raw" and polarity.name == FALLS and (unit_rest is not None or quiet.parts):
         fluid = _film(recording, change, rest, pdc, options, own_rest=unit_rest is None)
     if fluid is not None:
-        change = fluid.changes(change, rest)
+        elsewhere = unit_rest is not None and any(unit_rest.spread)  # that of the part before has none
+        pressed = of_kind(recording.sensor, Fluid).readout.pressure * pdc > film.FELT
+        change = fluid.changes(change, rest, ~pressed if elsewhere else None)
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))
         warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
@@ -100,7 +102,7 @@ def _film(
         return None if options.film is None else film.Film.given(options.film)
     pressure = of_kind(recording.sensor, Fluid).readout.pressure * pdc if np.isfinite(pdc).any() else None
     return film.find(
-        change, Changes(len(recording), rest.at), recording.time, pressure, recording.sensor,
+        change, Changes(len(recording), rest.at), np.nan_to_num(recording.time), pressure, recording.sensor,
         thickness=options.film, own_rest=own_rest, drifts=options.drift,
     )  # fmt: skip
 

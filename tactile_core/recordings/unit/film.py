@@ -36,6 +36,10 @@ AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
 # Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s. A
 # change that is no larger is no contact.
 DRIFT_LEFT = 0.3
+# Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
+# times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). FELT : Pa of the
+# fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
+REST_OFF, FELT = 0.0136, 450.0
 # Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
@@ -60,12 +64,14 @@ class Film:
         """Return a film of known thickness over a fluid that does not drift."""
         return cls(thickness, "given", np.zeros(1), np.zeros(1))
 
-    def changes(self, change: Changes, rest: Baseline) -> Changes:
+    def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
-        None where they are no larger than what drifts leave.
+        None where they are no larger than what drifts leave, or, where nothing shows a contact, than a rest is off.
+
+        perhaps_idle : (T,) bool, these frames of a recording whose rest is another's; None where it is its own
         """
-        if self.thickness == 1 and not self.conductivity.any():
+        if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
@@ -73,8 +79,12 @@ class Film:
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
             drift = divider.of_typical_film(seen, still, self.thickness) - found
-            unlike_drift = np.linalg.norm(found, axis=1) > DRIFT_LEFT * np.linalg.norm(drift, axis=1)
-            return found * unlike_drift[:, None]
+            contact = np.linalg.norm(found, axis=1) > DRIFT_LEFT * np.linalg.norm(drift, axis=1)
+            if perhaps_idle is not None:
+                grown = np.log(divider.film_impedance(still + seen) * since_rest / divider.film_impedance(still))
+                as_rest = np.square(grown).mean(axis=1) < (REST_OFF / self.thickness) ** 2
+                contact &= ~(as_rest & perhaps_idle[frames])
+            return found * contact[:, None]
 
         return Changes(len(change), of_typical_film)
 

@@ -14,6 +14,7 @@ from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.polarity import contact_signals
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.rest_level import Baseline, Changes
+from tactile_core.recordings.signals import Rest
 from tactile_core.recordings.unit import film
 from tactile_core.sensors import REST_COUNTS, divider
 from tactile_core.translation.translate import translate
@@ -173,3 +174,29 @@ def test_an_idle_finger_whose_fluid_warms_is_hardly_touched(forced):
     _, (idle, rest), _ = forced
     force = force_of(idle, rest)
     assert force.max() < 0.6 and (force > 0).mean() < 0.5
+
+
+def of_unit(recording, rest):
+    """Touched frames (n,) bool, every 50th, where rest is another recording's: that of the first rows."""
+    counts = recording.electrodes[:rest]
+    known = Rest(tuple(np.median(counts, axis=0)), tuple(np.ptp(counts, axis=0) / 2))
+    later = recording.at(np.arange(rest, len(recording)))
+    touch = translate(later, prepare=PrepareOptions(rest=known), frames=slice(0, None, 50))
+    return np.linalg.norm(touch.force, axis=1) > 0
+
+
+def test_a_unit_s_rest_leaves_an_idle_finger_silent_and_a_pressed_one_in_contact(forced):
+    pressed, idle, _ = forced
+    assert of_unit(*idle).mean() < 0.05 and of_unit(*pressed).mean() > 0.99
+
+
+@pytest.mark.parametrize("thickness", [0.5, 1.0])
+def test_what_a_rest_of_another_recording_is_off_by_is_no_contact_unless_something_shows_one(thickness):
+    shape = contact_signals()[0] / np.linalg.norm(contact_signals()[0])
+    change = np.outer([12.0, 12.0, 200.0], shape)
+    found, whole = film.Film(thickness, "", np.zeros(1), np.zeros(1)), Changes(3, change.__getitem__)
+    own, other = (
+        found.changes(whole, Baseline.constant(REST_COUNTS), idle)[np.arange(3)].any(axis=1).tolist()
+        for idle in (None, np.array([True, False, True]))
+    )
+    assert own == [True, True, True] and other == [False, True, True]
