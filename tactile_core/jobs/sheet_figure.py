@@ -251,24 +251,16 @@ class SheetFigure:
         axes.set_ylabel(label)
         self.top += height
 
-    def captions(
-        self,
-        force: np.ndarray,
-        confidence: np.ndarray,
-        flags: np.ndarray,
-        expected_error: np.ndarray,
-        dent: np.ndarray,
-    ) -> None:
+    def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
         """Write below each column its force (k, 3) N and how far it is to be trusted, and how to read the maps.
 
-        confidence (k,) 0..1, flags (k,), expected_error (k,) m, dent (k,) m : for `trust_words.in_words`
+        trust : confidence (k,) 0..1, flags (k,), expected error (k,) m and dent (k,) m, for `trust_words.in_words`
         """
-        for k in range(self.columns):
-            shape = confidence[k], flags[k], expected_error[k], dent[k]
-            trust = in_words(*shape, force[k])
-            lines = [f"force {np.linalg.norm(force[k]):.2f} N", *trust.replace(", ", ",\n").split("\n")]
+        for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
+            words = in_words(confidence, flags, error, dent, force[k])
+            lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]
             text = "\n".join(textwrap.fill(line, CAPTION_LETTERS) for line in lines)
-            color = MARK if is_guess(*shape) else "black"
+            color = MARK if is_guess(confidence, flags, error, dent) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION
         tip, along = "up" if self.camera.down_x > 0 else "down", "left" if self.camera.right_z < 0 else "right"
