@@ -340,7 +340,7 @@ def test_a_live_view_knows_a_finger_that_does_not_answer(press):
     np.testing.assert_allclose(
         live.known.rest, press.electrodes[:150].mean(axis=0), atol=2
     )  # nothing was learnt from zeros
-    signals = live.signals(np.stack([press.electrodes[350], zeros[0]]))
+    signals = live.signals(np.stack([press.electrodes[350], zeros[0]]), np.full(2, np.nan))
     assert signals.change[0].any() and not signals.change[1].any()
     assert (signals.flags & Flag.DEAD_CHANNEL > 0).tolist() == [False, True]
 

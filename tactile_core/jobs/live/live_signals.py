@@ -14,10 +14,13 @@ from ...recordings.flags import Flag
 from ...recordings.preparer import DOUBTS
 from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
+from ...recordings.rest_level import Baseline, Changes
 from ...recordings.signal_kind import full_scale
-from ...recordings.signals import PrepareOptions, Signals
-from ...sensors import SAMPLE_RATE, SOURCE, divider
-from ...sensors.fluid_sensor import FALLS, POLARITIES
+from ...recordings.signals import EVERY, PrepareOptions, Signals
+from ...recordings.unit import film
+from ...sensors import SAMPLE_RATE, SOURCE
+from ...sensors.descriptor import of_kind
+from ...sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import ElectrodeGains
@@ -62,6 +65,7 @@ class LiveSignals:
         self._seen: Recording | None = None
         self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest
+        self._rest_pdc = np.nan
         self._factor = 1.0  # counts a unit of the file
         self.polarity = options.polarity if options.polarity in POLARITIES else FALLS
         self.sure, self.silent = options.polarity in POLARITIES, False
@@ -98,6 +102,7 @@ class LiveSignals:
         signals = prepare(seen, dataclasses.replace(self._options, counts_per_unit=self._factor))
         if self._known is None and (len(seen) == self._most or self._shows_rest(signals)):
             self._known, self.found = signals, _source(signals)
+            self._rest_pdc = np.nan if seen.pdc is None else seen.pdc[0] - signals.pdc[0]
         self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
         self.sure = self._options.polarity in POLARITIES or not signals.flags[0] & DOUBTS
 
@@ -112,20 +117,27 @@ class LiveSignals:
             raise ValueError("no rest is known yet")
         return self._known
 
-    def signals(self, electrodes: np.ndarray) -> Signals:
-        """Return the signals of frames (T, 19) counts; raises ValueError before rest is known."""
+    def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
+        """Return the signals of frames (T, 19) and PDC (T,) counts, NaN where there is none.
+
+        Raises ValueError before rest is known.
+        """
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
         electrodes = electrodes * self._factor
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
-        if self.known.film != 1:
-            change = divider.of_typical_film(change, rest, self.known.film)
+        pdc = pdc - self._rest_pdc
+        elsewhere = any(reason_of(text) is Reason.REST_OF_UNIT for text in self.known.warnings)
+        fluid = film.Film(self.known.film, "", np.zeros(1), np.zeros(1))
+        pressed = of_kind(self._sensor, Fluid).readout.pressure * pdc > film.FELT
+        whole = Changes(count, change.__getitem__)
+        change = fluid.changes(whole, Baseline.constant(rest), ~pressed if elsewhere else None)[EVERY]
         signals = Signals(
             change=np.where(unheard[:, None], 0.0, change), rest=rest, drift=np.zeros_like(rest),
             electrodes=electrodes, kind=kind,
-            quiet=np.zeros(count, bool), flags=flags, pdc=np.full(count, np.nan),
+            quiet=np.zeros(count, bool), flags=flags, pdc=pdc,
             warnings=(), report={}, sensor=self._sensor, film=self.known.film,
         )  # fmt: skip
         if self._unit is None:

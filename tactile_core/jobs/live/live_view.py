@@ -73,7 +73,8 @@ class View:
         if not self.signals.learn(rows):
             return None
         self.passed += len(rows) - 1
-        signals = self.signals.signals(_newest(rows)[None])
+        pdc = np.full(1, np.nan) if rows.pdc is None else rows.pdc[-1:]
+        signals = self.signals.signals(_newest(rows)[None], pdc)
         translation = self._translation(signals)
         drawer = self._tools.drawer
         gel = drawer.gel(vars(translation))["displacement_digit"]

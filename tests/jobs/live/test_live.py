@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from types import SimpleNamespace
 
@@ -115,7 +116,7 @@ def test_live_signals_are_those_of_the_whole_recording(slide_csv):
     signals = live.LiveSignals()
     known = [signals.learn(recording.at(np.arange(i, i + 10))) for i in range(0, 150, 10)]
     assert known.index(True) == 2  # 30 frames are the tare's window
-    change = signals.signals(recording.electrodes).change
+    change = signals.signals(recording.electrodes, np.full(len(recording), np.nan)).change
     # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
     np.testing.assert_allclose(change, recordings.prepare(recording).change, atol=1.0)
 
@@ -168,7 +169,7 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
     assert held.learn(rows_of(2900 + noise)) and "unit's own" in held.found  # 300 counts away, however calm
     np.testing.assert_array_equal(held.known.rest, np.full(19, 3200.0))
     assert free.learn(rows_of(3210 + noise)) and free.found.startswith("frames")
-    change = free.signals(3110 + noise).change
+    change = free.signals(3110 + noise, np.full(40, np.nan)).change
     np.testing.assert_allclose(
         change, np.tile(-100 / np.array(gain), (40, 1)), atol=3.0
     )  # noise of half a count, twice
@@ -282,6 +283,17 @@ def test_the_polarity_is_found_by_pressure_and_assumed_until_then(sign):
         if start == 40:
             assert signals.polarity == "falls" and not signals.sure
     assert signals.sure and signals.polarity == {1: "falls", -1: "rises"}[sign]
-    change = signals.signals(electrodes).change
+    change = signals.signals(electrodes, np.full(len(electrodes), np.nan)).change
     np.testing.assert_allclose(change[60:], strength[60:, None] * contact, atol=8)
     assert live.LiveSignals(options=PrepareOptions(polarity="rises")).sure
+
+
+def test_a_pressure_that_denies_or_shows_a_contact_counts():
+    """PDC is taken from the same rows as rest, and a faint change from a unit's rest is a contact where it says so."""
+    unit = ElectrodeGains("a unit", [1.0] * 19, [0.0] * 19, [3200.0] * 19, [5.0] * 19, 1000.0, film=1.0)
+    noise = np.random.default_rng(3).normal(0, 0.5, (40, 19))
+    held = live.LiveSignals(unit=unit)
+    seen = dataclasses.replace(rows_of(2900 + noise), pdc=np.full(40, 1100.0))
+    assert held.learn(seen) and "unit's own" in held.found
+    faint = held.signals(np.full((2, 19), 3194.0), np.array([1000.0, 1050.0]))
+    assert faint.pdc.tolist() == [0.0, 50.0] and faint.change.any(axis=1).tolist() == [False, True]
