@@ -18,6 +18,10 @@ class Reason(enum.Enum):
     )
     POLARITY_CONTRADICTED = "polarity {name!r} contradicts the recording ({found})"
     REST_GUESSED = "no quiet part ({found}): rest is guessed from the calmest {frames} frames, {first}:{last}"
+    REST_LOADED = (
+        "what is calm looks like a contact, which explains {share:.0%} of how it differs from a unit at rest: rest was"
+        " perhaps taken under load. Give the unit's own (--sensor), or frames without contact (--tare)"
+    )
     REST_OF_FILE = "no quiet part ({found}): the file's own zero is taken for rest"
     REST_OF_UNIT = "rest is the unit's own: {found}"
     REST_CARRIED = "no quiet part: the rest of the part before is taken"

@@ -22,6 +22,7 @@ from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_
 from .signal_kind import detect, full_scale
 from .signals import EVERY, PrepareOptions, Rest, Signals, typical
 from .unit import contact_law, film
+from .unit.loaded_rest import as_contact
 
 # Frames to smooth over where the user gives none. Rectified signals need it: folded noise does not average out in the
 # networks.
@@ -51,7 +52,12 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     unit_rest = _unit_rest(recording, readings, kind, quiet, options, warnings)
     if unit_rest is None:
         rest = _rest(recording, readings, kind, quiet, options, warnings)
-        if not quiet.parts:
+        loaded = None
+        if kind == "raw" and quiet.parts and options.tare is None:
+            loaded = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)
+        if loaded is not None:
+            warnings.append(Doubt(Reason.REST_LOADED, share=loaded))
+        if loaded is not None or not quiet.parts:
             flags |= np.uint16(Flag.NO_QUIET_PART)
     else:
         rest = Baseline.constant(np.array(unit_rest.counts))

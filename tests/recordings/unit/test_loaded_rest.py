@@ -1,0 +1,47 @@
+"""A steady grip's level is told from a unit at rest where a contact explains most of it."""
+
+import numpy as np
+import pytest
+
+from tactile_core.recordings import prepare, read
+from tactile_core.recordings.assemble import assemble
+from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.polarity import contact_signals
+from tactile_core.recordings.readers import each_finger
+from tactile_core.recordings.signals import PrepareOptions
+from tactile_core.recordings.unit.loaded_rest import as_contact
+from tactile_core.sensors import REST_COUNTS, divider
+
+HARD = np.argsort(np.linalg.norm(contact_signals(), axis=1))[-50::10]
+
+
+def unit(seed: int) -> np.ndarray:
+    """Return the rest (19,) counts of a unit, its electrodes' impedances 10 % apart and its fluid another."""
+    random = np.random.default_rng(seed)
+    return divider.reading(np.exp(random.normal(0, 0.5) + 0.1 * random.standard_normal(19)), REST_COUNTS)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_unit_at_rest_is_not_under_load(seed):
+    assert as_contact(unit(seed), "biotac") is None
+
+
+@pytest.mark.parametrize("contact", HARD)
+def test_a_hard_grip_is(contact):
+    rest = divider.reading(1.2, REST_COUNTS)
+    assert as_contact(rest + divider.of_unit(contact_signals()[contact], rest), "biotac") > 0.5
+
+
+def test_a_recording_of_a_steady_grip_has_no_quiet_part_unless_the_user_names_one():
+    level = REST_COUNTS + contact_signals()[HARD[-1]]
+    counts = np.rint(level + np.random.default_rng(0).normal(0, 1, (400, 19)))
+    recording = assemble("a", "text", electrodes=counts, stamps=None)
+    found, named = prepare(recording), prepare(recording, PrepareOptions(tare="0:400"))
+    assert (found.flags & Flag.NO_QUIET_PART > 0).all() and "--sensor" in " ".join(found.warnings)
+    assert not (named.flags & Flag.NO_QUIET_PART).any()
+
+
+def test_real_hard_grips_are_under_load(outside_data):
+    files = [file for name in ("acrylic", "steel") for file in outside_data("biotac_phac").glob(f"{name}*.mat")]
+    loaded = [prepare(read(one)).flags[0] & Flag.NO_QUIET_PART for file in files for one in each_finger(file)]
+    assert len(loaded) == 20 and all(loaded)
