@@ -61,20 +61,20 @@ def _from(electrodes: np.ndarray, share: float = 0.3) -> slice:
     return slice(int(share * len(electrodes)), None)
 
 
-def _some(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
+def _drawn(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
     return random.choice(electrodes.shape[1], count, replace=False)
 
 
 def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     """Let one electrode keep its reading from some frame on."""
-    (one,), rows = _some(electrodes, random, 1), _from(electrodes)
+    (one,), rows = _drawn(electrodes, random, 1), _from(electrodes)
     electrodes[rows, one] = electrodes[rows, one][0]
     return electrodes
 
 
 def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     """Let one electrode read the same throughout, a count among those it has."""
-    (one,) = _some(electrodes, random, 1)
+    (one,) = _drawn(electrodes, random, 1)
     electrodes[:, one] = random.choice(electrodes[:, one])
     return electrodes
 
@@ -83,7 +83,7 @@ def stepped(count: int, by: float) -> Fault:
     """Move some electrodes by so many counts from some frame on."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[_from(electrodes), _some(electrodes, random, count)[:, None]] += by
+        electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by
         return electrodes
 
     return broken
@@ -93,7 +93,7 @@ def drifting(count: int, by: float) -> Fault:
     """Let some electrodes drift by so many counts to the end."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[:, _some(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
+        electrodes[:, _drawn(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
         return electrodes
 
     return broken
@@ -103,7 +103,7 @@ def noisy(count: int, counts: float) -> Fault:
     """Add so many counts of noise to some electrodes."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[:, _some(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
+        electrodes[:, _drawn(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
         return electrodes
 
     return broken
@@ -117,14 +117,14 @@ def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray
 
 def swapped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     """Swap two electrodes' plugs."""
-    two = _some(electrodes, random, 2)
+    two = _drawn(electrodes, random, 2)
     electrodes[:, two] = electrodes[:, two[::-1]]
     return electrodes
 
 
 def louder(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     """Double four electrodes' gains."""
-    some = _some(electrodes, random, 4)
+    some = _drawn(electrodes, random, 4)
     electrodes[:, some] += electrodes[:, some] - rest[some]
     return electrodes
 
