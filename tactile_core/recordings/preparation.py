@@ -80,7 +80,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         fluid = _film(recording, change, rest, pdc, options, own_rest=unit_rest is None)
     if fluid is not None:
         elsewhere = unit_rest is not None and any(unit_rest.spread)  # that of the part before has none
-        pressed = of_kind(recording.sensor, Fluid).readout.pressure * pdc > film.FELT
+        pressed = of_kind(recording.sensor, Fluid).readout.pressure * pdc > film.PRESSED
         change = fluid.changes(change, rest, ~pressed if elsewhere else None)
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))

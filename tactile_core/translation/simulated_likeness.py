@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..recordings.polarity import contact_signals
+from ..recordings.unit.film import PRESSED
 from ..sensors import SOURCE, divider, places_of
 from ..sensors.readout import NOISE
 from .layers import compress
@@ -46,8 +47,8 @@ LEFT = 0.25
 # Length, counts, below which a change is noise: 19 electrodes of 1.5 have 6.5 (assumed).
 FAINT = 8.0
 # Most of the estimated pressure over the fluid's own, and of that over it: .24 to 1.7 on real grips and slides.
-# FELT, FELT_ALONE : Pa, some 4 and 12 counts of PDC, its noise and its own drift (assumed).
-MOST_OVER, MOST_BELOW, FELT, FELT_ALONE = 3.0, 5.0, 150.0, 450.0
+# FELT : Pa, some 4 counts of PDC, its noise (assumed).
+MOST_OVER, MOST_BELOW, FELT = 3.0, 5.0, 150.0
 DRIFT = 1.1  # of the impedance, by which its pattern is drawn (assumed; it hardly depends on it)
 FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
 
@@ -113,7 +114,7 @@ def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
 def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
     """Mark (T,) bool the frames whose estimated pressure (T,) Pa is not the measured one, NaN where none was."""
     measured = np.maximum(measured, 0)
-    return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + FELT_ALONE)
+    return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + PRESSED)
 
 
 def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarray, np.ndarray]:

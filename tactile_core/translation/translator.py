@@ -201,10 +201,9 @@ class Translator:
         undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
-            latent_signal, latent_source, latent_target, skin, gel,
+            latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
-            pressure=pressure, contact_center=center, confidence=confidence, flags=flags,
-            **self._errors(change, rectified, center[:, 0]),
+            confidence=confidence, flags=flags, **self._errors(change, rectified, center[:, 0]),
             explained=np.where(silent, np.float32(np.nan), self._explained(signals, change, latent_source, rectified)),
         )  # fmt: skip
 

@@ -130,8 +130,8 @@ class LiveSignals:
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
         pdc = pdc - self._rest_pdc
         elsewhere = any(reason_of(text) is Reason.REST_OF_UNIT for text in self.known.warnings)
-        fluid = film.Film(self.known.film, "", np.zeros(1), np.zeros(1))
-        pressed = of_kind(self._sensor, Fluid).readout.pressure * pdc > film.FELT
+        fluid = film.Film.given(self.known.film)
+        pressed = of_kind(self._sensor, Fluid).readout.pressure * pdc > film.PRESSED
         whole = Changes(count, change.__getitem__)
         change = fluid.changes(whole, Baseline.constant(rest), ~pressed if elsewhere else None)[EVERY]
         signals = Signals(

@@ -37,9 +37,9 @@ AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
 # change that is no larger is no contact.
 DRIFT_LEFT = 0.3
 # Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
-# times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). FELT : Pa of the
-# fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
-REST_OFF, FELT = 0.0136, 450.0
+# times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa of
+# the fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
+REST_OFF, PRESSED = 0.0136, 450.0
 # Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
