@@ -76,7 +76,7 @@ def test_still() -> Found:
     """Counts that do not change at all."""
     signals = dataclasses.replace(
         prepared()[1], change=np.zeros((1, 19)), electrodes=np.full((1, 19), 3300.0), quiet=np.ones(1, bool),
-        flags=np.zeros(1, np.uint16),
+        flags=np.zeros(1, np.uint16), pdc=np.zeros(1),
     )  # fmt: skip
     found = translator()(signals)
     broken = () if not found.force.any() and np.isnan(found.contact_center).all() else ("a force or a place",)

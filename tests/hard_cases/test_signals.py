@@ -179,7 +179,7 @@ def test_out_of_range() -> Found:
     """Changes forty times those of the shipped recording, up to what 12 bits hold: training knows fifteen times."""
     _, signals = prepared()
     touched = np.flatnonzero(np.linalg.norm(shipped().truth.force, axis=1) > 0.3)[::EVERY]
-    part = {name: getattr(signals, name)[touched] for name in ("electrodes", "quiet", "flags")}
+    part = {name: getattr(signals, name)[touched] for name in ("electrodes", "quiet", "flags", "pdc")}
     change = np.clip(40 * signals.change[touched], -4095, 4095)
     found = translator()(dataclasses.replace(signals, change=change, **part))
     flagged = (found.flags & int(Flag.OUT_OF_RANGE)) > 0
