@@ -22,6 +22,7 @@ NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 
 ALIKE = 0.75  # of the electrodes that read the same where a finger does not answer: a dead one may differ (assumed)
 FROZEN = 50  # frames, half a second, of noise that stops in all electrodes (assumed)
 SHOWN = 8  # bad places spelled out one by one in the warnings
+MOST_STALE = 0.45  # of the rows; with more, they were recorded faster than the finger answers (assumed)
 STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
 # Impedance at rest over a typical unit's, or below it, that no unit's film and fluid give: .9 to 3.3 are seen (assumed)
 STRANGE_REST = 8.0
@@ -111,7 +112,7 @@ def _frozen(change: np.ndarray) -> np.ndarray:
 
 
 def mended(
-    recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], *, repair: bool
+    recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Interpolate what was not read: return readings (T, 19), flags (T,), and what was repaired, for the report.
 
@@ -120,10 +121,11 @@ def mended(
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
-        again, long = _stale(recording, readings, warnings)
-        flags = flags | np.where(again, Flag.REPAIRED, 0).astype(np.uint16)
-        flags |= np.where(long, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
-        unreadable |= again[:, None]
+        if kind == "raw" and np.isfinite(recording.time).all():  # others may stand still, and snapshots be alike
+            again, long = _stale(recording, readings, warnings)
+            flags = flags | np.where(again, Flag.REPAIRED, 0).astype(np.uint16)
+            flags |= np.where(long, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
+            unreadable |= again[:, None]
         glitches = _glitches(recording, fill(readings, unreadable), warnings)
     flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
     bad = glitches | unreadable
@@ -135,7 +137,7 @@ def mended(
 
 
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Mark the frames (T,) bool that repeat the row before them, and those of runs too long to be interpolated.
+    """Mark the frames (T,) bool that repeat the row before them, and those of longer runs, which are held.
 
     A packet was lost, or the driver stood still, where `STALE` rows and more are equal although most electrodes are
     noisy. electrodes : (T, e) counts; findings are added to the warnings
@@ -144,15 +146,16 @@ def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) ->
     found, long = np.zeros((2, len(electrodes)), bool)
     noisy = len(change) > 0 and np.median(change.mean(axis=0)) >= NOISY
     same = np.r_[False, ~change.any(axis=1)]
+    noisy &= same.mean() <= MOST_STALE
     again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
     for first, last in again:
-        found[first:last] = True
-        long[first:last] = last - first > SHORT
+        (long if last - first > SHORT else found)[first:last] = True
     if again:
         longest = max(last - first for first, last in again)
         warnings.append(
-            f"{found.sum()} frames repeat the row before, up to {longest} in a run, first in {recording.row_word} "
-            f"{recording.rows[again[0][0]]}: lost packets, or a driver that stood still; interpolated"
+            f"{(found | long).sum()} frames repeat the row before, up to {longest} in a run, first in "
+            f"{recording.row_word} {recording.rows[again[0][0]]}: lost packets, or a driver that stood still; up to "
+            f"{SHORT} in a run are interpolated"
         )
     return found, long
 

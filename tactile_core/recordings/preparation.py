@@ -41,10 +41,9 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         readings = np.multiply(readings, unit, dtype=float)
         if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
             kind, evidence = detect(readings)
-        pdc = recording.pdc if kind == "raw" else None
-        if pdc is not None and (COUNT_MAX if unit < 1 else 0) < np.nanmax(pdc) <= 1.01 * COUNT_MAX / unit:
-            recording = replace(recording, pdc=unit * pdc)
-    readings, flags, repaired = mended(recording, readings, flags, warnings, repair=options.repair)
+    if kind == "raw" and recording.pdc is not None:
+        recording = replace(recording, pdc=_pdc_in_counts(recording.pdc, unit, warnings))
+    readings, flags, repaired = mended(recording, readings, flags, warnings, kind, repair=options.repair)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
         warnings.append("the recording holds absolute changes (rectified): their sign is lost, and much of the place")
@@ -53,7 +52,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     if unit_rest is None:
         rest = _rest(recording, readings, kind, quiet, options, warnings)
         loaded = None
-        if kind == "raw" and quiet.parts and options.tare is None:
+        if kind == "raw" and quiet.parts and options.tare is None and options.rest is None:
             loaded = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)
         if loaded is not None:
             warnings.append(Doubt(Reason.REST_LOADED, share=loaded))
@@ -134,6 +133,20 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
         unit = full_scale(readings) if options.counts_per_unit is None else None
         return ("raw", f"{unit[1]}, all far above any change") if unit else detect(readings)
     return options.kind, f"given by the user (the samples look {detect(readings)[0]})"
+
+
+def pdc_unit(pdc: np.ndarray, unit: float) -> float:
+    """Return the counts a unit of PDC (T,) of a recording whose electrodes have so many: as many, or 1 where it has."""
+    most = pdc.max(where=np.isfinite(pdc), initial=0)
+    return unit if unit != 1 and (COUNT_MAX if unit < 1 else 0) < most <= 1.01 * COUNT_MAX / unit else 1.0
+
+
+def _pdc_in_counts(pdc: np.ndarray, unit: float, warnings: list[str]) -> np.ndarray | None:
+    """Return raw PDC (T,) in counts; None where it is 0 throughout, which no finger's is."""
+    if not pdc.any():
+        warnings.append("PDC is 0 in all frames: taken as not recorded")
+        return None
+    return pdc_unit(pdc, unit) * pdc
 
 
 def _unit_rest(

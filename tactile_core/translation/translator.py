@@ -182,8 +182,7 @@ class Translator:
             decode(latent) * touched[:, None, None]
             for decode, latent in ((nets.decode_source, latent_source), (nets.decode_target, latent_target))
         )
-        if self._shift is not None:
-            gel = self._shift(gel)
+        gel = gel if self._shift is None else self._shift(gel)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
@@ -193,7 +192,8 @@ class Translator:
         shares = residual_shares(change, rectified, self._patterns)
         pressure = np.where(silent, np.float32(0), signals.stiffness * nets.pressure(change, rectified))
         strange = unlike(shares, change) & (~silent | (accuracy.lengths(change) >= TOUCHING))
-        flags[strange | contradicted(pressure, signals.pressure_measured)] |= np.uint16(Flag.UNEXPLAINED)
+        denied = contradicted(pressure, signals.pressure_measured) & (signals.kind != "scaled")
+        flags[strange | (denied & ~(silent & signals.quiet))] |= np.uint16(Flag.UNEXPLAINED)
         flags[~silent & (DOUBT in self.card)] |= np.uint16(Flag.LAW_DOUBTED)
         confidence = self._confidence(change, flags, rectified)
         flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)

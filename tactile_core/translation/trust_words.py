@@ -11,7 +11,7 @@ from ..recordings.flags import Flag
 LOW_CONFIDENCE = 0.5  # assumed: frames of less are guesses
 MOST_OF_DENT = 0.5  # expected error beyond which a dent's shape is a guess (assumed)
 _REASONS = 2  # at most in a line, the gravest first
-_UNLIKE, _SILENT = "signals unlike training", "no contact"
+_UNLIKE, _SHAPE, _SILENT = "signals unlike training", "shape unsure", "no contact"
 # What makes a frame a guess, the gravest first; then what is only worth saying.
 _DOUBTS = {
     Flag.UNEXPLAINED: "unlike any contact",
@@ -41,7 +41,7 @@ SENTENCES = {
     Flag.BEYOND_PICTURE: "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
     Flag.UNDECIDED_PLACE: "by its own signals the contact may as well lie elsewhere",
     Flag.TWO_CONTACTS: "the signals look like two contacts at once; the translation shows one",
-    Flag.UNEXPLAINED: "the signals resemble no contact's, or the fluid's pressure denies it: drift, or a loaded rest?",
+    Flag.UNEXPLAINED: "the signals resemble no contact's, or PDC shows another pressure: drift, or rest under load",
     Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
 
@@ -52,7 +52,7 @@ def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: f
     expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where it is not known
     """
     doubted = confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS)
-    return bool(doubted or expected_error > MOST_OF_DENT * dent)
+    return bool(doubted or (dent > 0 and expected_error > MOST_OF_DENT * dent))
 
 
 def in_words(
@@ -66,8 +66,9 @@ def in_words(
     reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
     touching = bool(np.any(force))
     guess = is_guess(confidence, flags, expected_error if touching else 0.0, dent)
-    if confidence < LOW_CONFIDENCE and not any(flags & bit for bit in _DOUBTS):
-        reasons.insert(0, _UNLIKE)
+    untold = guess and not any(flags & bit for bit in _DOUBTS)
+    if untold and (confidence < LOW_CONFIDENCE or expected_error <= dent):
+        reasons.insert(0, _UNLIKE if confidence < LOW_CONFIDENCE else _SHAPE)
     reasons = reasons[:_REASONS]
     if guess and not touching:
         reasons.insert(0, _SILENT)

@@ -56,7 +56,7 @@ def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part):
     dent = part("tactile_core.accuracy").lengths(found.displacement_digit[40]).max()
     words = in_words(found.confidence[40], found.flags[40], found.expected_error_digit[40], dent, found.force[40])
     assert part("addon.ui.panels").trust_of(skin, gel) == (words, True)
-    assert words.startswith("guess, expected error")
+    assert words.startswith("guess: shape unsure, expected error")
 
 
 def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part):

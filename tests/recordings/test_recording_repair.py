@@ -125,20 +125,25 @@ def noisy(noise: float, size: float = 15.0) -> np.ndarray:
     return np.rint(3300 + ramp + noise * np.random.default_rng(0).standard_normal((400, 19)))
 
 
-@pytest.mark.parametrize(("frames", "flag"), [(3, 0), (20, Flag.DEAD_CHANNEL)])
-def test_rows_that_came_again_are_interpolated_and_long_runs_doubted(frames, flag):
+@pytest.mark.parametrize(("frames", "flag"), [(3, Flag.REPAIRED), (20, Flag.DEAD_CHANNEL)])
+def test_rows_that_came_again_are_interpolated_and_long_runs_held_and_doubted(frames, flag):
     true, rows = noisy(1.2), slice(150, 150 + frames)
     signals = recordings.prepare(assemble("a", "text", electrodes=held(true, rows), stamps=None))
-    assert np.flatnonzero(signals.flags & Flag.REPAIRED).tolist() == list(range(150, 150 + frames))
-    assert (signals.flags[rows] & Flag.DEAD_CHANNEL == flag).all()
-    assert np.abs(signals.electrodes[rows] - true[rows]).mean() < np.abs(held(true, rows) - true)[rows].mean()
+    marked = signals.flags & (Flag.REPAIRED | Flag.DEAD_CHANNEL)
+    assert (marked[rows] == flag).all() and np.count_nonzero(marked) == frames
+    left = np.abs(signals.electrodes[rows] - true[rows]).mean()
+    assert (left < np.abs(held(true, rows) - true)[rows].mean()) == (flag == Flag.REPAIRED)
     assert any(f"{frames} frames repeat the row before" in text for text in signals.warnings)
 
 
 @pytest.mark.parametrize(
-    "values", [held(noisy(1.2), slice(150, 151)), held(noisy(0.0, size=5.0), slice(150, 160)), noisy(1.2)]
-)
-def test_a_row_that_came_twice_and_a_finger_without_noise_are_no_fault(values):
+    "values",
+    [
+        held(noisy(1.2), slice(150, 151)), held(noisy(0.0, size=5.0), slice(150, 160)), noisy(1.2),
+        noisy(1.2)[np.arange(400) * 2 // 5],  # recorded two and a half times as fast as the finger answers
+    ],
+)  # fmt: skip
+def test_rows_that_came_twice_and_a_finger_without_noise_are_no_fault(values):
     signals = recordings.prepare(assemble("a", "text", electrodes=values, stamps=None))
     assert not (signals.flags & (Flag.REPAIRED | Flag.DEAD_CHANNEL)).any()
 
@@ -149,3 +154,13 @@ def test_electrodes_that_rest_where_no_unit_s_do_are_doubted(factor, strange):
     signals = recordings.prepare(assemble("a", "text", electrodes=counts, stamps=None))
     assert ((signals.flags & Flag.OUT_OF_RANGE > 0) == strange).all()
     assert any("which no film gives" in text for text in signals.warnings) == strange
+
+
+def test_a_pressure_that_is_0_throughout_was_not_recorded():
+    counts = noisy(1.2)
+    zero, none = (
+        recordings.prepare(assemble("a", "text", electrodes=counts, stamps=None, pdc=pdc))
+        for pdc in (np.zeros(len(counts)), None)
+    )
+    assert any("PDC is 0" in text for text in zero.warnings) and np.isnan(zero.pdc).all()
+    np.testing.assert_array_equal(zero.change, none.change)

@@ -45,7 +45,8 @@ def test_every_flag_is_said(flag: Flag, force: tuple[float, ...]) -> None:
 
 def test_a_dent_whose_error_is_as_large_is_no_shape() -> None:
     force = (0.0, 0.2, 0.0)
-    assert in_words(1.0, 0, 4e-4, 7e-4, force) == "guess, expected error 0.40 mm of 0.70"
+    assert in_words(1.0, 0, 4e-4, 7e-4, force) == "guess: shape unsure, expected error 0.40 mm of 0.70"
     assert in_words(1.0, 0, 4e-4, 3e-4, force) == "nothing but a touch is known, expected error 0.40 mm of 0.30"
     assert in_words(1.0, 0, float("nan"), 3e-4, force) == "as in training, error not known"
+    assert not is_guess(1.0, 0, 4e-4, 0.0)  # no contact has no shape
     assert is_guess(1.0, 0, 4e-4, 7e-4) and not is_guess(1.0, 0, 3e-4, 7e-4) and not is_guess(1.0, 0, -1e-6, 7e-4)

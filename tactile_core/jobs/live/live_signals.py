@@ -11,6 +11,7 @@ from ...recordings.answers import prepare
 from ...recordings.doubt import REST, Reason, reason_of
 from ...recordings.electrode_faults import alike, silent
 from ...recordings.flags import Flag
+from ...recordings.preparation import pdc_unit
 from ...recordings.preparer import DOUBTS
 from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
@@ -65,7 +66,7 @@ class LiveSignals:
         self._seen: Recording | None = None
         self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest
-        self._rest_pdc = np.nan
+        self._rest_pdc, self._pdc_factor = np.nan, 1.0
         self._factor = 1.0  # counts a unit of the file
         self.polarity = options.polarity if options.polarity in POLARITIES else FALLS
         self.sure, self.silent = options.polarity in POLARITIES, False
@@ -102,7 +103,10 @@ class LiveSignals:
         signals = prepare(seen, dataclasses.replace(self._options, counts_per_unit=self._factor))
         if self._known is None and (len(seen) == self._most or self._shows_rest(signals)):
             self._known, self.found = signals, _source(signals)
-            self._rest_pdc = np.nan if seen.pdc is None else seen.pdc[0] - signals.pdc[0]
+            if seen.pdc is not None:
+                self._pdc_factor = pdc_unit(seen.pdc, self._factor)
+                rest = (self._pdc_factor * seen.pdc - signals.pdc)[np.isfinite(signals.pdc)]
+                self._rest_pdc = np.median(rest) if len(rest) else np.nan
         self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
         self.sure = self._options.polarity in POLARITIES or not signals.flags[0] & DOUBTS
 
@@ -128,7 +132,7 @@ class LiveSignals:
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
         electrodes = electrodes * self._factor
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
-        pdc = pdc - self._rest_pdc
+        pdc = self._pdc_factor * pdc - self._rest_pdc
         elsewhere = any(reason_of(text) is Reason.REST_OF_UNIT for text in self.known.warnings)
         fluid = film.Film.given(self.known.film)
         pressed = of_kind(self._sensor, Fluid).readout.pressure * pdc > film.PRESSED
