@@ -40,14 +40,18 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Describe each recording, going on after a bad one; returns the exit status."""
-    from ...recordings import PrepareOptions, electrode_gains, info
+    from ...recordings import PrepareOptions, info
     from ...recordings.readers import each_finger
 
     if not options.recordings:
         return _tell_sensor(options.sensor)
     if options.columns is not None and not os.path.lexists(options.columns):
         _write_columns(options)
-    unit = None if options.sensor is None else electrode_gains.read(options.sensor)
+    unit = None
+    if options.sensor is not None:
+        from ...recordings import electrode_gains  # reads by msgspec, which recordings alone do not need
+
+        unit = electrode_gains.read(options.sensor)
     prepare, failed = PrepareOptions(**prepare_words(options)), 0
     for path in options.recordings:
         try:
