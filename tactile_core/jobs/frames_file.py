@@ -174,6 +174,7 @@ class FramesFile:
                     own = named(name, self._pair)
                     data = self._file[own] if own in self._file else self._create(name, array)
                     data[start : start + len(array)] = array
+                    data.flush()  # else its chunks may lie elsewhere where another thread delays Python's letting go
 
     def write_labels(self, labels: dict[str, np.ndarray]) -> None:
         """Write the group ``labels``: a dataset (T,) of UTF-8 text for each label of the converted frames."""
