@@ -51,12 +51,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     unit_rest = _unit_rest(recording, readings, kind, quiet, options, warnings)
     if unit_rest is None:
         rest = _rest(recording, readings, kind, quiet, options, warnings)
-        loaded = None
-        if kind == "raw" and quiet.parts and options.tare is None and options.rest is None:
-            loaded = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)
-        if loaded is not None:
-            warnings.append(Doubt(Reason.REST_LOADED, share=loaded))
-        if loaded is not None or not quiet.parts:
+        if not quiet.parts or _is_loaded(recording, rest, kind, quiet, options, warnings):
             flags |= np.uint16(Flag.NO_QUIET_PART)
     else:
         rest = Baseline.constant(np.array(unit_rest.counts))
@@ -74,13 +69,12 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     if polarity.sign < 0:
         change = change.then(np.negative)
     pdc = _pressure_change(recording, kind, quiet, unit_rest)
-    fluid = None
+    pressure, fluid = of_kind(recording.sensor, Fluid).readout.pressure * pdc, None
     if kind == "raw" and polarity.name == FALLS and (unit_rest is not None or quiet.parts):
-        fluid = _film(recording, change, rest, pdc, options, own_rest=unit_rest is None)
+        fluid = _film(recording, change, rest, pressure, options, own_rest=unit_rest is None)
     if fluid is not None:
         elsewhere = unit_rest is not None and any(unit_rest.spread)  # that of the part before has none
-        pressed = of_kind(recording.sensor, Fluid).readout.pressure * pdc > film.PRESSED
-        change = fluid.changes(change, rest, ~pressed if elsewhere else None)
+        change = fluid.changes(change, rest, ~(pressure > film.PRESSED) if elsewhere else None)
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))
         warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
@@ -100,14 +94,15 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
 
 
 def _film(
-    recording: Recording, change: Changes, rest: Baseline, pdc: np.ndarray, options: PrepareOptions, *, own_rest: bool
-) -> film.Film | None:
+    recording: Recording, change: Changes, rest: Baseline, pressure: np.ndarray, options: PrepareOptions, *,
+    own_rest: bool,
+) -> film.Film | None:  # fmt: skip
     """Return the film of a raw recording whose rest is known; of a sensor without simulated contacts only as given."""
     if contacts_of(recording.sensor) is None:
         return None if options.film is None else film.Film.given(options.film)
-    pressure = of_kind(recording.sensor, Fluid).readout.pressure * pdc if np.isfinite(pdc).any() else None
     return film.find(
-        change, Changes(len(recording), rest.at), np.nan_to_num(recording.time), pressure, recording.sensor,
+        change, Changes(len(recording), rest.at), np.nan_to_num(recording.time),
+        pressure if np.isfinite(pressure).any() else None, recording.sensor,
         thickness=options.film, own_rest=own_rest, drifts=options.drift,
     )  # fmt: skip
 
@@ -256,6 +251,18 @@ def _rest(
         return Baseline.constant(level(readings[guess]))
     warnings.append(Doubt(Reason.REST_OF_FILE, found=quiet.evidence))
     return Baseline.constant(np.zeros(readings.shape[1]))
+
+
+def _is_loaded(
+    recording: Recording, rest: Baseline, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
+) -> bool:
+    """Return whether the calm level of a raw recording looks like a grip's, which is then added to the warnings."""
+    if kind != "raw" or options.tare is not None or options.rest is not None:
+        return False
+    share = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)
+    if share is not None:
+        warnings.append(Doubt(Reason.REST_LOADED, share=share))
+    return share is not None
 
 
 def _report(

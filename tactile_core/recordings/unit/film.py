@@ -67,9 +67,10 @@ class Film:
     def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
-        None where they are no larger than what drifts leave, or, where nothing shows a contact, than a rest is off.
+        They are zero where they are no larger than what a drift leaves. A rest of another recording may be off by
+        `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
 
-        perhaps_idle : (T,) bool, these frames of a recording whose rest is another's; None where it is its own
+        perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself
         """
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change

@@ -17,9 +17,10 @@ LEAST = 100.0  # counts, root of the sum of squares: units differ by 106 to 434 
 
 
 def as_contact(level: np.ndarray, sensor: str) -> float | None:
-    """Return the share of a level (e,) counts, beside a conductivity, that a contact of a typical unit explains.
+    """Return the share (0..1) of how a level differs from a typical unit at rest that one contact explains.
 
-    None where it looks like a unit at rest, and for a sensor without simulated contacts.
+    None where that is too little for a contact, and for a sensor without simulated contacts. The unit's conductivity is
+    free. level : (e,) counts
     """
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
