@@ -30,7 +30,7 @@ class ShownUnit:
 
 def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
     """Read the objects; parts that a scene has none of are the calibration's. Raises TactileError."""
-    if not digit_body.leds_of(gel):
+    if not any(thing.tactile.role == "BODY" for thing in gel.children_recursive):
         return ShownUnit(unit, Surroundings())
     camera = _camera(gel, depsgraph, unit.camera)
     leds, others = _leds(gel, depsgraph, unit, camera)
@@ -98,10 +98,14 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
     return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
 
 
-def ignored_lamps(scene: bpy.types.Scene) -> list[str]:
-    """List the user's lamps that do not reach the picture: suns, spots and areas."""
+def left_out(scene: bpy.types.Scene) -> list[str]:
+    """Say what a scene asks for that its pictures leave out: lamps that are no points, blur by motion and by focus."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
-    return [lamp.name for lamp in lamps if lamp.data.type != "POINT"]
+    found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
+    camera = scene.camera
+    if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
+        found.append(f"{camera.name}: depth of field is left out")
+    return found + ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202
@@ -147,6 +151,11 @@ def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camer
     if thing is None:
         return camera
     now = thing.evaluated_get(depsgraph)
+    lens = now.data
+    if lens.type != "PERSP" or lens.sensor_fit != "VERTICAL" or lens.shift_x or lens.shift_y:
+        found = f"type {lens.type}, sensor fit {lens.sensor_fit}, shift {lens.shift_x:g} and {lens.shift_y:g}"
+        expected = "a perspective camera, its sensor fit vertical, without shift"
+        raise TactileError(thing.name, found, expected, "Set them so, or Reset to Calibration")
     relative = axes.from_world(gel.evaluated_get(depsgraph)) @ now.matrix_world
     own = np.array(relative.to_3x3().normalized())
     forward, right = -own[:, 2], own[:, 0]
@@ -157,9 +166,7 @@ def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camer
     sign = 1 if right[1] * camera.right_z > 0 else -1
     right_z, down_x = camera.right_z * sign, camera.down_x * sign
     place = image_frame.from_gel(np.array(relative.translation), camera, gel.tactile.per_metre)
-    view = math.tan(now.data.angle_y / 2) * place[2] if now.data.sensor_fit == "VERTICAL" else None
-    size = 2 * view if view is not None else camera.height * camera.pixel_size[1]
-    scale = camera.height * camera.pixel_size[1] / size
+    scale = camera.height * camera.pixel_size[1] / (2 * math.tan(lens.angle_y / 2) * place[2])
     new = dataclasses.replace(
         camera, apparent_height=float(place[2]), right_z=right_z, down_x=down_x,
         centre_x=camera.centre_x + camera.down_x * float(place[1]),

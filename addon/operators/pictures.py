@@ -8,13 +8,14 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.pictures import height_map
+from ...tactile_core.pictures import height_map, seen_fields
 from ...tactile_core.pictures.renderer import Renderer
 from ...tactile_core.sensors.calibration import Calibration
-from ..objects import digit_objects, digit_unit, images
+from ...tactile_core.translation import gel_place
+from ..objects import axes, digit_objects, digit_unit, frame_attribute, images
 from ..process import tracer_process
 from ..settings import properties, render_settings, reports
-from . import stale_picture
+from . import stale_picture, view
 
 FAST = "fast"
 _renderers: dict[str, Renderer] = {}  # one at most: the frames of an animation share it
@@ -54,6 +55,28 @@ def draw(
     return tracer_process.draw(preset, shown.unit, shown.around, heights, stopped, better), heights
 
 
+def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Compute what a picture's pixels see of a gel, float32 (H, W, channels): Height and Displacement in mm, Normal.
+
+    And Contact, the share that is touched. Vectors are in the gel object's axes. Raises as ``draw`` does.
+    """
+    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
+    unit = digit_unit.shown_unit(gel, depsgraph, unit).unit
+    moved = digit_objects.displacement_of(gel, depsgraph)
+    heights = height_map.height_map(moved, unit.camera)
+    known = gel.evaluated_get(depsgraph).data.attributes.get(frame_attribute.PATCH)
+    touched = np.empty(len(moved), np.float32)
+    if known is None:
+        touched = gel_place.contact_patch(moved[None], unit.camera.surface)[0]
+    else:
+        known.data.foreach_get("value", touched)
+    found = seen_fields.seen_fields(renderer_of(unit), heights, moved, touched)
+    return {
+        "Height": 1e3 * found["Height"][..., None], "Normal": axes.to_blender(found["Normal"], 1),
+        "Contact": found["Contact"][..., None], "Displacement": axes.to_blender(found["Displacement"], 1e3),
+    }  # fmt: skip
+
+
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Start the worker of a preset of Mitsuba's, in a window, so that it has compiled before its first picture.
 
@@ -75,6 +98,14 @@ def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:
     """Draw fast picture and height map of the current frame into their datablocks; returns the picture's."""
     return show(gel, depsgraph, FAST)
+
+
+def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: bpy.types.Object) -> None:
+    """Show the fast picture of what an operator has made; why there is none is a warning, and the work is kept."""
+    try:
+        view.show_picture(context, update(gel, context.evaluated_depsgraph_get()))
+    except (TactileError, OSError) as error:
+        operator.report({"WARNING"}, str(error))
 
 
 def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> bpy.types.Image:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import traceback
+
 import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
+from ..objects import digit_unit
 from ..process import tracer_process
 from ..settings import properties, render_settings, reports
 from . import pictures
@@ -15,6 +18,7 @@ ID = "TACTILE_DIGIT"
 _LOOK = 10.0  # s between two looks for workers that do nothing
 # Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
 _SHARED = {"properties_output", "properties_render", "properties_view_layer"}
+PASSES = {"Height": "V", "Normal": "XYZ", "Contact": "V", "Displacement": "XYZ"}  # name -> channels, beside Combined
 _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "simplify", "curves_render")
 
 
@@ -26,53 +30,78 @@ class TactileRenderEngine(bpy.types.RenderEngine):
     bl_use_preview = False
     bl_use_eevee_viewport = True  # the 3D view's Rendered shading shows the meshes, not the camera inside the gel
 
+    def update_render_passes(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+        """Declare the passes to the compositor; Blender calls it."""
+        self.register_pass(scene, view_layer, "Combined", 4, "RGBA", "COLOR")
+        for name, channels in PASSES.items():
+            kind = "VALUE" if len(channels) == 1 else "VECTOR"
+            self.register_pass(scene, view_layer, name, len(channels), channels, kind)
+
     def render(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Render a frame; Blender calls it."""
+        """Render a view layer of a frame; Blender calls it."""
         try:
-            self._show(self._picture(depsgraph))
-        except (TactileError, OSError, ModuleNotFoundError) as error:
-            self.report({"ERROR"}, _describe_error(error))
-            return
+            self._render(depsgraph)
         except tracer_process.Stopped:
             tracer_process.close_all()
-            return
-        self.update_progress(1.0)
+        except Exception as error:  # whatever it was: Blender shows in the log alone what a render raises
+            self.report({"ERROR"}, _describe_error(error))
 
-    def _show(self, picture: np.ndarray) -> None:
-        """Put a picture (H, W, 3) uint8 into the result, in place of the one before."""
-        height, width = picture.shape[:2]
-        result = self.begin_result(0, 0, width, height)
-        # Flat: a two-dimensional array takes fifty times as long (blender.md).
-        result.layers[0].passes["Combined"].rect.foreach_set(to_linear(picture).ravel())
-        self.end_result(result)
-
-    def _picture(self, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-        scene = depsgraph.scene
+    def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
+        scene, layer = depsgraph.scene, depsgraph.view_layer_eval.name
         gel = properties.gel_of(scene)
         if gel is None:
             raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
-        share = scene.render.resolution_percentage / 100
-        width, height = (int(size * share) for size in (scene.render.resolution_x, scene.render.resolution_y))
-        preset = render_settings.preset_of(scene)
+        for left_out in digit_unit.left_out(scene):
+            self.report({"WARNING"}, left_out)
+        size, preset = (self.resolution_x, self.resolution_y), render_settings.preset_of(scene)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
-        return pictures.draw(gel, depsgraph, preset, (width, height), self.test_break, self._show)[0]
+
+        for name, channels in PASSES.items():
+            self.add_pass(name, len(channels), channels, layer=layer)
+        fields = pictures.fields(gel, depsgraph, size)
+
+        def show(picture: np.ndarray) -> None:
+            self._show({"Combined": to_linear(picture)} | fields, scene.render, layer)
+
+        show(pictures.draw(gel, depsgraph, preset, size, self.test_break, show)[0])
+        self.update_progress(1.0)
+
+    def _show(self, found: dict[str, np.ndarray], render: bpy.types.RenderSettings, layer: str) -> None:
+        """Put passes (H, W, channels), first row first, into the result: into the region that is rendered, each eye's.
+
+        The sensor has one camera, which is both eyes'.
+        """
+        left, low = 0, 0
+        if render.use_border:  # as Blender rounds it, in float32
+            left, low = (int(np.float32(share) * np.float32(whole)) for share, whole in (
+                (render.border_min_x, self.resolution_x), (render.border_min_y, self.resolution_y)))  # fmt: skip
+        result = self.begin_result(0, 0, self.resolution_x, self.resolution_y, layer=layer)
+        region = slice(low, low + result.resolution_y), slice(left, left + result.resolution_x)
+        for each in result.layers[0].passes:
+            if each.name in found:
+                # Flat: a two-dimensional array takes fifty times as long (blender.md).
+                each.rect.foreach_set(found[each.name][::-1][region].ravel())
+        self.end_result(result)
 
 
 def _describe_error(error: Exception) -> str:
     if isinstance(error, ModuleNotFoundError):
         return f"{error.name} is missing. {reports.ADVICE}"
+    if not isinstance(error, (TactileError, OSError)):
+        traceback.print_exc()
+        return f"Tactile render: {error!r}; the log says where"
     return str(error)
 
 
 def to_linear(picture: np.ndarray) -> np.ndarray:
-    """Convert a picture (H, W, 3) uint8 to Blender's scene-linear float32 (H, W, 4), last row first.
+    """Convert a picture (H, W, 3) uint8 to Blender's scene-linear float32 (H, W, 4).
 
     By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again.
     """
     levels = np.arange(256) / 255
     curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
-    pixels[..., :3] = curve[picture[::-1]]
+    pixels[..., :3] = curve[picture]
     return pixels
 
 

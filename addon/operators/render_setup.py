@@ -144,8 +144,8 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     coating = digit_body.coating_of(gel) if leds else None
     for name, socket in digit_materials.sockets_of(coating).items() if coating else ():
         layout.prop(socket, "default_value", text=name)
-    for name in digit_unit.ignored_lamps(context.scene)[:2]:
-        layout.label(text=f"{name}: no point lamp, left out", icon="INFO")
+    for words in digit_unit.left_out(context.scene)[:3]:
+        layout.label(text=words, icon="INFO")
     row = layout.row(align=True)
     row.operator("tactile.reset_to_calibration", text="Reset", icon="LOOP_BACK")
     row.operator("tactile.save_as_calibration", text="Save As", icon="FILE_TICK")

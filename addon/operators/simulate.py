@@ -11,7 +11,7 @@ from ...tactile_core.sensors import SAMPLE_RATE
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import require
-from . import scene_bridge, simulation_result
+from . import pictures, scene_bridge, simulation_result
 from .job_operator import JobOperator
 
 
@@ -60,6 +60,9 @@ class TACTILE_OT_simulate(JobOperator):
         result = simulation_result.read(self._folder.path)
         summary = simulation_result.bake(context, thing, result)
         self._keep(context)
+        gel = properties.gel_of(context.scene)
+        if gel is not None:
+            pictures.show_result(self, context, gel)
         self.report({"INFO"}, summary)
 
     def _keep(self, context: bpy.types.Context) -> None:

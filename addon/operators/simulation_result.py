@@ -11,7 +11,7 @@ import numpy as np
 
 from ..objects import axes, curves
 from ..settings import properties
-from . import pictures, set_style, view
+from . import set_style
 
 STANDING = "{} simulated"
 MOVED = "moved "  # before a sensor's name, in a worker's result
@@ -70,8 +70,6 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
             continue
         told = {"force": force}
         sentences.append(set_style.animate(sensor, moved[sample], frames, sensor.tactile.motion, told))
-        if sensor == properties.gel_of(scene):
-            view.show_picture(context, pictures.update(sensor, context.evaluated_depsgraph_get()))
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))
     _stand(context, thing, result, sample, frames)

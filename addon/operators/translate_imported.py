@@ -84,7 +84,7 @@ class TACTILE_OT_translate(JobOperator):
             set_style.take_over(gel, skin)
         low = view.mark_low_confidence(context.scene, self._found.translation.confidence, frames)
         view.show(context, [gel, skin])
-        view.show_picture(context, pictures.update(gel, context.evaluated_depsgraph_get()))
+        pictures.show_result(self, context, gel)
         self.report({"INFO"}, f"{summary}; {low} parts of low confidence")
 
 

@@ -64,7 +64,7 @@ class Renderer:
         self._domed = rest is None and calibration.dome_scale != 1
         self._resting = rest_height_map(self.camera) if rest is None else np.asarray(rest)
         resting = self._heights(self._resting, "rest height map")
-        self._view = Perspective(self.camera, resting)
+        self.view = Perspective(self.camera, resting)
         self._spread = CoatingSpread(self.camera, calibration.coating.spread)
         self.variant: str | None = None
         self._light: GelLight | MatteLight | None = None
@@ -109,7 +109,7 @@ class Renderer:
         if not isinstance(self._light, GelLight):
             yield self.picture(self._spread_radiance(heights))
             return
-        seen = self._view(heights)
+        seen = self.view(heights)
         for found in self._light.refined(heights):
             yield self.picture(self._completed(np.moveaxis(found, -1, 0), seen))
 
@@ -135,10 +135,10 @@ class Renderer:
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
-        seen = self._view(heights)
+        seen = self.view(heights)
         if self._light is not None:
             return self._completed(np.moveaxis(self._light.radiance(heights), -1, 0), seen)
-        light = self._lamps.light(self._view, seen)
+        light = self._lamps.light(self.view, seen)
         light *= self.calibration.facing.astype(np.float32)[:, None, None]
         return self._completed(light, seen)
 

@@ -68,13 +68,137 @@ def test_the_percentage_scales_the_picture(ready, part, tmp_path):
     assert np.abs(small - _wanted(part)).mean() < 1
 
 
+@pytest.fixture
+def rendered(ready, tmp_path):
+    """``rendered(file="frame.png", **options)``: renders frame 80 and reads the levels of the file."""
+    ready.frame_set(80)
+
+    def run(file="frame.png", **options):
+        ready.render.filepath = str(tmp_path / "frame.png")
+        bpy.ops.render.render(write_still=True, **options)
+        return np.rint(255 * _pixels(tmp_path / file))
+
+    return run
+
+
+@pytest.mark.parametrize("percent", [12, 33, 66, 67, 150])
+def test_every_percentage_renders_the_same_view(ready, rendered, percent):
+    whole = rendered()
+    ready.render.resolution_percentage = percent
+    part = rendered()
+    assert part.shape == (320 * percent // 100, 240 * percent // 100, 3)
+    # Of a mean of 100 levels: less than a pixel is cut at an edge, one of 28 pixels at 12 %.
+    assert np.abs(part.mean((0, 1)) - whole.mean((0, 1))).max() < 1.5
+
+
+@pytest.mark.parametrize("crop", [False, True])
+def test_a_render_region_is_that_part_of_the_picture(ready, rendered, crop):
+    whole, render = rendered(), ready.render
+    render.use_border, render.use_crop_to_border = True, crop
+    render.border_min_x, render.border_max_x, render.border_min_y, render.border_max_y = 0.25, 0.6, 0.3, 0.9
+    part, region = rendered(), (slice(32, 224), slice(60, 144))  # rows are counted from the lower edge
+    np.testing.assert_array_equal(part if crop else part[region], whole[region])
+    assert crop or part.sum() == part[region].sum()
+
+
+def test_each_view_layer_and_each_eye_has_the_picture(ready, rendered):
+    whole = rendered()
+    layer = ready.view_layers.new("second")
+    np.testing.assert_array_equal(rendered(layer="second"), whole)
+    ready.view_layers.remove(layer)
+    ready.render.use_multiview = True
+    for eye in "LR":
+        np.testing.assert_array_equal(rendered(f"frame_{eye}.png"), whole)
+
+
+def test_a_multilayer_exr_holds_what_the_pixels_see(ready, rendered, part, tmp_path):
+    kind = ready.render.image_settings
+    kind.file_format, kind.exr_codec, kind.color_depth = "OPEN_EXR_MULTILAYER", "NONE", "32"
+    ready.frame_set(80)
+    ready.render.filepath = str(tmp_path / "frame.exr")
+    bpy.ops.render.render(write_still=True)
+    found = _channels(tmp_path / "frame.exr")
+    assert found["ViewLayer.Combined.A"].min() == 1
+    gel, depsgraph = bpy.context.scene.objects["DIGIT gel"], bpy.context.evaluated_depsgraph_get()
+    _, heights = part("addon.operators.pictures").draw(gel, depsgraph, "fast")
+    height, contact = found["ViewLayer.Height.V"], found["ViewLayer.Contact.V"]
+    # Of the middle, where perspective moves nothing; the unit's dome is flatter than the public mesh's.
+    assert height[140:180, 100:140].max() == pytest.approx(1e3 * heights[140:180, 100:140].max(), abs=0.05)
+    touched = contact > 0.5
+    assert 0.005 < touched.mean() < 0.5
+    up, moved = found["ViewLayer.Normal.Z"], found["ViewLayer.Displacement.Z"]
+    assert moved[touched].mean() < 3 * moved[~touched].mean() < 0 and up.min() > 0
+    length = sum(found[f"ViewLayer.Normal.{axis}"] ** 2 for axis in "XYZ")
+    np.testing.assert_allclose(length, 1, atol=1e-5)
+
+
+def _channels(path):
+    """The channels (H, W) float32 of an uncompressed EXR of 32-bit floats, by name."""
+    data = path.read_bytes()
+    at, known = 8, {}
+    while data[at]:
+        name, kind = (data[at:].split(b"\0", 2))[:2]
+        at += len(name) + len(kind) + 2
+        size = int.from_bytes(data[at : at + 4], "little")
+        known[name], at = data[at + 4 : at + 4 + size], at + 4 + size
+    width, height = (np.frombuffer(known[b"dataWindow"], "<i4")[2:] + 1).tolist()
+    names, rest = [], known[b"channels"]
+    while rest[0]:
+        name, rest = rest.split(b"\0", 1)
+        names, rest = [*names, name.decode()], rest[16:]
+    row = 2 + len(names) * width
+    values = np.frombuffer(data, "<f4", height * row, at + 1 + 8 * height).reshape(height, row)[:, 2:]
+    return dict(zip(names, values.reshape(height, len(names), width).swapaxes(0, 1), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda scene, gel: setattr(scene.camera.data, "type", "ORTHO"), "DIGIT camera: type ORTHO"),
+        (lambda scene, gel: setattr(scene.camera.data, "shift_x", 0.2), "shift 0.2 and 0"),
+        (lambda scene, gel: setattr(scene.camera.data, "sensor_fit", "HORIZONTAL"), "sensor fit HORIZONTAL"),
+        (lambda scene, gel: setattr(gel, "hide_render", True), "DIGIT gel: hidden in view layer ViewLayer"),
+        (lambda scene, gel: setattr(scene.collection.children[0], "hide_render", True), "hidden in view layer"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(ready, change, words):
+    change(ready, ready.objects["DIGIT gel"])
+    with pytest.raises(RuntimeError, match=words):
+        bpy.ops.render.render()
+
+
+def test_what_is_left_out_is_said(ready, part, capfd):
+    ready.render.use_motion_blur = ready.camera.data.dof.use_dof = True
+    area = bpy.data.objects.new("softbox", bpy.data.lights.new("softbox", "AREA"))
+    ready.collection.objects.link(area)
+    bpy.ops.render.render()
+    said = capfd.readouterr()
+    for words in ("softbox: no point lamp", "depth of field", "Motion blur"):
+        assert words in said.out + said.err
+
+
+def test_a_fault_of_our_own_ends_the_render_too(ready, part, monkeypatch, tmp_path):
+    monkeypatch.setattr(part("addon.operators.pictures"), "fields", lambda *_: 1 / 0)
+    ready.render.filepath = str(tmp_path / "images") + "/"
+    ready.frame_start, ready.frame_end = 78, 80
+    with pytest.raises(RuntimeError, match="division by zero"):
+        bpy.ops.render.render(animation=True)
+    assert not (tmp_path / "images").exists()
+
+
+def test_without_leds_it_is_dark(ready, rendered):
+    for thing in [thing for thing in ready.objects if thing.tactile.role == "LED"]:
+        bpy.data.objects.remove(thing)
+    assert rendered().max() == 0
+
+
 def test_exr_holds_the_same_in_float(ready, part, tmp_path):
     ready.frame_set(80)
     ready.render.image_settings.file_format = "OPEN_EXR"
     ready.render.filepath = str(tmp_path / "frame.exr")
     bpy.ops.render.render(write_still=True)
     linear = _pixels(tmp_path / "frame.exr")
-    picture = part("addon.operators.render_engine").to_linear(_wanted(part))[::-1, :, :3]
+    picture = part("addon.operators.render_engine").to_linear(_wanted(part))[..., :3]
     assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
 
 
