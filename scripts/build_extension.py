@@ -31,7 +31,7 @@ PYTHONS = ("3.11", "3.13", "3.14")
 # Never torch (users translate with numpy), never numpy (Blender ships it).
 WHEELS = (
     "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit",
-    "threadpoolctl",
+    "threadpoolctl", "rosbags", "apsw", "backports.zstd", "lz4", "ruamel.yaml", "typing_extensions",
 )  # fmt: skip
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
@@ -71,15 +71,15 @@ def fetch(platform: str, python: str, folder: Path) -> list[Path]:
                "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
     for name in PLATFORMS[platform]:
         command += ["--platform", name]
-    subprocess.run([*command, *requirements()], check=True)
+    subprocess.run([*command, *requirements(python)], check=True)
     return sorted(folder.glob("*.whl"))
 
 
-def requirements() -> list[str]:
-    """List ``name==version`` of every wheel."""
+def requirements(python: str = PYTHONS[0]) -> list[str]:
+    """List ``name==version`` of every wheel for a Python."""
     text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
     pins = dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
-    return [f"{name}=={pins[name]}" for name in WHEELS]
+    return [f"{name}=={pins[name]}" for name in WHEELS if (name, python) != ("backports.zstd", "3.14")]
 
 
 def manifest(platform: str | None, wheels: list[Path]) -> str:

@@ -1,5 +1,6 @@
 """File > Import > BioTac Recording, and the same by drag and drop; of other sensors by weights that read them."""
 
+import functools
 import os
 
 import bpy
@@ -8,16 +9,32 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
+from ...tactile_core.recordings.opened_file import ENDINGS
 from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, electrode_markers
 from ..settings import properties
 from ..settings.properties import MOTIONS, RecordingOptions
-from ..settings.reports import TactileOperator, shown
+from ..settings.reports import TactileOperator, in_blender, shown
 from . import recording_data, set_style, view
 
-SUFFIXES = "*.csv;*.h5;*.hdf5;*.npz"
 _APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housing and a gap
+_LABEL = "BioTac Recording (.csv, .h5, .npz, .mat, .json, .bag, .mcap)"
 LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
+
+
+def _fingers(operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
+    """List the recordings of the operator's file for a menu; while a browser is open, of the file chosen there."""
+    path, chosen = bpy.path.abspath(operator.filepath), getattr(context.space_data, "params", None)
+    if not os.path.isfile(path) and hasattr(chosen, "filename"):
+        path = os.path.join(os.fsdecode(chosen.directory), chosen.filename)
+    return _items(tuple(recording_data.fingers(path)))
+
+
+@functools.lru_cache(maxsize=8)  # Blender needs the texts to live on
+def _items(names: tuple[str, ...]) -> list[tuple[str, str, str]]:
+    return [
+        (str(k), name.rpartition("#")[2] if "#" in name else "The file's own", name) for k, name in enumerate(names)
+    ]
 
 
 class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelper):
@@ -29,7 +46,11 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
     filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
     filename_ext = ".csv"
-    filter_glob: bpy.props.StringProperty(default=SUFFIXES, options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default=";".join(f"*{end}" for end in ENDINGS), options={"HIDDEN"})
+    finger: bpy.props.EnumProperty(
+        name="Finger", description="Which of the recordings of a file of several fingers or topics",
+        items=lambda self, context: _fingers(self, context), options={"SKIP_SAVE"},
+    )  # fmt: skip
     first_frame: bpy.props.IntProperty(
         name="First Frame", description="Scene frame on which the recording's frame 0 is put", default=0
     )
@@ -45,9 +66,12 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
-        path = bpy.path.abspath(self.filepath)
+        path = recording_data.fingers(bpy.path.abspath(self.filepath))[int(self.finger or 0)]
         if self.motion == "MESH_CACHE" and not bpy.data.is_saved:
             raise TactileError(path, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
+        guessed = recording_data.write_columns(path, self)
+        if guessed:
+            self.report({"WARNING"}, guessed)
         with shown(context) as progress:
             found = recording_data.load(path, self, progress)
         scene, source = context.scene, found.translator.source
@@ -72,7 +96,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             advice = "Name the folder of your own sensors in Preferences"
             self.report({"WARNING"}, f"No electrodes are shown: there is no {table_of(source)}. {advice}")
         for warning in found.signals.warnings:
-            self.report({"WARNING"}, warning)
+            self.report({"WARNING"}, in_blender(warning))
         if len(frames) > LONG and self.motion != "MESH_CACHE":
             self.report({"WARNING"}, f"{len(frames)} frames: a mesh cache makes a smaller, faster file")
         self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
@@ -121,7 +145,7 @@ class TACTILE_FH_recording(bpy.types.FileHandler):
     bl_idname = "TACTILE_FH_recording"
     bl_label = "BioTac recording"
     bl_import_operator = "tactile.import_recording"
-    bl_file_extensions = SUFFIXES.replace("*", "")
+    bl_file_extensions = ";".join(ENDINGS)
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
@@ -130,7 +154,7 @@ class TACTILE_FH_recording(bpy.types.FileHandler):
 
 
 def _menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-    menu.layout.operator(TACTILE_OT_import_recording.bl_idname, text="BioTac Recording (.csv, .h5, .npz)")
+    menu.layout.operator(TACTILE_OT_import_recording.bl_idname, text=_LABEL)
 
 
 CLASSES = (TACTILE_OT_import_recording, TACTILE_FH_recording)

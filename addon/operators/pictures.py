@@ -105,7 +105,7 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
     try:
         view.show_picture(context, update(gel, context.evaluated_depsgraph_get()))
     except (TactileError, OSError) as error:
-        operator.report({"WARNING"}, str(error))
+        operator.report({"WARNING"}, reports.in_blender(str(error)))
 
 
 def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> bpy.types.Image:

@@ -8,7 +8,7 @@ from bpy.app.handlers import persistent
 from ...tactile_core.errors import TactileError
 from ..objects import images
 from ..process import tracer_process
-from ..settings import properties, render_settings
+from ..settings import properties, render_settings, reports
 from ..settings.reports import TactileOperator
 from . import pictures, stale_picture, view
 
@@ -38,7 +38,7 @@ def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) 
         pictures.show(gel, depsgraph, render_settings.preset_of(scene))
         _failed = ""
     except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
-        _failed = str(error)
+        _failed = reports.in_blender(str(error))
         stale_picture.check(scene, depsgraph)
     finally:
         _drawing = False

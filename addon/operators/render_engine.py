@@ -90,7 +90,7 @@ def _describe_error(error: Exception) -> str:
     if not isinstance(error, (TactileError, OSError)):
         traceback.print_exc()
         return f"Tactile render: {error!r}; the log says where"
-    return str(error)
+    return reports.in_blender(str(error))
 
 
 def to_linear(picture: np.ndarray) -> np.ndarray:

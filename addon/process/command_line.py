@@ -10,12 +10,12 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.recordings.opened_file import FOLDER_ENDINGS
 from ..settings import properties
 
 DESCRIPTION = """\
 Convert recordings, simulate scenes and render pictures inside Blender, unattended. Each input gets the folder
 DIR/<its name>. An input that fails is named and does not stop the others; the exit status is then 1."""
-RECORDINGS = (".csv", ".h5", ".hdf5", ".npz")
 EPILOG = """\
 examples:
   blender -b --command tactile convert touch.csv --out results       touch.blend: BioTac and DIGIT, animated
@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     gels = [name.lower() for name, _, _ in properties.sensor_items(gels_only=True)]
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     for name, brief, what in (
-        ("convert", "recordings to .blend files with both sensors", "recording: CSV, HDF5 or NPZ"),
+        ("convert", "recordings to .blend files with both sensors", "recording, in any layout that is read"),
         ("simulate", "scenes to .blend files and recordings", "scene.toml, or the folder that holds one"),
         ("render", "pictures of every frame", ".blend file, or a recording"),
         ("batch", "all of that for whatever a folder holds", "folder"),
@@ -80,6 +80,11 @@ def _parser() -> argparse.ArgumentParser:
             metavar="FOLDER",
             help="networks, which name the sensor of the recordings (default: those that ship for it)",
         )
+        verb.add_argument("--columns", type=Path, metavar="FILE", help="map of the recordings' columns")
+        verb.add_argument(
+            "--sensor", type=Path, metavar="FILE", help="rest and gains of the unit, from `tactile adapt`"
+        )
+        verb.add_argument("--frames-apart", action="store_true", help="translate each frame by itself, as of snapshots")
         verb.add_argument("--to", choices=gels, help="gel of recordings (default: the weights')")
         verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
         verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
@@ -93,7 +98,7 @@ def _found_in(folders: list[Path]) -> list[Path]:
     for folder in folders:
         for path in sorted(folder.iterdir()) if folder.is_dir() else [folder]:
             scene = path.is_dir() and (path / "scene.toml").is_file()
-            if scene or path.suffix.lower() in (*RECORDINGS, ".blend"):
+            if scene or path.suffix.lower() in (*FOLDER_ENDINGS, ".blend"):
                 found.append(path)
     return found
 
@@ -113,9 +118,15 @@ def _claimed(folder: Path, options: argparse.Namespace) -> Path:
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
     """Write a recording as a .blend."""
     _fresh()
-    words = {"tare": options.tare, "frames": options.frames, "polarity": options.polarity}
-    weights = "" if options.weights is None else str(options.weights.resolve())
-    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), weights=weights, **words)
+    words = {
+        "tare": options.tare,
+        "frames": options.frames,
+        "polarity": options.polarity,
+        "apart": options.frames_apart,
+    }
+    files = {"weights": options.weights, "columns": options.columns, "unit": options.sensor}
+    words |= {name: str(file.resolve()) for name, file in files.items() if file is not None}
+    bpy.ops.tactile.import_recording(filepath=str(path.resolve()), **words)
     bpy.ops.tactile.translate(**({} if options.to is None else {"to": options.to.upper()}))
     _claimed(folder, options)
     _finish(folder, options)

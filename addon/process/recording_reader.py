@@ -15,17 +15,18 @@ import numpy as np
 
 from ...tactile_core import recordings
 from ...tactile_core.recordings import Recording, Truth
+from ...tactile_core.recordings.tables import column_map
 from ...tactile_core.sensors import SOURCE
 from .jobs import Job, JobFolder
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
-def read(path: str | os.PathLike, sensor: str = SOURCE) -> Recording:
-    """See ``tactile_core.recordings.read``."""
+def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Recording:
+    """See ``tactile_core.recordings.read``; columns : file of a map, or empty."""
     if _is_hdf5(path) and not _hdf5_works():
-        return _read_elsewhere(os.fspath(path), sensor)
-    return recordings.read(path, sensor=sensor)
+        return _read_elsewhere(os.fspath(path), sensor, columns)
+    return recordings.read(path, column_map.read(columns) if columns else None, sensor)
 
 
 def _is_hdf5(path: str | os.PathLike) -> bool:
@@ -48,10 +49,10 @@ def _hdf5_works() -> bool:
     return True
 
 
-def _read_elsewhere(path: str, sensor: str = SOURCE) -> Recording:
+def _read_elsewhere(path: str, sensor: str = SOURCE, columns: str = "") -> Recording:
     """Raise TactileError as the reader does."""
     with JobFolder() as folder:
-        Job("read", folder, path=path, sensor=sensor).wait()
+        Job("read", folder, path=path, sensor=sensor, columns=columns).wait()
         about = json.loads((folder / "about.json").read_text(encoding="utf-8"))
         with np.load(folder / "arrays.npz", allow_pickle=False) as stored:
             arrays = dict(stored)

@@ -27,7 +27,7 @@ def main(folder: Path) -> int:
     try:
         JOBS[job["kind"]](folder, job, lambda done, total: say(done=done, total=total))
     except TactileError as error:
-        say(error=str(error).replace(f"{folder}/", ""))
+        say(error=str(error))
         return 2
     except ModuleNotFoundError as error:
         say(error=f"{error.name} is missing in Blender's Python. Install the extension's zip for this platform")
@@ -261,11 +261,17 @@ def variant(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:
-    """Read the recording of job["sensor"] at job["path"] into arrays.npz and about.json, for ``recording_reader``."""
-    from tactile_core import recordings
+    """Read the recording job["path"] of job["sensor"] into arrays.npz and about.json, for ``recording_reader``.
 
-    found = recordings.read(job["path"], sensor=job["sensor"])
+    job["columns"] : file of a map of its columns, or empty
+    """
+    from tactile_core import recordings
+    from tactile_core.recordings.tables import column_map
+
+    columns = column_map.read(job["columns"]) if job["columns"] else None
+    found = recordings.read(job["path"], columns, job["sensor"])
     whole = {field.name: getattr(found, field.name) for field in dataclasses.fields(found)}
+    whole["labels"] = {}  # texts of frames, which no part of Blender shows
     truth = whole.pop("truth")
     if truth is not None:
         held = {f"truth.{field.name}": getattr(truth, field.name) for field in dataclasses.fields(truth)}

@@ -60,6 +60,18 @@ class RecordingOptions:
     frames: bpy.props.StringProperty(
         name="Frames", description="Part of the recording, A:B:STEP as in Python; a colon alone takes all", default=":"
     )
+    columns: bpy.props.StringProperty(
+        name="Columns", description="Map that says which column or array of the recording is what, where no layout is"
+        " known; one that is not there is written, guessed, to be checked", subtype="FILE_PATH", options=RELATIVE,
+    )  # fmt: skip
+    unit: bpy.props.StringProperty(
+        name="Unit", description="Rest and gains of the recording's own finger, a file of `tactile adapt`; empty: a"
+        " typical finger's", subtype="FILE_PATH", options=RELATIVE,
+    )  # fmt: skip
+    apart: bpy.props.BoolProperty(
+        name="Each Frame Alone", description="Translate each frame by its own signals, as snapshots without order need;"
+        " else the contact is followed through the frames", options=set(),
+    )  # fmt: skip
     weights: bpy.props.StringProperty(
         name="Weights", description="Folder of the networks, which name their two sensors; empty: those that ship for"
         " the recording's sensor", subtype="DIR_PATH", options=RELATIVE,

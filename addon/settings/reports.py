@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import re
+import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -13,14 +15,32 @@ from ...tactile_core.errors import TactileError
 # module -> what it is needed for
 MODULES = {
     "h5py": "reading HDF5 recordings",
-    "msgspec": "scene files",
-    "scipy": "simulating contacts",
+    "msgspec": "scene files, maps of columns and files of units",
+    "rosbags": "ROS bags and MCAP",
+    "scipy": "simulating contacts and MATLAB files",
     "trimesh": "meshes as indenters",
     "rtree": "meshes as indenters",
     "mitsuba": "the Mitsuba presets",
     "threadpoolctl": "simulating contacts",
 }
+# What errors call by the command line's names -> what Blender calls it; folders of jobs, which the user never sees.
+WORDS = (
+    (re.escape(tempfile.gettempdir()) + r"[/\\]tactile-\w+[/\\]?", ""),
+    (r"tactile info \S+ --columns \S+( writes one( to fill in)?)?", "Columns writes the file that it names"),
+    (r"See `tactile doctor`", "Check LLVM in the add-on's preferences"),
+    (r"--(tare|polarity|columns|weights|preset)\b", lambda found: found[1].title()),
+    (r"--sensor\b", "Unit"),
+    (r"--error\b", "Largest Error"),
+    (r"--frames-apart\b", "Each Frame Alone"),
+)  # fmt: skip
 ADVICE = "Install the extension's zip for this platform, which brings it"
+
+
+def in_blender(text: str) -> str:
+    """Put Blender's own names in place of the command line's."""
+    for pattern, words in WORDS:
+        text = re.sub(pattern, words, text)
+    return text
 
 
 def missing(*names: str) -> list[str]:
@@ -55,6 +75,7 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
         text = f"{error.filename or 'Tactile'}: cannot be written or read ({error.strerror or error})"
     else:
         return
+    text = in_blender(text)
     operator.report({"ERROR"}, text)
     raise Refused(text)
 

@@ -45,7 +45,8 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "recording", text="")
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
-            box.prop(skin.tactile, "weights")
+            for name in ("columns", "unit", "apart", "weights"):
+                box.prop(skin.tactile, name)
         row = layout.row(align=True)
         row.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
         row.operator_menu_enum(TACTILE_OT_translate.bl_idname, "to", text="", icon="DOWNARROW_HLT")

@@ -18,6 +18,8 @@ from .tables.json_table import is_json
 from .tables.matlab import START, START_OF_HDF5
 from .tables.unpacked import unpacked
 
+FOLDER_ENDINGS = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # of what is taken from a folder
+ENDINGS = (*FOLDER_ENDINGS, ".npy", ".json", ".jsonl", ".txt", ".tsv", ".gz")  # of all that is read, some by a map
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
 

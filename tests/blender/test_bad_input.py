@@ -164,3 +164,23 @@ def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
     translated.tactile.format, translated.add_rest_position_attribute = 1, False
     assert bpy.ops.tactile.set_style(style="DISPLACEMENT") == {"FINISHED"}
     assert translated.data.color_attributes.active_color.name == "Tactile colour"
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        ("a.csv: odd; expected counts. Give the unit's own (--sensor), or frames (--tare)",
+         "a.csv: odd; expected counts. Give the unit's own (Unit), or frames (Tare)"),
+        ("Name it in a map: tactile info FILE --columns map.toml writes one to fill in",
+         "Name it in a map: Columns writes the file that it names"),
+        ("LLVM missing. See `tactile doctor`", "LLVM missing. Check LLVM in the add-on's preferences"),
+    ],
+)  # fmt: skip
+def test_errors_have_blender_s_words(part, said, shown):
+    assert part("addon.settings.reports").in_blender(said) == shown
+
+
+def test_no_folder_of_a_job_is_named(part):
+    with part("addon.process.jobs").JobFolder() as folder:
+        said = f"{folder / 'scene.toml'}, recording: missing"
+        assert part("addon.settings.reports").in_blender(said) == "scene.toml, recording: missing"

@@ -18,6 +18,7 @@ from ...errors import TactileError
 from ...files import provenance
 from ...files.outside import read_small
 from ...recordings.bags.bag import MARK
+from ...recordings.opened_file import FOLDER_ENDINGS
 from ...recordings.readers import list_fingers
 from ...recordings.recording import name_of, split
 from ...sensors.calibration_file import load_calibration
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from ...simulation.scene import Scene
 
 log = logging.getLogger(__name__)
-SUFFIXES = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # what is taken from a folder
 MOST_STARS, MOST_PARTS = 2, 100  # of a glob: '**', whose work multiplies; parts, each a call deeper in Python's glob
 MOST_QUOTED = 200  # characters of a glob in an error: a line of a list may have millions
 SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wrenches and poses are no recordings
@@ -55,7 +55,7 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
     for word, place in _words(words):
         paths = [path for path in _named(word, within) if not path.is_relative_to(own)]
         if not paths:
-            expected, advice = f"files ({', '.join(SUFFIXES)}), folders or globs", "Check the path"
+            expected, advice = f"files ({', '.join(FOLDER_ENDINGS)}), folders or globs", "Check the path"
             advice += "; quote a glob, so that the shell leaves it alone" if not place else ""
             raise TactileError(f"{place}{word[:MOST_QUOTED]}", "names no recording", expected, advice)
         found |= dict.fromkeys(paths)
@@ -126,7 +126,7 @@ def _of_folder(folder: Path) -> Iterator[Path]:
         bags = [name for name in folders if _is_bag(Path(place, name))]
         folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
         beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
-        files = [name for name in names if name.lower().endswith(SUFFIXES) and not name.startswith(".")]
+        files = [name for name in names if name.lower().endswith(FOLDER_ENDINGS) and not name.startswith(".")]
         for name in sorted([*bags, *(name for name in files if not name.endswith(beside))]):
             yield Path(place) / name
 
