@@ -13,7 +13,7 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.translation import card as cards
 from tactile_core.translation import contact_frame, networks, translate
 from tactile_core.translation.posterior import Posterior
-from tactile_core.translation.translator import UNTRAINED_CONFIDENCE, Translator, elsewhere
+from tactile_core.translation.translator import UNTRAINED, UNTRAINED_CONFIDENCE, Translator, elsewhere
 
 
 @pytest.fixture(scope="module")
@@ -109,6 +109,15 @@ def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped,
     assert (odd.flags[touched(shipped)] & Flag.OUT_OF_RANGE).mean() > 0.9
     restless = dataclasses.replace(signals, flags=signals.flags | np.uint16(Flag.NO_QUIET_PART))
     assert translator(restless).confidence.max() <= np.float32(UNTRAINED_CONFIDENCE)
+
+
+def test_confidence_has_the_order_of_what_is_explained(translator, shipped, signals):
+    gains = np.random.default_rng(0).uniform(0.7, 1.1, 19)
+    odd = translator(dataclasses.replace(signals, change=gains * signals.change))
+    near = touched(shipped) & np.isfinite(odd.explained) & ((odd.flags & np.uint16(UNTRAINED)) == 0)
+    near &= odd.confidence > 0.7  # no distance counts
+    order = np.argsort(odd.explained[near])
+    assert near.sum() > 20 and (np.diff(odd.confidence[near][order]) >= 0).all()
 
 
 def test_rectified_signals_are_read_as_such(translator, shipped, signals, translation):

@@ -100,7 +100,8 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
     found += sequence_rows.full_rows(network, pairs)
     found += two_contact_rows.rows(pairs)
-    found += made_up_units.rows(network, *((2, 2) if options.quick else ()))
+    few = (2, 2) if options.quick else ()
+    found += made_up_units.rows(network, *few) + made_up_units.reliability(network, *few)
     apart = [translate.load_translator(folder) for folder in options.held_out]
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)

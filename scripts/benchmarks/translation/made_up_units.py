@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import itertools
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -34,7 +35,7 @@ from tactile_core.sensors.readout import NOISE, converted
 from tactile_core.simulation.pair_sampling import draw_place, paired
 from tactile_core.simulation.scene import Scene, load_scene
 from tactile_core.translation.translate import PreparedRows, translated
-from tactile_core.translation.translator import Translator
+from tactile_core.translation.translator import Translation, Translator
 
 from .noise import GAIN
 
@@ -47,6 +48,8 @@ FORCES = 0.2, 2.0  # N, log-uniform: a typical skin's at the deepest contact of 
 HELD, STILL = 8, 6  # frames at the deepest contact, and without one before the next
 AT_FIRST = 60  # frames without contact
 SEED = 17
+# Confidence is judged on other units than the 64 whose half it was fitted to, in bins of these edges that hold enough.
+OTHERS, CHECKED, EDGES, FEWEST = 64, 24, (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 1.0), 50
 
 
 @dataclasses.dataclass(frozen=True)
@@ -166,11 +169,7 @@ def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> lis
 
     found : by the recording itself, its rest and contacts, as `tactile convert` does; stiffness cannot be
     """
-    drawn = []
-    for number in range(units):
-        random = np.random.default_rng([SEED, number, 0])
-        ranges = (FILMS, CONDUCTIVITIES, STIFFNESSES)
-        drawn.append(Unit(*(float(np.exp(random.uniform(*np.log(each)))) for each in ranges)))
+    drawn = [unit_of(number) for number in range(units)]
     made, typical = ([played(*each, presses) for each in enumerate(every)] for every in (drawn, [Unit()] * units))
     beside = _errors(network, typical, "unknown")
     of = f"{sum(len(each.frames) for each in made)} contacts of {units} units; baseline: of a typical unit"
@@ -181,19 +180,49 @@ def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> lis
     ]
 
 
-def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
-    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact."""
-    began = time.process_time()
+def unit_of(number: int) -> Unit:
+    """Draw a unit; number : the only seed."""
+    random = np.random.default_rng([SEED, number, 0])
+    return Unit(*(float(np.exp(random.uniform(*np.log(each)))) for each in (FILMS, CONDUCTIVITIES, STIFFNESSES)))
+
+
+def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSES) -> list[Row]:
+    """Shares of contacts whose largest node error is below its bound, a row a bin of confidence, which it should be."""
+    made = [played(OTHERS + each, unit_of(OTHERS + each), presses) for each in range(units)]
+    gel, rows = np.concatenate([each.gel for each in made]), []
+    found = [_translated(network, made, taken) for taken in TAKEN]
+    error = np.concatenate([accuracy.lengths(each.displacement_digit - gel).max(axis=1) for each in found])
+    confidence, expected, bound = (
+        np.concatenate([getattr(each, name) for each in found])
+        for name in ("confidence", "expected_error_digit", "error_bound_digit")
+    )
+    for low, high in itertools.pairwise(EDGES):
+        here = (confidence > low) & (confidence <= high)
+        if here.sum() < FEWEST:
+            continue
+        share, mean = (error < bound)[here].mean(), f"{confidence[here].mean():.3f} in the mean"
+        of = f"{here.sum()} contacts of {units} other units, {mean}; baseline: below the expected error"
+        below = (error < expected)[here].mean()
+        rows.append(row(f"confidence_to_{high:g}", share, "1", low, baseline=below, of=of, at_least=True))
+    return rows
+
+
+def _translated(network: Translator, made: Sequence[Played], taken: str) -> Translation:
+    """Translate the contacts of recordings, one after the other."""
     answers = []
     for each in made:
         options, unit = TAKEN[taken](each.unit)
         prepared = PreparedRows(each.recording, each.frames, network.answer, options, unit)
         answers.append(translated(network, prepared, each.frames))
+    return Translation.joined(answers)
+
+
+def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
+    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact."""
+    began = time.process_time()
+    found = _translated(network, made, taken)
     spent = time.process_time() - began
-    force, place, gel = (
-        np.concatenate([getattr(each, name) for each in answers])
-        for name in ("force", "contact_center", "displacement_digit")
-    )
+    force, place, gel = found.force, found.contact_center, found.displacement_digit
     true_force, true_gel = (np.concatenate([getattr(each, name) for each in made]) for name in ("force", "gel"))
     away = accuracy.lengths(place - accuracy.dent_center(true_gel, sensors.digit_surface().rest))
     return {

@@ -33,3 +33,9 @@ def test_rows_of_units_given_found_and_unknown():
     ]
     assert [each["name"] for each in found] == names
     assert all(np.isfinite(each["value"]) for each in found)
+
+
+def test_confidence_is_the_share_of_errors_below_their_bound():
+    found = made_up_units.reliability(load_translator(), units=2, presses=6)
+    assert [each["name"] for each in found][-1] == "confidence_to_1"
+    assert all(each["ok"] for each in found)  # nowhere less than the confidence
