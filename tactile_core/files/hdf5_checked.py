@@ -31,30 +31,29 @@ MAX_DEPTH = 32  # groups within groups, whose names the library looks up again a
 MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enough: the library keeps at most 32 MB)
-LOCK = threading.Lock()  # one bound at a time: each restores what it found
 
 
 @contextmanager
 def bounded_memory(more: int) -> Iterator[None]:
     """Let the process take at most ``more`` bytes beyond its present data; allocations beyond fail.
 
-    On Linux alone: macOS and Windows have no such bound within a process.
+    On Linux alone: macOS and Windows have no such bound within a process. In the main thread alone: beside other work,
+    as in a Dask worker, whose own limit holds, the work of other threads would fail of the bound.
     """
-    if not sys.platform.startswith("linux"):
+    if not sys.platform.startswith("linux") or threading.current_thread() is not threading.main_thread():
         yield
         return
     import resource
 
-    with LOCK:
-        before = resource.getrlimit(resource.RLIMIT_DATA)
-        with open("/proc/self/statm") as file:
-            present = int(file.read().split()[5]) * resource.getpagesize()
-        limits = [present + more, *(limit for limit in before if limit != resource.RLIM_INFINITY)]
-        resource.setrlimit(resource.RLIMIT_DATA, (min(limits), before[1]))
-        try:
-            yield
-        finally:
-            resource.setrlimit(resource.RLIMIT_DATA, before)
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    with open("/proc/self/statm") as file:
+        present = int(file.read().split()[5]) * resource.getpagesize()
+    limits = [present + more, *(limit for limit in before if limit != resource.RLIM_INFINITY)]
+    resource.setrlimit(resource.RLIMIT_DATA, (min(limits), before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, before)
 
 
 @contextmanager

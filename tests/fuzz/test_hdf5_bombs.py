@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 import struct
+import sys
 import zlib
+from concurrent.futures import ThreadPoolExecutor
 
 import h5py
 import numpy as np
@@ -213,3 +215,17 @@ def test_a_dataset_that_holds_nothing_is_bounded(tmp_path):
         for name in set(pairs_file.DATASETS) - {"displacement_biotac"}:
             file[name] = np.zeros(1)
     refused(pairs_file.read_pairs, tmp_path / "b.h5", "stored bytes")
+
+
+def test_the_bound_is_the_main_threads_alone_and_ends_with_it():
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+
+    def within(_) -> tuple[int, int]:
+        with hdf5_checked.bounded_memory(2**20):
+            return resource.getrlimit(resource.RLIMIT_DATA)
+
+    with ThreadPoolExecutor(2) as pool:  # as Dask's workers do tasks
+        assert set(pool.map(within, range(8))) == {before}
+    assert sys.platform != "linux" or within(0)[0] not in (before[0], resource.RLIM_INFINITY)
+    assert resource.getrlimit(resource.RLIMIT_DATA) == before
