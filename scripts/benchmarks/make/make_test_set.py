@@ -20,11 +20,12 @@ import tempfile
 import numpy as np
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 SCENE = ROOT / "scenes" / "training"
 
+from benchmarks.make import full_pairs  # noqa: E402
 from tactile_core.files import array_pack, atomic  # noqa: E402
-from tactile_core.simulation import full_pairs, pairs_writer  # noqa: E402
+from tactile_core.simulation import pairs_writer  # noqa: E402
 from tactile_core.simulation.pairs_writer import Made, card, card_path  # noqa: E402
 from tactile_core.simulation.scene import load_scene  # noqa: E402
 

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.make.full_pairs import REGION_X
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter
 from tactile_core.mechanics.skin_contact import BodyContact, likely_contacts
-from tactile_core.simulation.full_pairs import REGION_X
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.simulation.scene import load_scene
 from tactile_core.training.step_errors import (

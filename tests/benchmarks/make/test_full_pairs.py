@@ -8,7 +8,8 @@ import h5py
 import msgspec
 import numpy as np
 import pytest
-from benchmarks.make import make_test_set
+from benchmarks.make import full_pairs, make_test_set
+from benchmarks.make.full_pairs import REGION_X, draw_press, full_rows
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
@@ -21,11 +22,10 @@ from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.mechanics.force_search import FORCE_TOLERANCE
 from tactile_core.mechanics.placement import Placement, pose_at
 from tactile_core.mechanics.solve import Step, solve, solve_path
-from tactile_core.simulation import full_pairs, pairs_file, pairs_writer
-from tactile_core.simulation.full_pairs import REGION_X, draw_press, full_rows
+from tactile_core.simulation import pairs_file, pairs_writer
 from tactile_core.simulation.scene import load_scene
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 BALL, PLACE = Sphere(3.5e-3), Placement(-8e-3, 1e-3, 0.15, 1.0)
 
 

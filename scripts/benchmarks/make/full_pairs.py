@@ -12,17 +12,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .. import sensors
-from ..errors import TactileError
-from ..geometry.indenters import Box, Indenter, Ring
-from ..mechanics.force_search import UnreachableError
-from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, surface_drop
-from ..mechanics.solution import Solution, Step
-from ..mechanics.solve import solve, solve_path
-from ..sensors import SOURCE, TARGET
-from .pair_sampling import draw_place, pair_row, paired
-from .scene import Scene
+from tactile_core import sensors
+from tactile_core.errors import TactileError
+from tactile_core.geometry.indenters import Box, Indenter, Ring
+from tactile_core.mechanics.force_search import UnreachableError
+from tactile_core.mechanics.penetration import PenetrationError
+from tactile_core.mechanics.placement import DEPTH_LIMIT, Placement, depth_at, pose_at, surface_drop
+from tactile_core.mechanics.solution import Solution, Step
+from tactile_core.mechanics.solve import solve, solve_path
+from tactile_core.sensors import SOURCE, TARGET
+from tactile_core.simulation.pair_sampling import draw_place, pair_row, paired
+from tactile_core.simulation.scene import Scene
 
 REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
 SHARES = 0.25, 0.55, 1.0  # of a press's greatest depth on the BioTac, at which it is sampled
