@@ -6,7 +6,7 @@ from pathlib import Path
 
 import bpy
 
-from ...tactile_core.files import cache
+from ...tactile_core.files import array_cache
 from ...tactile_core.sensors.descriptor import OWN
 from .reports import ADVICE, MODULES, TactileOperator, missing
 
@@ -39,7 +39,7 @@ class TACTILE_OT_clear_cache(TactileOperator):
 
     def work(self, _context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
-        known = cache.entries()
+        known = array_cache.entries()
         size = sum(map(size_of, known))
         for folder in known:
             shutil.rmtree(folder)
@@ -102,8 +102,8 @@ class TactilePreferences(bpy.types.AddonPreferences):
         row.label(text=self.verdict or "LLVM: not checked yet", icon="INFO")
         row.operator("tactile.check_llvm", icon="FILE_REFRESH")
         row = column.row()
-        size = sum(map(size_of, cache.entries()))
-        row.label(text=f"Cache: {1e-6 * size:.0f} MB in {cache.cache_folder()}", icon="DISK_DRIVE")
+        size = sum(map(size_of, array_cache.entries()))
+        row.label(text=f"Cache: {1e-6 * size:.0f} MB in {array_cache.cache_folder()}", icon="DISK_DRIVE")
         row.operator(TACTILE_OT_clear_cache.bl_idname, icon="TRASH")
         row = column.row()
         row.label(text="Styles in the asset library “Tactile”", icon="ASSET_MANAGER")

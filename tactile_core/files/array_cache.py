@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -11,9 +12,23 @@ import numpy as np
 
 from ..errors import TactileError
 from . import atomic, outside
-from .cache import HASHES as HASHES  # written last: without it an entry is not whole
 
+HASHES = "sha256.json"  # in each folder of arrays, with the hash of each; written last: else an entry is not whole
 _MOST = 2**16  # bytes of that file; a few names and hashes
+
+
+def cache_folder() -> Path:
+    """Return ``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows); it need not exist."""
+    chosen = os.environ.get("TACTILE_CACHE")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "tactile"
+
+
+def entries() -> list[Path]:
+    """List the cache's folders that hold our arrays, which are computed again where they are missing."""
+    return sorted(file.parent for file in cache_folder().glob(f"*/{HASHES}"))
 
 
 class DamagedError(Exception):

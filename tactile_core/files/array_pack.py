@@ -50,7 +50,7 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
 def write_files(file: Path, folder: Path) -> None:
     """Pack all files of a folder and below it."""
     paths = [path for path in sorted(folder.rglob("*")) if path.is_file()]
-    write(file, {path.relative_to(folder).as_posix(): _bytes(path) for path in paths})
+    write(file, {path.relative_to(folder).as_posix(): np.frombuffer(path.read_bytes(), np.uint8) for path in paths})
 
 
 def unpack(file: Path, folder: Path) -> None:
@@ -61,7 +61,3 @@ def unpack(file: Path, folder: Path) -> None:
             raise TactileError(file, f"the name {name!r:.80}", "a name inside the folder")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content.tobytes())
-
-
-def _bytes(path: Path) -> np.ndarray:
-    return np.frombuffer(path.read_bytes(), np.uint8)

@@ -62,7 +62,11 @@ class MujocoGel:
         """
         pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
         if not pressing:
-            return None if self.gel is None else self._lift(self.gel)
+            self._shift = np.zeros(3)
+            if self.gel is None:
+                return None
+            self.gel.reset()
+            return self.gel.contact
         body = max(pressing, key=lambda geom: (pressing[geom][1], -geom))
         if body not in self._gels:
             indenter, offset = indenter_of(self.model, body)
@@ -127,11 +131,6 @@ class MujocoGel:
         pose[:3, :3] = axes.T @ data.geom_xmat[geom].reshape(3, 3)
         pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - data.site_xpos[self._site])
         return pose
-
-    def _lift(self, gel: Gel) -> GelContact:
-        gel.reset()
-        self._shift = np.zeros(3)
-        return gel.contact
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:

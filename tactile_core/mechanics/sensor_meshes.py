@@ -53,7 +53,8 @@ def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, col
         if values.ndim == 1:
             fields[name] = values
         else:
-            fields |= {_component(name, axis): values[:, k] for k, axis in enumerate("xyz")}
+            stem = f"{name}_" if len(name) > 1 else name
+            fields |= {stem + axis: values[:, k] for k, axis in enumerate("xyz")}
     head = ["ply", "format binary_little_endian 1.0", "comment tactile-core, metres and newtons"]
     head += [f"element vertex {len(nodes)}", *(f"property float {name}" for name in fields)]
     head += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header"]
@@ -140,10 +141,6 @@ def _array(name: str, values: np.ndarray) -> str:
     text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
     return f'<DataArray type="{_VTK_NAMES[values.dtype.name]}" Name="{name}"{width} format="binary">{text}</DataArray>'
-
-
-def _component(name: str, axis: str) -> str:
-    return f"{name}_{axis}" if len(name) > 1 else name + axis
 
 
 def _checked(path: str | os.PathLike, name: str, values: np.ndarray, count: int) -> np.ndarray:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import os
+import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import BinaryIO, NamedTuple
@@ -16,7 +19,7 @@ from .bags.bag import START_BYTES, is_bag_folder, kind_of
 from .recording import split
 from .tables.json_table import is_json
 from .tables.matlab import START, START_OF_HDF5
-from .tables.unpacked import unpacked
+from .tables.table import MAX_BYTES
 
 FOLDER_ENDINGS = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # of what is taken from a folder
 ENDINGS = (*FOLDER_ENDINGS, ".npy", ".json", ".jsonl", ".txt", ".tsv", ".gz")  # of all that is read, some by a map
@@ -112,3 +115,31 @@ def refuse_finger(path: str, finger: int | None) -> None:
     """Raise TactileError where a finger is asked of a file of one."""
     if finger is not None:
         raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
+
+
+GZIP, STEP = b"\x1f\x8b", 2**20
+
+
+@contextmanager
+def unpacked(path: str, file: BinaryIO) -> Iterator[BinaryIO]:
+    """Yield the file from its start, unpacked where it is gzipped.
+
+    Raises TactileError for damage, and for what unpacks to more than a text may have.
+    """
+    packed = file.read(len(GZIP)) == GZIP
+    file.seek(0)
+    if not packed:
+        yield file
+        return
+    with tempfile.TemporaryFile() as whole:
+        try:
+            with gzip.GzipFile(fileobj=file) as stream:
+                while data := stream.read(STEP):
+                    if whole.tell() + len(data) > MAX_BYTES:
+                        found = f"unpacks to more than {MAX_BYTES // 2**20} MB"
+                        raise TactileError(path, found, "a recording of some hours", "Split the recording")
+                    whole.write(data)
+        except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+            raise TactileError(path, f"damaged gzip ({error})", "a whole file", "Copy it again") from error
+        whole.seek(0)
+        yield whole

@@ -82,7 +82,7 @@ def write_simulated(
     }
     plain = {"time": np.asarray(time, np.float64)} | counts
     pressed = {f"truth/{_PRESSED}{sensor}": values for sensor, values in truth.tractions.items()}
-    tractions = {name: _tractions(path, name, value, frames) for name, value in pressed.items()}
+    tractions = {name: _of_nodes(path, name, value, frames).astype(np.float32) for name, value in pressed.items()}
     _write_whole(path, attributes, plain, steps, forces, tractions)
     return path
 
@@ -185,7 +185,7 @@ def _traction(store: Store, name: str, frames: int) -> np.ndarray:
 
 
 def _displacement(store: Store, name: str, frames: int) -> np.ndarray:
-    steps = store.array(name, (frames, *store.shapes[name][0][1:2], 3), np.float32)
+    steps = _traction(store, name, frames)
     scale = store.attributes_of(name).get("scale")
     if not isinstance(scale, float) or not 0 < scale < 1:
         raise TactileError(f"{store.path}, {name}", f"attribute scale = {scale!r}", "metres a unit, such as 1e-7")
@@ -207,16 +207,15 @@ def _counts(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...]) ->
     return rounded.astype(np.int16)
 
 
-def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
+def _of_nodes(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
     if np.ndim(value) != 3 or np.shape(value)[0] != frames or np.shape(value)[2] != 3:
-        raise TactileError(f"{path}, truth/{name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
+        raise TactileError(f"{path}, {name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
+    return np.asarray(value)
+
+
+def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
+    value = _of_nodes(path, f"truth/{name}", value, frames)
     steps = np.rint(np.asarray(value, np.float64) / SCALE)
     if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):
         raise TactileError(f"{path}, truth/{name}", "displacements beyond +-16 mm or not finite", "at most 16 mm")
     return steps.astype(np.int16)
-
-
-def _tractions(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
-    if np.ndim(value) != 3 or np.shape(value)[0] != frames or np.shape(value)[2] != 3:
-        raise TactileError(f"{path}, {name}", f"shape {np.shape(value)}", f"({frames}, nodes, 3)")
-    return np.asarray(value, np.float32)

@@ -105,11 +105,13 @@ def simulate_recording(
         change = np.stack([frame.change for frame in frames])
         electrode_counts, pdc = readings(change, time, _wiring(spec), seed), pdc_counts(pressure)
         still = np.full(len(time), _STILL_COUNT, np.int16)
-        fluid = " " + _describe_fluid(pressure, electrodes)
+        fluid = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
+        fluid += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the {electrodes} law."
+    made_by = ", ".join(["mechanics.recording", *map(" ".join, sorted((tiers or {}).items()))])
     write_simulated(
         out, time=time, electrodes=electrode_counts, pdc=pdc, tac=still, tdc=still,
         truth=_truth(frames, keep), scene=text, seed=seed,
-        made_by=f"tactile {__version__}, mechanics.recording{_describe_tiers(tiers)}",
+        made_by=f"tactile {__version__}, {made_by}",
         note=f"Simulated, not measured: {scene.description}{fluid}",
     )  # fmt: skip
 
@@ -125,10 +127,6 @@ def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
         advice = "See scenes/press_roll_slide/scene.toml"
         raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
     return scene.recording
-
-
-def _describe_tiers(tiers: Mapping[Sensor, Tier] | None) -> str:
-    return "" if not tiers else ", " + ", ".join(f"{sensor} {tier}" for sensor, tier in sorted(tiers.items()))
 
 
 def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
@@ -208,13 +206,6 @@ def _pressure(frames: list[_Frame]) -> np.ndarray:
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
     """Convert the fluid's pressure, Pa, to PDC (...,) int16 counts, 0..4095."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
-
-
-def _describe_fluid(pressure: np.ndarray, electrodes: str) -> str:
-    """The fluid's pressure and the electrodes' law in words for the file."""
-    low, high = pressure.min() / 1e3, pressure.max() / 1e3
-    fluid = f"Fluid pressure {low:.2f} to {high:.2f} kPa; PDC counts {sensors.PRESSURE_PER_COUNT:g} Pa each."
-    return f"{fluid} Electrodes by the {electrodes} law."
 
 
 def _wiring(spec: RecordingSpec) -> Wiring:

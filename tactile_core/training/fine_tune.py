@@ -8,7 +8,6 @@ the recording's own signals and on the typical simulated signals that ship with 
 from __future__ import annotations
 
 import copy
-import hashlib
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from torch import Tensor
 from .. import accuracy, sensors
 from ..accuracy import Row, row
 from ..errors import TactileError
-from ..files import outside
+from ..files import provenance
 from ..recordings import prepare, read
 from ..recordings.flags import Flag
 from ..sensors import unrolling
@@ -167,7 +166,7 @@ def fine_tune(
         note = {
             "network": net,
             "recording": os.path.basename(path),
-            "recording_sha256": _file_sha256(path),
+            "recording_sha256": provenance.sha256(path),
             "weights_sha256": before.sha256,
             "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
             "dropped": list(data.dropped),
@@ -177,11 +176,6 @@ def fine_tune(
         }
         _write(Path(out_folder) / "weights", source, before.card, net, state, note)
     return rows
-
-
-def _file_sha256(path: str | os.PathLike) -> str:
-    with outside.open_file(path) as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _train(

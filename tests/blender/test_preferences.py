@@ -22,7 +22,7 @@ def test_clearing_the_cache_removes_our_arrays_alone(monkeypatch, tmp_path, part
         (tmp_path / name / "array.npy").write_bytes(b"1234")
     (tmp_path / "compliance-digit-1" / "sha256.json").write_text("{}")
     assert [
-        part("addon.settings.preferences").size_of(each) for each in part("tactile_core.files.cache").entries()
+        part("addon.settings.preferences").size_of(each) for each in part("tactile_core.files.array_cache").entries()
     ] == [6]
     assert bpy.ops.tactile.clear_cache() == {"FINISHED"}
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine"]

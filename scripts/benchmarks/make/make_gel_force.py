@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
 
-from benchmarks.translation.gel_force import TABLE
+from benchmarks.translation.contact_rows import TABLE
 from tactile_core import accuracy
 from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs, read_pairs, split_presses

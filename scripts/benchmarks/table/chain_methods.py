@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from benchmarks.measure_presets import QUICK_PASSES, one_thread, rms
-from benchmarks.translation.noise import as_read
-from benchmarks.translation.test_set import SEED
+from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
 from tactile_core.pictures.mitsuba.matte_light import MatteLight

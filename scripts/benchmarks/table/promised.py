@@ -12,8 +12,7 @@ import numpy as np
 
 from benchmarks.measured_rows import png_of
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
-from benchmarks.translation.noise import as_read
-from benchmarks.translation.test_set import SEED
+from benchmarks.translation.test_set import SEED, as_read
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.pictures.presets import measured as measured_presets

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.translation.noise import as_read
-from benchmarks.translation.test_set import SEED
+from benchmarks.translation.test_set import SEED, as_read
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel

@@ -29,7 +29,7 @@ from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translator, contact_center
 
 from . import fluid_pressure, prints
-from .noise import as_read
+from .test_set import as_read
 
 PATTERN = "*_HOLD.mat"  # <object>_<number>_<trial>_HOLD.mat
 HARD = ("acrylic", "steel_vase")

@@ -37,7 +37,7 @@ from tactile_core.simulation.scene import Scene, load_scene
 from tactile_core.translation.translate import PreparedRows, translated
 from tactile_core.translation.translator import Translation, Translator
 
-from .noise import GAIN
+from .test_set import GAIN
 
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training"
 # Over the typical unit's: films and conductivities of five real units and some room (shared/design/finger.md),

@@ -16,8 +16,7 @@ from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translator import Translator
 
 from ..measured_rows import png_of, short, write_table
-from .noise import as_read
-from .test_set import SEED
+from .test_set import SEED, as_read
 
 PICTURE = "translation_cases.png"
 PURPOSE = """\

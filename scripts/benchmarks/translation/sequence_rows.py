@@ -23,7 +23,7 @@ from tactile_core.translation.translator import Translation, Translator
 
 from . import full_sequences
 from .followed_rows import FORCE, PEAK, PLACE, TOUCHED
-from .noise import GAIN, NOISE
+from .test_set import GAIN, NOISE
 
 FILE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_sequences.npz"
 MOTIONS = "presses", "rolls", "slides"

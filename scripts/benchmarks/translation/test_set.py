@@ -6,6 +6,7 @@ import numpy as np
 
 from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
+from tactile_core.sensors.readout import NOISE
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import (
     Bodies,
@@ -22,7 +23,6 @@ from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows
 from .mechanics_rows import mechanics_rows
-from .noise import as_read
 from .slide_metrics import rank_correlation
 
 # Targets (docs/sources.md, Targets), without shear, depth bins and indenters alike.
@@ -35,6 +35,7 @@ UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter th
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 BASELINE_METRICS = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
 SEED = 7  # of the readings' noise
+GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac read-out)
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
@@ -109,3 +110,10 @@ def _share_row(name: str, value: float, low: float | None, high: float | None, s
     """A row with a target from below, from above, or both."""
     found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
     return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
+
+
+def as_read(change: np.ndarray, seed: int) -> np.ndarray:
+    """Add seeded noise and gains to true changes (C, 19) counts."""
+    random = np.random.default_rng(seed)
+    gain = 1 + GAIN * random.standard_normal(change.shape)
+    return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

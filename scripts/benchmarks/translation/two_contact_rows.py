@@ -12,7 +12,7 @@ from tactile_core.recordings.polarity import TOUCHING
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation.simulated_likeness import residual_shares, two_contacts
 
-from .noise import as_read
+from .test_set import as_read
 
 COUNT = 2000  # of each kind; the standard error of a share of a half is .011
 NEAREST, LIGHTEST = 6e-3, 1 / 3  # m between the two; share of the stronger signal that the weaker has at least

@@ -20,7 +20,7 @@ import h5py  # noqa: E402
 import numpy as np  # noqa: E402
 
 from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
-from benchmarks.translation.noise import GAIN, NOISE  # noqa: E402
+from benchmarks.translation.test_set import GAIN, NOISE  # noqa: E402
 from tactile_core.accuracy import Row, row  # noqa: E402
 from tactile_core.recordings.unit import contact_law  # noqa: E402
 from tactile_core.sensors import PRESSURE_PER_COUNT  # noqa: E402

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...files import array_cache
-from ...files.cache import cache_folder
+from ...files.array_cache import cache_folder
 from ...files.installed import needing
 from ...files.short_text import Summary
 from . import mesh_file, mesh_grid

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 import msgspec
 
@@ -46,11 +46,8 @@ class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, d
     def id(self) -> str:
         """Hash of all that decides the shards; the same inputs elsewhere have the same."""
         named = [[one.name, one.sha256] for one in self.inputs]
-        return _hash([named, msgspec.to_builtins(self.recipe)])
-
-
-def _hash(content: Any) -> str:
-    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        content = json.dumps([named, msgspec.to_builtins(self.recipe)], sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()
 
 
 def make(inputs: list[Input], recipe: R, weights: str | None, calibration: str | None = None) -> Job[R]:

@@ -78,7 +78,8 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
     Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
     """
-    listed = _read_checksums(folder)
+    shards = [shard for recording in _read(folder) for shard in recording.shards]
+    listed = {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
     files = sorted({*there, *listed})
     bad = []
@@ -88,12 +89,6 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
             bad.append(file)
         progress(index + 1, len(files))
     return bad
-
-
-def _read_checksums(folder: Path) -> dict[Path, str]:
-    """Shards of a manifest and their hashes."""
-    shards = [shard for recording in _read(folder) for shard in recording.shards]
-    return {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
 
 
 def warnings(folder: Path) -> dict[str, list[str]]:

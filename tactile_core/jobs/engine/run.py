@@ -143,12 +143,15 @@ class _Work:
     def take(self, task: Task, reply: Reply) -> list[Task]:
         """Record a worker's reply; returns the tasks that can be started now."""
         self.finished += 1
+        name = tasks.name(self._job, task)
+        file = self._folder / jobs.ASIDE / f"{name}.json"
         if reply.failure is not None:
             if reply.stop:
-                raise reply.failure.error(tasks.name(self._job, task))
-            self._set_aside(task, reply.failure)
+                raise reply.failure.error(name)
+            self.done.aside[name] = reply.failure
+            atomic.write_json(file, {"task": name, "why": str(reply.failure)}, shared=True)
             return []
-        self._clear(task)
+        file.unlink(missing_ok=True)
         if task.shard is None:
             follow = self._shards(task.recording, reply.shards)
         else:
@@ -169,17 +172,6 @@ class _Work:
         mine = [number for number in numbers if (number + recording) % self._parts == self._part]
         self._open[recording] += len(mine)
         return [Task(recording, number) for number in mine]
-
-    def _file(self, task: Task) -> Path:
-        return self._folder / jobs.ASIDE / f"{tasks.name(self._job, task)}.json"
-
-    def _set_aside(self, task: Task, why: Failure) -> None:
-        name = tasks.name(self._job, task)
-        self.done.aside[name] = why
-        atomic.write_json(self._file(task), {"task": name, "why": str(why)}, shared=True)
-
-    def _clear(self, task: Task) -> None:
-        self._file(task).unlink(missing_ok=True)
 
 
 def folder_of(out: Path) -> Path:

@@ -101,7 +101,8 @@ class LiveSignals:
             unit = full_scale(seen.electrodes)
             self._factor = unit[0] if unit else 1.0
         signals = prepare(seen, dataclasses.replace(self._options, counts_per_unit=self._factor))
-        if self._known is None and (len(seen) == self._most or self._shows_rest(signals)):
+        of_unit = Reason.REST_OF_UNIT in map(reason_of, signals.warnings) or self._options.tare is not None
+        if self._known is None and (len(seen) == self._most or signals.quiet.any() or of_unit):
             self._known, self.found = signals, _source(signals)
             if seen.pdc is not None:
                 self._pdc_factor = pdc_unit(seen.pdc, self._factor)
@@ -109,10 +110,6 @@ class LiveSignals:
                 self._rest_pdc = np.median(rest) if len(rest) else np.nan
         self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
         self.sure = self._options.polarity in POLARITIES or not signals.flags[0] & DOUBTS
-
-    def _shows_rest(self, signals: Signals) -> bool:
-        of_unit = Reason.REST_OF_UNIT in map(reason_of, signals.warnings)
-        return bool(signals.quiet.any()) or of_unit or self._options.tare is not None
 
     @property
     def known(self) -> Signals:

@@ -170,7 +170,8 @@ def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, 
             if ahead > LONGEST_WAIT:
                 say(f"nothing for {ahead:.0f} s before frame {done}: skipped")
                 began -= ahead
-            due = done + 1 if speed == 0 else _due(recording, speed * (time.perf_counter() - began))
+            passed = speed * (time.perf_counter() - began)
+            due = done + 1 if speed == 0 else int(recording.time.searchsorted(passed, side="right"))
             if due <= done:
                 time.sleep(POLL)
                 continue
@@ -178,8 +179,3 @@ def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, 
             rows = dataclasses.replace(recording, electrodes=recording.electrodes[done:due], pdc=pdc)
             yield rows, time.perf_counter()
             done = due
-
-
-def _due(recording: Recording, passed: float) -> int:
-    """Return the number of frames whose time is within `passed` s of the first."""
-    return int(recording.time.searchsorted(passed, side="right"))

@@ -19,7 +19,7 @@ import numpy as np
 from ... import sensors
 from ...errors import TactileError
 from ...files import array_cache, lock
-from ...files.cache import cache_folder
+from ...files.array_cache import cache_folder
 from ...files.threads import one_thread
 from ...geometry.lattice import Lattice
 from ...sensors import TARGET, Material

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.measured_rows import read_table
 from benchmarks.translation import evaluation, test_set
-from benchmarks.translation.noise import GAIN, NOISE, as_read
+from benchmarks.translation.test_set import GAIN, NOISE, as_read
 from small_pairs import bodies, write_pairs
 
 from tactile_core import sensors

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from benchmarks.translation.gel_force import carried_force
+from benchmarks.translation.contact_rows import carried_force
 
 from tactile_core import accuracy, sensors
 from tactile_core.simulation.pairs_file import read_pairs

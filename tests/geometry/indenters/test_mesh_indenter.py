@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tactile_core.files.cache import cache_folder
+from tactile_core.files.array_cache import cache_folder
 from tactile_core.geometry.indenters import Box, MeshIndenter, Sphere, mesh_grid, mesh_indenter, pose_on
 
 BALL = Sphere(2.5e-3)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from tactile_core.errors import TactileError
-from tactile_core.files.cache import cache_folder
+from tactile_core.files.array_cache import cache_folder
 from tactile_core.geometry.indenters import MeshIndenter, mesh_file
 from tactile_core.geometry.indenters.mesh_grid import OverlapError, inside
 
