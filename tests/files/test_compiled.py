@@ -1,4 +1,4 @@
-"""Compiled loops are kept on disk for the next process, whatever name the package has there."""
+"""Compiled loops are kept on disk for the next process, whatever its name of the package, and give numpy's numbers."""
 
 from __future__ import annotations
 
@@ -6,7 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from tactile_core import sensors
+from tactile_core.files import compiled
+from tactile_core.geometry.indenters import Box, LyingCylinder, Ring, Sphere
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solve import Step, solve_path
+from tactile_core.pictures.height_map import folds_counted, gel_mapper
+from tactile_core.pictures.renderer import Renderer
 
 ROOT = Path(__file__).resolve().parents[2]
 INTERPOLATE = """
@@ -38,3 +47,69 @@ def test_what_blender_compiles_under_its_own_name_does_not_break_other_processes
     for package in ("bl_ext.tactile_core", "tactile_core", "bl_ext.tactile_core"):
         assert interpolated(package) == "[[1.5, 2.25, 0.0]]\n"
     assert list(tmp_path.rglob("*.nbi"))
+
+
+SHAPES = {
+    "ball": Sphere(1.5e-3),
+    "box": Box((2e-3, 2e-3, 2e-3), 0.3e-3),
+    "side": LyingCylinder(1e-3, 0.5e-3, 3e-3),
+    "ring": Ring(1.5e-3, 0.5e-3),
+}
+# arcsinh, cosine and sine of numpy and of the C library differ in their last bits. Before version 2 numpy multiplies a
+# single float32 by a Python float in float64, numba in float32, as a matrix is stored: 6e-8 an operation.
+ROUNDING = 1e-10 if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 1e-6
+PATH = [Step(depth=0.1e-3), Step(depth=0.1e-3, slide=(0.1e-3, 0.0)), Step(force=0.05)]
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.78])
+@pytest.mark.parametrize("sensor", ["digit", "biotac"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_contacts_do_not_depend_on_what_is_installed(name, sensor, friction, compiled_loops):
+    place, found = Placement(-6e-3, 1e-3, 0.1, 1.0), []
+    for on in (True, False):
+        compiled_loops(on)
+        assert compiled.available() == on
+        found.append(list(solve_path(sensor, SHAPES[name], place, PATH, friction=friction)))
+    for fast, plain in zip(*found, strict=True):
+        assert fast.converged and fast.iterations == plain.iterations
+        np.testing.assert_array_equal(fast.contact_patch, plain.contact_patch)
+        for one, other in ((fast.displacement, plain.displacement), (fast.force, plain.force)):
+            np.testing.assert_allclose(one, other, rtol=0, atol=ROUNDING * np.abs(other).max())
+
+
+def dents(count: int) -> np.ndarray:
+    """Smooth displacements (count, n, 3) m at random places: dents that also move sideways."""
+    random, rest = np.random.default_rng(5), sensors.digit_surface().rest
+    moved = np.zeros((count, *rest.shape))
+    for each in moved:
+        x, z = random.uniform(-13e-3, -2e-3), random.uniform(-4e-3, 4e-3)
+        shape = np.exp(-((rest[:, 0] - x) ** 2 + (rest[:, 2] - z) ** 2) / random.uniform(1e-3, 3e-3) ** 2)
+        each[:] = shape[:, None] * random.uniform([-0.2e-3, 0.1e-3, -0.2e-3], [0.2e-3, 0.9e-3, 0.2e-3])
+    return moved
+
+
+def test_heights_and_pictures_are_numpys(compiled_loops):
+    renderer, mapper, found = Renderer(preset="fast"), gel_mapper(), {}
+    for on in (False, True):
+        compiled_loops(on)
+        heights = mapper(dents(12))
+        found[on] = heights, [renderer(height) for height in heights]
+    assert np.abs(found[True][0] - found[False][0]).max() < 1e-9  # m, float32's rounding of a height
+    compiled_loops(True)
+    for height, picture in zip(*found[False], strict=True):
+        np.testing.assert_array_equal(renderer(height), picture)  # light, shadows and levels, to the bit
+    assert np.ptp(found[True][1][0].astype(int) - found[True][1][1]) > 20  # grey levels: something is seen
+
+
+def test_a_gel_that_folds_over_itself_is_counted_as_numpy_counts_it(compiled_loops):
+    rest, folding = sensors.digit_surface().rest, np.zeros((1, *sensors.digit_surface().rest.shape))
+    folding[0, :, 0] = 1e-3 * np.sin(
+        rest[:, 0] / 0.4e-3
+    )  # m, pushed along the finger farther than its places lie apart
+    found = {}
+    for on in (False, True):
+        compiled_loops(on)
+        with folds_counted() as folds:
+            found[on] = gel_mapper()(folding), folds
+    assert found[True][1] == found[False][1] and found[True][1][0] > 100
+    assert np.isfinite(found[True][0]).all()

@@ -1,12 +1,13 @@
 """The picture at rest: a photograph of the untouched gel follows the lights that are changed after it was taken."""
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from tactile_core.pictures.background import resting_picture
+from tactile_core.pictures.background import read_photograph, resting_picture
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
@@ -55,3 +56,19 @@ def test_a_calibration_in_memory_keeps_its_photograph(unit):
     radiance = np.zeros((*unit.camera.shape, 3), np.float32)
     unknown = dataclasses.replace(unit, photographed=None)
     np.testing.assert_array_equal(resting_picture(unknown, radiance), at_rest(unit))
+
+
+PICTURES = sorted((Path(__file__).parents[2] / "scenes").glob("*/picture.png"))
+
+
+@pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.parent.name)
+def test_a_scenes_picture_has_the_shipped_background(path):
+    background = Renderer(preset="fast").background
+    off = np.abs(read_photograph(path).astype(float) - background).mean(axis=2)
+    # Nothing touches the corners: light that the walls return makes them up to 0.4 levels off, another unit 30 to 60.
+    ends = (slice(20), slice(-20, None))
+    assert max(off[rows, columns].mean() for rows in ends for columns in ends) < 2
+
+
+def test_all_six_are_here():
+    assert len(PICTURES) == 6

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 from plain_unit import plain_unit
-from pressed_unit import PLACES, photograph, write_photographs
+from pressed_unit import BALL, PLACES, photograph, write_photographs
 
 from tactile_core.errors import TactileError
-from tactile_core.pictures.calibrate.photographs import chosen, estimated_background, read_photographs
+from tactile_core.pictures.calibrate.evaluate import evaluate_unit
+from tactile_core.pictures.calibrate.photographs import chosen, estimated_background, lighting_drift, read_photographs
 
 UNIT = plain_unit()
 
@@ -124,3 +125,28 @@ def test_two_photographs_need_a_background(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((160, 120, 3), np.uint8)).save(tmp_path / "small.png")
     with pytest.raises(TactileError, match=r"small\.png: 120 x 160"):
         read_photographs(folder, tmp_path / "small.png")
+
+
+DOWN, RIGHT = np.meshgrid(np.linspace(-1, 1, 320), np.linspace(-1, 1, 240), indexing="ij")
+# Grey levels, a channel each: more than the 18 that count as a press, over a third of the picture.
+DRIFT = np.stack([30 * RIGHT - 5, 12 * DOWN**2 + 8 * RIGHT, -20 * DOWN * RIGHT + 6], axis=-1)
+
+
+def test_a_quadratic_is_found_beside_a_press():
+    press = np.where(((RIGHT - 0.3) ** 2 + DOWN**2 < 0.2)[..., None], (60.0, -50.0, 40.0), 0)  # a sixth of the picture
+    noise = np.random.default_rng(0).normal(scale=2, size=DRIFT.shape)
+    assert np.abs(lighting_drift(DRIFT + press + noise) - DRIFT).max() < 1.5
+    assert np.abs(lighting_drift(noise)).max() < 0.5  # nothing is made of nothing
+
+
+def test_presses_are_found_under_a_drifted_light(tmp_path):
+    folder = write_photographs(tmp_path / "presses", plain_unit(), PLACES[:3])
+    for file in sorted(folder.iterdir()):
+        picture = np.asarray(Image.open(file)).astype(float) + DRIFT
+        Image.fromarray(np.rint(picture).clip(0, 255).astype(np.uint8)).save(file)
+    tried = evaluate_unit(plain_unit(), read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False)
+    for each, (right, down, depth) in zip(tried, PLACES, strict=False):
+        assert each.ball.right == pytest.approx(1e-3 * right, abs=0.15e-3)
+        assert each.ball.down == pytest.approx(1e-3 * down, abs=0.15e-3)
+        assert each.ball.depth == pytest.approx(1e-3 * depth, abs=0.1e-3)
+        assert each.metrics["frame_l1"] < 2.5
