@@ -364,6 +364,7 @@ def sources_hash() -> str:
 
 
 def python_version() -> str:
+    """Return the running Python's version, such as 3.11.4."""
     return ".".join(str(number) for number in sys.version_info[:3])
 
 
@@ -376,6 +377,7 @@ def relative(path: Path) -> str:
 
 
 def say(text: str) -> None:
+    """Print a line of this script's own, at once."""
     print("[dev] " + text, flush=True)
 
 

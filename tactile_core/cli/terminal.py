@@ -111,6 +111,7 @@ def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], Non
     with tqdm(desc=name, unit=unit, delay=0 if forced else 2, file=sys.stderr) as shown:
 
         def show(done: int, total: int) -> None:
+            """Move the bar."""
             shown.total = total
             shown.update(done - shown.n)
 

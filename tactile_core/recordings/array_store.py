@@ -123,10 +123,12 @@ def open_hdf5(path: str) -> Iterator[Store]:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
         def attributes_of(name: str) -> dict[str, Any]:
+            """Read the attributes of an array."""
             with damage_reported(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
         def load(name: str, rows: slice | None = None) -> np.ndarray:
+            """Read an array, or some rows of it, that takes no more than its stored bytes can unpack to."""
             declared(file[name], f"{path}, {name}")
             return read_rows(file[name], rows)
 
@@ -169,6 +171,7 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
             header = _npy_header(file)
 
         def load_whole(name: str) -> np.ndarray:
+            """Read the one array there is."""
             file.seek(0)
             return np.lib.format.read_array(file, allow_pickle=False)
 
@@ -191,6 +194,7 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
                         shapes[member.filename[:-4]] = _npy_header(stream)
 
         def load(name: str) -> np.ndarray:
+            """Unpack an array."""
             with archive.open(name + ".npy") as stream:
                 return np.lib.format.read_array(stream, allow_pickle=False)
 

@@ -17,7 +17,7 @@ from ..sensors.fluid_sensor import Fluid
 from .electrode_faults import without_absent
 from .flags import Flag
 from .recording import Recording, Truth
-from .time_stamps import seconds_of, tell_rate, time_jumps
+from .time_stamps import clock_of
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
@@ -105,15 +105,11 @@ def assemble(
     if bad.any():
         electrodes = np.where(bad, np.nan, electrodes)
     notes = [*warnings, *notes]
-    if stamps is None and not snapshots:
-        notes.append(f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed")
     if stamps is None:
         stamps = np.arange(frames) / SAMPLE_RATE
+        notes += [] if snapshots else [f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed"]
     _check_share(path, np.any(bad, axis=1), problems, row_word)
-    notes += tell_problems(problems, row_word)
-    seconds, start, more = seconds_of(stamps)
-    more += tell_rate(seconds)
-    jumps, jump_notes = time_jumps(seconds, rows, row_word)
+    seconds, start, jumps, of_clock = clock_of(stamps, rows, row_word)
     clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
@@ -124,7 +120,7 @@ def assemble(
         electrodes=electrodes,
         rows=rows,
         flags=_flags(bad, problems, jumps) | np.uint16(Flag.DEAD_CHANNEL if absent.any() else 0),
-        warnings=tuple(notes + more + jump_notes),
+        warnings=(*notes, *tell_problems(problems, row_word), *of_clock),
         simulated=simulated,
         truth=truth,
         about=about or {},

@@ -25,6 +25,16 @@ OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is 
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
+def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
+    """Return what stamps (T,) say: time and start as `seconds_of`, the frames at which it jumps, and sentences.
+
+    rows : (T,) of the file, which are called row_word
+    """
+    seconds, start, notes = seconds_of(stamps)
+    jumps, found = time_jumps(seconds, rows, row_word)
+    return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
+
+
 def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
     """Return time from the first frame (s), unix start time (s, 0.0 if unknown) and warnings."""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)

@@ -11,7 +11,7 @@ import numpy as np
 from tactile_core.accuracy import Row, failed
 from tactile_core.files import atomic
 
-from ..measured_rows import short, write_table
+from ..measured_rows import png_of, short, write_table
 from .bonded_layer import GOLDEN_FORCE
 
 _CHECKS = """\
@@ -72,14 +72,11 @@ def _tier_table(rows: list[Row]) -> str:
 
 
 def _save(path: Path, draw: Any) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6, 3.6), dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
     draw(figure.add_subplot())
-    with atomic.new_file(path) as partial:
-        figure.savefig(partial, format="png", metadata={"Software": None})
+    atomic.write_bytes(path, png_of(figure))
 
 
 def _series(rows: list[Row], pattern: str) -> tuple[np.ndarray, np.ndarray]:

@@ -181,6 +181,7 @@ def cross_validated(
         others = chosen(photographs, [name for name in names if name not in apart])
 
         def step(done: int, total: int, before: int = fold) -> None:
+            """Report the progress of one fold as that of all."""
             progress(before * total + done, folds * total)
 
         done = calibrate(others, ball_diameter, start, unit="others", quick=quick, progress=step).calibration
