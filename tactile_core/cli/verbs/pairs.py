@@ -33,20 +33,11 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json beside it describes it"
     )
-    verb.add_argument(
-        "--from",
-        dest="source",
-        default=SOURCE,
-        metavar="SENSOR",
-        help="sensor translated from (default: %(default)s)",
-    )
-    verb.add_argument(
-        "--to",
-        dest="target",
-        default=TARGET,
-        metavar="SENSOR",
-        help="gel to translate to (default: %(default)s); your own is a folder in $TACTILE_SENSORS",
-    )
+    for word, role, sensor, about in (
+        ("--from", "source", SOURCE, "sensor translated from (default: %(default)s)"),
+        ("--to", "target", TARGET, "gel to translate to (default: %(default)s); yours is a folder in $TACTILE_SENSORS"),
+    ):
+        verb.add_argument(word, dest=role, default=sensor, metavar="SENSOR", help=about)
     verb.add_argument(
         "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"
     )
