@@ -158,17 +158,8 @@ def run_in_bpy(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
     needed = (3, 11) if old else (3, 13)
     if sys.version_info[:2] != needed:
         raise SetupError("bpy {} has wheels for Python {}.{} alone".format(options.bpy, *needed))
-    python = make_venv(folder)
-    packages = ["bpy==" + options.bpy, *BLENDER_PACKAGES]
-    wanted = {"root": str(ROOT), "python": python_version(), "packages": packages, "sources": sources_hash()}
-    have = read_stamp(folder)
-    if any(have.get(key) != value for key, value in wanted.items()):
-        say(f"installing {packages[0]} into {relative(folder)}; downloads up to about 450 MB")
-        write_stamp(folder, dict(wanted, state="installing"))
-        failure = run_pip(python, folder, packages, "1.26.4" if old else None)
-        if failure:
-            raise SetupError(failure)
-        write_stamp(folder, dict(wanted, state="ready"))
+    packages = ("bpy==" + options.bpy, *BLENDER_PACKAGES)
+    python = install(folder, packages, "1.26.4" if old else None, packages)
     say(f"pytest tests/blender, {packages[0]}")
     return call_with_limit([str(python), "-m", "pytest", "tests/blender", *pytest_arguments], environment())
 
@@ -209,8 +200,10 @@ def call_with_limit(command: list[str], variables: dict[str, str]) -> int:
         return 124
 
 
-def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> Path:
-    """Make the virtual environment hold the project with these extras; returns its Python.
+def install(
+    folder: Path, extras: tuple[str, ...], numpy: str | None = None, packages: tuple[str, ...] | None = None
+) -> Path:
+    """Make the virtual environment hold the project with these extras, or packages alone; returns its Python.
 
     A stamp remembers what is installed, so that this costs nothing when nothing has changed. What an earlier call
     installed beyond the extras asked for stays.
@@ -224,12 +217,14 @@ def install(folder: Path, extras: tuple[str, ...], numpy: str | None = None) -> 
     missing = [extra for extra in ("", *extras) if extra not in there]
     if not missing:
         return python
-    what = "tactile-core" + ("[{}]".format(",".join(extras)) if extras else "")
-    say(f"installing {what} into {relative(folder)}; downloads some 50 to 650 MB")
+    # pip reads `.[extra]` relative to its working folder, whatever characters the path of that folder holds.
+    what = packages or ("--editable", ".[{}]".format(",".join(extras)) if extras else ".")
+    name = packages[0] if packages else "tactile-core" + what[1][1:]
+    say(f"installing {name} into {relative(folder)}; downloads some 50 to 650 MB")
     if "train" in missing:
         say("torch takes up to 3,000 MB; its CPU build 190: PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu")
     write_stamp(folder, dict(wanted, extras=[], state="installing"))
-    failure = pip_install(python, folder, extras, numpy)
+    failure = run_pip(python, folder, what, numpy)
     write_stamp(folder, dict(wanted, extras=[] if failure else sorted(there | {"", *extras}), state="ready"))
     if failure:
         raise SetupError(failure)
@@ -280,14 +275,7 @@ def why_unusable(python: Path, have: dict) -> str | None:
     return None if found == python_version() else f"it holds Python {found}, this is {python_version()}"
 
 
-def pip_install(python: Path, folder: Path, extras: tuple[str, ...], numpy: str | None) -> str | None:
-    """Install the project with these extras. Returns why it failed, or None."""
-    # pip reads `.[extra]` relative to its working folder, whatever characters the path of that folder holds.
-    project = ".[{}]".format(",".join(extras)) if extras else "."
-    return run_pip(python, folder, ["--editable", project], numpy)
-
-
-def run_pip(python: Path, folder: Path, what: list[str], numpy: str | None) -> str | None:
+def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> str | None:
     """Run pip, showing its downloads and keeping all it says in a log. Returns why it failed, or None."""
     constraints = ROOT / "constraints.txt"
     if numpy:

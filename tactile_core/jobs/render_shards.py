@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -66,16 +67,17 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
 
 
 def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -> None:
-    words, heights, frames = input_kind(folder, job, 0)
+    words, heights = input_kind(folder, job)
+    frames = _frames(folder, job)
     name, recipe = job.inputs[0].name, job.recipe
     shape = None
     if heights:
-        shape = array_pack.read(jobs.prepared_file(folder, name), slice(0, 1), (VALUES,))[VALUES].shape[1:]
+        shape = _prepared(folder, job, VALUES, rows=slice(0, 1))[VALUES].shape[1:]
     made = _pictures(job.calibration, recipe, shape)
     with atomic.new_folder(out, overwrite=options.overwrite) as partial:
         made.begin(partial)
         made.write_rest(partial)
-        for number in range(count(folder, job, 0)):
+        for number in range(count(folder, job)):
             array_pack.unpack(jobs.shard_file(folder, name, number), partial)
         note = note_of(job.inputs[0].path, words, frames, made.renderer, recipe.preset, options)
         atomic.write_json(partial / results.NOTE, note)
@@ -93,7 +95,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
         arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
         kind = np.frombuffer(frames.kind.encode(), np.uint8)
         array_pack.write(file, arrays | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
-    return count(folder, job, index), made
+    return count(folder, job), made
 
 
 def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
@@ -103,10 +105,8 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
     if checksummed.verified_checksum(file) is not None:
         return False
     start = number * recipe.shard_frames
-    found = array_pack.read(
-        jobs.prepared_file(folder, one.name), slice(start, start + recipe.shard_frames), (NUMBERS, VALUES)
-    )
-    shape = found[VALUES].shape[1:] if input_kind(folder, job, index)[1] else None
+    found = _prepared(folder, job, NUMBERS, VALUES, rows=slice(start, start + recipe.shard_frames))
+    shape = found[VALUES].shape[1:] if input_kind(folder, job)[1] else None
     pictures = _pictures(job.calibration, recipe, shape)
     with tempfile.TemporaryDirectory() as name:
         pictures.begin(Path(name))
@@ -120,23 +120,27 @@ def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | No
     """Return how many frames an inspected input has."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
-    frames = _frames(folder, job, index)
-    return InputFacts(count(folder, job, index), frames)
+    return InputFacts(count(folder, job), _frames(folder, job))
 
 
-def count(folder: Path, job: Job[Render], index: int) -> int:
-    """Return how many shards an inspected input has."""
-    return -(-_frames(folder, job, index) // job.recipe.shard_frames)
+def count(folder: Path, job: Job[Render]) -> int:
+    """Return how many shards the prepared input has."""
+    return -(-_frames(folder, job) // job.recipe.shard_frames)
 
 
-def input_kind(folder: Path, job: Job[Render], index: int) -> tuple[str, bool, int]:
-    """Describe an inspected input: its kind in words, true if it holds height maps, its frames."""
-    found = array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(KIND, HEIGHTS))
-    return found[KIND].tobytes().decode(), bool(found[HEIGHTS]), _frames(folder, job, index)
+def input_kind(folder: Path, job: Job[Render]) -> tuple[str, bool]:
+    """Describe the prepared input: its kind in words, and true if it holds height maps."""
+    found = _prepared(folder, job, KIND, HEIGHTS)
+    return found[KIND].tobytes().decode(), bool(found[HEIGHTS])
 
 
-def _frames(folder: Path, job: Job[Render], index: int) -> int:
-    return len(array_pack.read(jobs.prepared_file(folder, job.inputs[index].name), names=(NUMBERS,))[NUMBERS])
+def _frames(folder: Path, job: Job[Render]) -> int:
+    return len(_prepared(folder, job, NUMBERS)[NUMBERS])
+
+
+def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> dict[str, np.ndarray]:
+    """Read arrays of what is to be rendered, the only input of such a job."""
+    return array_pack.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
 
 
 @functools.lru_cache(maxsize=2)

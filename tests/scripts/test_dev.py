@@ -29,12 +29,12 @@ def pip(dev, monkeypatch):
     class Pip(list):
         failure = None
 
-        def __call__(self, python, folder, extras, numpy):
-            self.append((extras, numpy))
+        def __call__(self, python, folder, what, numpy):
+            self.append((what[-1], numpy))
             return self.failure
 
     pip = Pip()
-    monkeypatch.setattr(dev, "pip_install", pip)
+    monkeypatch.setattr(dev, "run_pip", pip)
     return pip
 
 
@@ -57,10 +57,10 @@ def test_a_second_call_installs_nothing(dev, pip, venv):
     dev.install(venv, ("dev",))
     dev.install(venv, ("dev",))
     dev.install(venv, ())
-    assert pip == [(("dev",), None)]
+    assert pip == [(".[dev]", None)]
     dev.install(venv, ("dev", "train"))
     dev.install(venv, ("dev",))
-    assert pip[1:] == [(("dev", "train"), None)]
+    assert pip[1:] == [(".[dev,train]", None)]
 
 
 @pytest.mark.parametrize("change", ["numpy", "sources"])
@@ -86,11 +86,11 @@ def test_an_interrupted_installation_is_made_anew(dev, venv, monkeypatch, capsys
     def interrupted(*arguments):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(dev, "pip_install", interrupted)
+    monkeypatch.setattr(dev, "run_pip", interrupted)
     with pytest.raises(KeyboardInterrupt):
         dev.install(venv, ())
     (venv / "debris").write_text("x")
-    monkeypatch.setattr(dev, "pip_install", lambda *arguments: None)
+    monkeypatch.setattr(dev, "run_pip", lambda *arguments: None)
     dev.install(venv, ())
     assert "again: its installation was interrupted" in capsys.readouterr().out
     assert not (venv / "debris").exists()
@@ -173,7 +173,7 @@ def test_tools_run_after_one_another_and_the_first_failure_counts(command, dev, 
     monkeypatch.setattr(dev.subprocess, "call", lambda command, **more: ran.append(command[2]) or len(ran) + 4)
     assert dev.main([command, "--venv", str(venv)]) == 5
     assert ran == [tool[0] for tool in dev.TOOLS[command]]
-    assert pip == [((command,), None)]
+    assert pip == [(f".[{command}]", None)]
 
 
 @pytest.mark.parametrize(

@@ -29,12 +29,7 @@ def progress_argument(verb: argparse.ArgumentParser) -> None:
 
 def prepare_arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments that control how readings become signals."""
-    verb.add_argument(
-        "--tare",
-        default="auto",
-        metavar="auto|none|A:B",
-        help="frames without contact that give the resting reading (default: found automatically)",
-    )
+    tare_argument(verb)
     verb.add_argument(
         "--kind",
         choices=("raw", "tared", "scaled", "rectified"),
@@ -48,6 +43,12 @@ def prepare_arguments(verb: argparse.ArgumentParser) -> None:
         "--smooth", type=int, metavar="N", help="average over N frames, odd (default: 3 if rectified, else 1)"
     )
     verb.add_argument("--no-drift", action="store_true", help="do not remove drift")
+
+
+def tare_argument(verb: argparse.ArgumentParser, among: str = "") -> None:
+    """Add ``--tare``; among : which frames it names, in words."""
+    about = f"frames without contact{among} that give the resting reading (default: found automatically)"
+    verb.add_argument("--tare", default="auto", metavar="auto|none|A:B", help=about)
 
 
 def polarity_argument(verb: argparse.ArgumentParser) -> None:
@@ -156,13 +157,6 @@ def weights_argument(verb: argparse.ArgumentParser) -> None:
 def error_argument(verb: argparse.ArgumentParser, what: str) -> None:
     """Add ``--error``; what : the units that mean something here, in words."""
     verb.add_argument("--error", metavar="BOUND", help=f"the largest error that the toolkit itself may add: {what}")
-
-
-def plan_argument(verb: argparse.ArgumentParser) -> None:
-    """Add ``--plan`` to a verb that has no job to write."""
-    verb.add_argument(
-        "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
-    )
 
 
 def seed_argument(verb: argparse.ArgumentParser, same: str) -> None:

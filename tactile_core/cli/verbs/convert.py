@@ -13,7 +13,6 @@ from .common import (
     NOTHING,
     answer_arguments,
     error_argument,
-    plan_argument,
     prepare_arguments,
     prepare_words,
     progress_argument,
@@ -97,7 +96,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     unit_arguments(verb)
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
-    plan_argument(verb)
+    verb.add_argument(
+        "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
+    )
     progress_argument(verb)
 
 

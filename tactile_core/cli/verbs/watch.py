@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument, unit_arguments
+from .common import NOTHING, columns_argument, columns_of, polarity_argument, tare_argument, unit_arguments
 
 if TYPE_CHECKING:
     import numpy as np
@@ -66,12 +66,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="rate of the recording (default: 100)")
     polarity_argument(verb)
     columns_argument(verb)
-    verb.add_argument(
-        "--tare",
-        default="auto",
-        metavar="auto|none|A:B",
-        help="frames without contact, of the first 10 s, that give the resting reading (default: found automatically)",
-    )
+    tare_argument(verb, ", of the first 10 s,")
     unit_arguments(verb)
 
 
