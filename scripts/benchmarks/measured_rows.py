@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import csv
 import io
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -47,6 +48,21 @@ def read_table(path: Path) -> list[dict[str, str]]:
     """Read the rows that ``write_table`` wrote, their cells as text."""
     with path.open(encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
+
+
+def renew_tables(page: Path, tables: dict[str, list[str]]) -> None:
+    """Put tables in the place of old ones in a page of Markdown, whose words stay.
+
+    tables : text that the page has once -> the lines of the first table at or after it
+    Raises ValueError for a page without one of them.
+    """
+    text = page.read_text(encoding="utf-8")
+    for before, lines in tables.items():
+        old = re.compile(r"(^\|.*\n)+", re.MULTILINE).search(text, text.index(before))
+        if text.count(before) != 1 or old is None:
+            raise ValueError(f"{page} has {before!r} {text.count(before)} times, where it wants one table after it")
+        text = text[: old.start()] + "\n".join([*lines, ""]) + text[old.end() :]
+    atomic.write_bytes(page, text.encode())
 
 
 def short(value: float | None) -> str:

@@ -11,13 +11,11 @@ import numpy as np
 from tactile_core.accuracy import Row, failed
 from tactile_core.files import atomic
 
-from ..measured_rows import png_of, short, write_table
+from ..measured_rows import png_of, renew_tables, short, write_table
 from .bonded_layer import GOLDEN_FORCE
 
-_CHECKS = """\
-| check | rows | with a target | errors that miss it |
-|---|---|---|---|
-"""
+_TIERS = "| tier | DIGIT: time | shape | force | BioTac: time | shape | force |", "|---|---|---|---|---|---|---|"
+_CHECKS = "| check | rows | with a target | errors that miss it |", "|---|---|---|---|"
 
 
 def write(report: Path, parts: dict[str, list[Row]]) -> None:
@@ -26,25 +24,20 @@ def write(report: Path, parts: dict[str, list[Row]]) -> None:
     parts : rows by heading. Raises ValueError for a page that has not each of the tables once.
     """
     rows = [row for part in parts.values() for row in part]
-    text = report.read_text(encoding="utf-8")
-    for table in (_tier_table(rows), _CHECKS + "".join(_check(heading, part) for heading, part in parts.items())):
-        head = table.partition("\n")[0]
-        text, count = re.subn(rf"{re.escape(head)}\n(\|.*\n)*", lambda _, table=table: table, text)
-        if count != 1:
-            raise ValueError(f"{report} has {count} tables with the head {head}")
+    checks = [*_CHECKS, *(_check(heading, part) for heading, part in parts.items())]
+    renew_tables(report, {_TIERS[0]: _tier_table(rows), _CHECKS[0]: checks})
     for name, draw in (("spacing", _spacing), ("force", _force), ("speed", _speed)):
         _save(report.with_name(f"mechanics_{name}.png"), lambda axes, draw=draw: draw(axes, rows))
-    atomic.write_bytes(report, text.encode())
     write_table(report.with_suffix(".csv"), parts)
 
 
 def _check(heading: str, rows: list[Row]) -> str:
     """Return a check's line: its rows, how many have a target, and which errors miss it."""
     missed = ", ".join(f"`{row['name']}` {row['value']:g} {row['unit']}" for row in failed(rows))
-    return f"| {heading} | {len(rows)} | {sum(row['ok'] is not None for row in rows)} | {missed} |\n"
+    return f"| {heading} | {len(rows)} | {sum(row['ok'] is not None for row in rows)} | {missed} |"
 
 
-def _tier_table(rows: list[Row]) -> str:
+def _tier_table(rows: list[Row]) -> list[str]:
     """Return the table of the tiers' time and errors at 0.6 mm; a cell is empty where nothing was measured."""
     found = {row["name"]: row for row in rows}
 
@@ -52,7 +45,7 @@ def _tier_table(rows: list[Row]) -> str:
         value = found[name][field] if name in found else None
         return "" if value is None else f"{short(abs(scale * value))} {unit}"
 
-    lines = ["| tier | DIGIT: time | shape | force | BioTac: time | shape | force |", "|---|---|---|---|---|---|---|"]
+    lines = [*_TIERS]
     for tier in ("fast", "full", "reference"):
         cells = [tier]
         for sensor in ("digit", "biotac"):
@@ -68,7 +61,7 @@ def _tier_table(rows: list[Row]) -> str:
         base = f"{sensor}_fast_0.6mm"
         cells += ["", number(f"{base}_shape_rms", "um", field="baseline")]
         cells += [number(f"{base}_force_error", "%", field="baseline")]
-    return "\n".join([*lines, f"| {' | '.join(cells)} |"]) + "\n"
+    return [*lines, f"| {' | '.join(cells)} |"]
 
 
 def _save(path: Path, draw: Any) -> None:

@@ -1,12 +1,11 @@
-"""Write the results of a whole run to docs: the rows as JSON, a table for readers, the plot of error over time."""
+"""Write the results of a whole run to docs: the rows as JSON, the page's tables, the plot of error over time."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.measured_rows import png_of
+from benchmarks.measured_rows import png_of, renew_tables
 from tactile_core.accuracy import Row
 from tactile_core.files import atomic, provenance
 
@@ -17,54 +16,18 @@ TITLES = {
     "pictures": "Pictures of known deformations", "photographs": "Pictures beside photographs",
     "chain": "Whole chain, signals to pictures",
 }  # fmt: skip
-TABLE = "| method | ms a frame | MB | error | baseline | measured on |\n|---|---|---|---|---|---|"
-INTRODUCTION = """\
-# Speed against error
-
-Made by `python scripts/benchmark.py` on one machine: {machine}.
-Times are CPU ms a frame (a contact) on one core, the best of several, so that other programs count little; memory is
-the peak of a process that does this alone, Python and libraries included; errors are on held-out sets, beside the
-baseline's: no deformation, or the background. `docs/benchmark.json` holds every row. Not measured: {missing}.
-
-![error over time](benchmark.png)
-"""
-SAME = """\
-## Ours and ACROSS's networks on the same 10,000 pairs
-
-Measured once, on 2026-11-22; the scripts are in commit d537259 (`scripts/benchmarks/competitors/`). ACROSS's networks
-had the published sizes, losses and rates, and as many passes over the data as about the CPU time of our training holds:
-one of the mesh networks in place of 300. So the rows tell what a budget buys, not how far those networks come in hours.
-A lean rewrite of them (sparse matrices, Clenshaw) took 9.5 ms a frame; ACROSS's own classes 183 to 246 ms, as reported
-to us. Errors: um rms over moving nodes of 498 test contacts, solved by the full tier. MVB and MVD code a mesh of the
-BioTac and of the DIGIT and decode it (autoencoders), S2MPN takes signals to the BioTac's code, M2MPN that to the
-DIGIT's; chain is all of them.
-
-| step | ACROSS's shapes | ours | baseline |
-|---|---|---|---|
-| MVB | 53 um | 8.52 um | 113 um |
-| S2MPN | 55.9 um | 24 um | 113 um |
-| MVD | 43.8 um | 7.63 um | 50.8 um |
-| M2MPN | 46.7 um | 36.9 um | 50.8 um |
-| chain | 47.9 um | 40.4 um | 50.8 um |
-| training | 309 s (7980 contacts, mesh networks 1 pass, CPU) | 250 s (7980 contacts, CPU) | |
-"""
+TABLE = "| method | ms a frame | MB | error | baseline | measured on |", "|---|---|---|---|---|---|"
 
 
 def write_report(
-    folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: str
+    folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: dict[str, list[str]]
 ) -> None:
-    """Write ``benchmark.json``, ``benchmark.md`` and ``benchmark.png``; more : Markdown that follows the tables."""
-    machine = provenance.machine()
-    atomic.write_json(folder / "benchmark.json", {"machine": machine, "missing": missing, "rows": list(rows)})
-    listed = ", ".join(f"{name} ({why})" for name, why in missing.items()) or "nothing"
-    load = f", {os.getloadavg()[0]:.0f} programs competing for them at the end" if hasattr(os, "getloadavg") else ""
-    text = INTRODUCTION.format(machine=f"{machine['processor']}, {machine['cores']} cores{load}", missing=listed)
-    for stage, title in TITLES.items():
-        lines = [as_line(method) for method in methods if method.stage == stage]
-        if lines:
-            text += "\n".join(["", f"## {title}", "", TABLE, *lines, ""])
-    text += "\n" + SAME + "\n" + more
-    atomic.write_bytes(folder / "benchmark.md", text.encode())
+    """Write ``benchmark.json``, the tables of ``benchmark.md``, and ``benchmark.png``; more : tables of the page."""
+    about = {"machine": provenance.machine(), "missing": missing, "rows": list(rows)}
+    atomic.write_json(folder / "benchmark.json", about)
+    lines = {title: [as_line(each) for each in methods if each.stage == stage] for stage, title in TITLES.items()}
+    tables = {f"## {title}\n": [*TABLE, *found] for title, found in lines.items() if found}
+    renew_tables(folder / "benchmark.md", tables | more)
     atomic.write_bytes(folder / "benchmark.png", plot(methods))
 
 

@@ -31,41 +31,16 @@ from .method import ROOT, TEST_SET, TRAINING
 
 COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (assumed)
 FEWEST = 200  # contacts: of fewer, such a share is 1.5 % off and more by chance, and has no target
-TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |\n|---|---|---|---|---|---|"
+TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |", "|---|---|---|---|---|---|"
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
 SCENES = "press", "press_roll_slide", "edge", "ring", "roll", "slide", "user_mesh"
-TEXT = """\
-## Stated bounds against measured errors
-
-A bound holds for 95 of 100 contacts. Mechanics: the fast tier against the full tier on the test contacts; the bounds
-are those of a table made, as `mechanics_tiers.json` is, from the other four fifths of the presses. Translation: largest
-node error from signals, bounds as `tactile convert` writes them, found on the training's validation presses for each
-place along the finger. The share below the bound should be 90 to 98 %.
-
-![measured errors over stated bounds](promised.png)
-
-"""
-PICTURES = """
-Pictures: grey levels rms, as `tactile render` states them, against the reference preset on contact fields that the
-table was not made from.
-
-| preset | stated | measured, each field |
-|---|---|---|
-"""
-SCENES_TEXT = """
-Scenes, simulated (fast tier) and translated: largest node error of the frames in contact, um.
-
-| scene | frames | BioTac, expected | measured | below the bound | DIGIT, expected | measured | below the bound |
-|---|---|---|---|---|---|---|---|
-"""
-PHOTOGRAPHS = """
-Photographs that the calibration was not fitted on, mean error in the region, grey levels; stated is the error on those
-that it was fitted on.
-
-| photograph | stated | measured | baseline |
-|---|---|---|---|
-"""
+PICTURES = "| preset | stated | measured, each field |", "|---|---|---|"
+SCENES_TABLE = (
+    "| scene | frames | BioTac, expected | measured | below the bound | DIGIT, expected | measured | below the bound |",
+    "|---|---|---|---|---|---|---|---|",
+)
+PHOTOGRAPHS = "| photograph | stated | measured | baseline |", "|---|---|---|---|"
 
 
 @dataclass(frozen=True)
@@ -102,20 +77,16 @@ class Promise:
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
 
 
-def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], str, bytes]:
-    """Rows, Markdown and PNG; rows : of the pictures and photographs that were measured in this run."""
+def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], dict[str, list[str]], bytes]:
+    """Rows, the page's tables and a PNG; rows : of the pictures and photographs that were measured in this run."""
     promises = [*of_mechanics(quick), *of_translation(quick)]
-    text = TEXT + "\n".join([TABLE, *(line for promise in promises for line in promise.lines()), ""])
-    found = [promise.row() for promise in promises]
-    pictures = list(of_pictures(rows))
-    text += PICTURES + "\n".join([*pictures, ""]) if pictures else ""
-    if not quick:
-        scenes = [scene_rows(load_translator(), name) for name in SCENES]
-        text += SCENES_TEXT + "\n".join([*(line for _, line in scenes), ""])
-        found += [each for part, _ in scenes for each in part]
-    photographs = list(of_photographs(rows))
-    text += PHOTOGRAPHS + "\n".join([*photographs, ""]) if photographs else ""
-    return found, text, plot(promises)
+    scenes = [] if quick else [scene_rows(load_translator(), name) for name in SCENES]
+    found = [promise.row() for promise in promises] + [each for part, _ in scenes for each in part]
+    tables: dict[tuple[str, ...], list[str]] = {
+        TABLE: [line for promise in promises for line in promise.lines()], PICTURES: list(of_pictures(rows)),
+        SCENES_TABLE: [line for _, line in scenes], PHOTOGRAPHS: list(of_photographs(rows)),
+    }  # fmt: skip
+    return found, {head[0]: [*head, *lines] for head, lines in tables.items() if lines}, plot(promises)
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:

@@ -53,11 +53,11 @@ def main(arguments: list[str] | None = None) -> int:
     missing: dict[str, str] = {}
     try:
         methods = list(all_measured(options, missing))
-        rows, text, picture = [each for method in methods for each in method.rows()], "", b""
+        rows = [each for method in methods for each in method.rows()]
         if not options.only:
             from benchmarks.table.promised import promised
 
-            found, text, picture = promised(rows, options.quick)
+            found, tables, picture = promised(rows, options.quick)
             rows += found
     except TactileError as error:
         print(error, file=sys.stderr)
@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not (options.quick or options.only):
         from benchmarks.table.benchmark_page import write_report
 
-        write_report(ROOT / "docs", methods, rows, missing, text)
+        write_report(ROOT / "docs", methods, rows, missing, tables)
         atomic.write_bytes(ROOT / "docs" / "promised.png", picture)
     for each in failed(rows):
         print(f"MISSED: {each['name']} = {each['value']}, right is 0.9 to 0.98", file=sys.stderr)

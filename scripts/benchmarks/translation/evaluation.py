@@ -30,7 +30,7 @@ from benchmarks.translation import (
     test_set,
     two_contact_rows,
 )
-from benchmarks.translation.model_card import write_model_card
+from benchmarks.translation.model_card import renew_model_card
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
 from tactile_core.recordings import electrode_gains, read
@@ -62,9 +62,13 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
     parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
     parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
-    parser.add_argument("--card", metavar="FILE", help="write the model card (Markdown, CSV, a picture) here")
+    parser.add_argument(
+        "--card", metavar="FILE", help="renew the tables of this model card, and CSV and picture beside it"
+    )
     parser.add_argument("--quick", action="store_true", help="a few recordings, or a few test presses")
     options = parser.parse_args(arguments)
+    if options.card and not Path(options.card).is_file():
+        parser.error(f"--card {options.card}: no such page; docs/translation.md is one")
     try:
         network = translate.load_translator(options.weights)
         found = on_recordings(network, options) if options.recordings else on_test_set(network, options)
@@ -106,5 +110,5 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     for unaware in apart:
         found += test_set.unseen_rows(unaware, pairs, bodies)
     if options.card:
-        write_model_card(Path(options.card), found, network, pairs, apart)
+        renew_model_card(Path(options.card), found, network, pairs, apart)
     return found

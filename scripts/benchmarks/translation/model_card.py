@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +15,10 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import mesh_columns, true_displacement
 from tactile_core.translation.translator import Translator
 
-from ..measured_rows import png_of, short, write_table
+from ..measured_rows import png_of, renew_tables, short, write_table
 from .test_set import SEED, as_read
 
 PICTURE = "translation_cases.png"
-PURPOSE = """\
-The networks take the changes of a BioTac's 19 electrodes to the contact that most plausibly caused them, and to the
-deformation of the skin and of a DIGIT's gel. `tactile convert` and `tactile.translate` run them; nothing needs to be
-set. This page says how far to trust the result; `docs/translation.csv` holds every number that was measured.
-"""
 # Words of an estimate, its row, and what the number is followed by.
 EXPECTED = (
     ("place of the contact on the gel", "likely_place_mm", " mm"),
@@ -32,41 +27,14 @@ EXPECTED = (
     ("overlap with the true contact patch, best is 1", "likely_iou", ""),
 )
 SHALLOW, DEEP = "0.1 to 0.3 mm deep", "deeper than 0.3 mm"  # in the sets of these rows
-NAMES = """\
-| name | meaning |
-|---|---|
-| MVB, MVD, SVB | autoencoders of the BioTac's mesh, the DIGIT's mesh, the signals |
-| S2MPN | network from signals to the BioTac's mesh |
-| M2MPN, D2B | networks from the BioTac's mesh to the DIGIT's, and back |
-| chain | S2MPN, then M2MPN: from signals to the DIGIT's mesh |
-| B2S, D2S | from the BioTac's or the DIGIT's mesh back to signals |
-| likely, mean | the most plausible contact of the posterior, and the posterior's mean |
-| solved | the likely contact, solved on the gel by contact mechanics |
-| followed, sequence | recordings whose contact is tracked through time |
-| peak, core | depth of the dent; nodes deeper than 30 % of it |
-| place, position | centre of the contact |
-| iou | intersection over union of the true and the estimated contact patch |
-"""
-LIMITS = """\
-## Limits
-
-- All truth here is simulated. Real recordings are judged apart (`--recordings`): there only the fluid's pressure is
-  known, and how strong, silent and smooth the translation is can be measured, not how right a deformation is.
-- The size of the electrodes and the BioTac's filling are assumed (see `docs/mechanics.md` and
-  `tactile_core/sensors/`). A real unit's gains differ from the simulated ones by half: `tactile adapt` fits them.
-- Rectified recordings are read by networks that know they are; expect larger errors, as their bounds say.
-- Light touches are lost in the electrodes' noise: see the shallow contacts above.
-- Contacts beyond the DIGIT's gel, deeper than trained, or with shapes far from the nine indenters are not learned.
-"""
+HEAD = f"| estimate, median error | {SHALLOW} | nearest example | {DEEP} | nearest example |"
+CONDITIONS = "| condition | of these networks and contacts |", "|---|---|"
 
 
 def expected(rows: Sequence[Row]) -> list[str]:
     """Return the lines of a small table: the errors of shallow and of deeper contacts, each beside its baseline."""
     by_set = {(row["name"], part): row for row in rows for part in (SHALLOW, DEEP) if part in (row["set"] or "")}
-    lines = [
-        f"| estimate, median error | {SHALLOW} | nearest example | {DEEP} | nearest example |",
-        "|---|---|---|---|---|",
-    ]
+    lines = [HEAD, "|---|---|---|---|---|"]
     for words, name, unit in EXPECTED:
         found = [by_set[name, part] for part in (SHALLOW, DEEP) if (name, part) in by_set]
         numbers = [number for row in found for number in (row["value"], row["baseline"])]
@@ -75,79 +43,40 @@ def expected(rows: Sequence[Row]) -> list[str]:
     return lines
 
 
-def write_model_card(
-    path: Path,
-    rows: list[Row],
-    translator: Translator,
-    pairs: Pairs,
-    apart: Sequence[Translator] = (),
+def renew_model_card(
+    page: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Sequence[Translator] = ()
 ) -> None:
-    """Write the card as Markdown, its rows as CSV and the picture of cases beside it.
+    """Renew the tables of the card, and beside it the rows as CSV and the picture of cases.
 
-    apart : the networks of the unseen rows
+    apart : the networks of the unseen rows. Raises ValueError for a page without the tables.
     """
-    card = translator.card
+    conditions = [f"| {what} | {words} |" for what, words in _conditions(translator.card, pairs, apart)]
+    renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
-    text = [
-        "# Model card: the networks that translate touch",
-        "",
-        PURPOSE,
-        "## What to expect",
-        "",
-        *expected(rows),
-        "",
-        LIMITS,
-        "## Conditions",
-        "",
-        _training(card),
-        f"Test set: {len(pairs.press)} contacts of {len(np.unique(pairs.press))} presses, solved by the full tier of"
-        " mechanics on both sensors; signals read with 1.5 counts of noise and gains 10 % off. Depth bins (0.1-0.3,"
-        " 0.3-0.6, 0.6-0.9, 0.9-1.2 mm on the BioTac) and indenters count alike, no slides; baseline: no deformation.",
-        "",
-        "Made by `scripts/evaluate_translation.py --card`; the numbers are of the weights that ship.",
-        "",
-        "## Cases",
-        "",
-        f"![best, median and worst contact]({PICTURE})",
-        "",
-        "From signals to the DIGIT's gel: the contact with the least, the median and the largest error over the true"
-        " deformation's size, among those the gel is moved 0.1 mm by and more.",
-        "",
-        "## Names in the rows",
-        "",
-        NAMES,
-        *([_apart([each.card["options"] for each in apart]), ""] if apart else []),
-    ]
-    atomic.write_bytes(path, "\n".join(text).encode())
-    parts = {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen}
-    write_table(path.with_suffix(".csv"), parts)
-    atomic.write_bytes(path.with_name(PICTURE), _cases(translator, pairs))
+    write_table(
+        page.with_suffix(".csv"),
+        {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen},
+    )
+    atomic.write_bytes(page.with_name(PICTURE), _cases(translator, pairs))
 
 
-def _training(card: dict) -> str:
+def _conditions(card: dict, pairs: Pairs, apart: Sequence[Translator]) -> Iterator[tuple[str, str]]:
+    """Yield what the networks were trained on and measured with, in words."""
     data, options = card["pairs"], card["options"]
     counts = ", ".join(f"{number} for {what}" for what, number in data["contacts"].items())
-    names = ", ".join(json.loads(data["indenters"]))
-    return (
-        f"Data: {sum(data['contacts'].values())} simulated paired contacts ({counts}; no press in two of them), fast"
-        f" tier with friction and the learned correction, sha256 `{data['sha256'][:16]}...`. Indenters: {names}.\n"
-        f"Latents: signal {options['latent_signal']}, BioTac {options['latent_biotac']},"
-        f" DIGIT {options['latent_digit']};"
-        f" KL weight {options['beta']:g}; seed {card['seed']}; torch {card['versions']['torch']}.\n"
+    total = sum(data["contacts"].values())
+    yield (
+        "training data",
+        f"{total} simulated paired contacts ({counts}), fast tier, sha256 `{data['sha256'][:16]}...`",
     )
-
-
-def _apart(trainings: list[dict]) -> str:
-    each = []
-    for options in trainings:
-        left = [*options["without"]]
-        if options["without_below_x"] is not None:
-            left.append(f"the pad beyond x = {1e3 * options['without_below_x']:g} mm")
-        each.append(f"one without {' and '.join(left)} for {options['effort']:g} of the usual epochs")
-    return (
-        f"Rows of unseen sets are of networks of their own: {', '.join(each)};"
-        " the weights that ship have seen all of it."
-    )
+    yield "indenters", ", ".join(json.loads(data["indenters"]))
+    latents = ", ".join(f"{name} {options[f'latent_{name.lower()}']}" for name in ("signal", "BioTac", "DIGIT"))
+    yield "latents", f"{latents}; KL weight {options['beta']:g}; seed {card['seed']}; torch {card['versions']['torch']}"
+    yield "test contacts", f"{len(pairs.press)} of {len(np.unique(pairs.press))} presses"
+    for kept in (each.card["options"] for each in apart):
+        left, below = [*kept["without"]], kept["without_below_x"]
+        left += [] if below is None else [f"the pad beyond x = {1e3 * below:g} mm"]
+        yield "kept apart", f"networks without {' and '.join(left)}, for {kept['effort']:g} of the usual epochs"
 
 
 def _cases(translator: Translator, pairs: Pairs) -> bytes:

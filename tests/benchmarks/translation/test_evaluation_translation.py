@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import shutil
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -151,6 +153,7 @@ def test_the_patch_of_a_dent_is_where_it_bends_inward():
 
 def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(request.config.rootpath)
+    shutil.copy("docs/translation.md", tmp_path / "card.md")
     monkeypatch.setattr(evaluation, "QUICK_PRESSES", 29)  # prime as well; targets are met on the whole set alone
     status = evaluation.main(["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")])
     rows = json.loads((tmp_path / "rows.json").read_text())
@@ -163,7 +166,10 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
         assert found[f"{step}_rms_um"]["value"] < share * found[f"{step}_rms_um"]["baseline"]
     card = (tmp_path / "card.md").read_text(encoding="utf-8")
     names = {each["name"] for each in read_table(tmp_path / "card.csv")}
-    assert "M2MPN_rms_um" in names and "## Limits" in card and (tmp_path / "translation_cases.png").exists()
+    assert "M2MPN_rms_um" in names and (tmp_path / "translation_cases.png").exists()
+    words = [line for line in Path("docs/translation.md").read_text(encoding="utf-8").splitlines() if line[:1] != "|"]
+    assert [line for line in card.splitlines() if line[:1] != "|"] == words
+    assert "| test contacts | 368 of 119" in Path("docs/translation.md").read_text() and "| 368 of" not in card
 
 
 def test_a_file_that_is_no_test_set_is_refused(tmp_path, capsys):
