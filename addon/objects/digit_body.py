@@ -21,14 +21,24 @@ _RIM = 2.2e-3  # m over height zero: the cover round the gel, below the LEDs
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 
 
+def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
+    """The gel's parts that a scene shows; with a gel that is appended alone Blender brings others, out of sight."""
+    return [thing for thing in gel.children_recursive if thing.users_scene]
+
+
+def has_body(gel: bpy.types.Object) -> bool:
+    """Whether a body was made for the gel: without LEDs it is then dark. One appended or copied alone has none."""
+    return any(thing.tactile.role == "BODY" for thing in parts_of(gel))
+
+
 def leds_of(gel: bpy.types.Object) -> dict[str, bpy.types.Object]:
     """The gel's LEDs by colour; renamed ones are known by their role."""
-    return {thing.tactile.colour: thing for thing in gel.children_recursive if thing.tactile.role == "LED"}
+    return {thing.tactile.colour: thing for thing in parts_of(gel) if thing.tactile.role == "LED"}
 
 
 def camera_of(gel: bpy.types.Object) -> bpy.types.Object | None:
     """The gel's camera, if any."""
-    return next((thing for thing in gel.children_recursive if thing.type == "CAMERA"), None)
+    return next((thing for thing in parts_of(gel) if thing.type == "CAMERA"), None)
 
 
 def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
@@ -39,7 +49,7 @@ def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
 
 def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
     """Add the missing parts of a unit's body to the gel; parts that exist stay as the user has changed them."""
-    first = not any(thing.tactile.role == "BODY" for thing in gel.children_recursive)
+    first = not has_body(gel)
     if coating_of(gel) is None:
         gel.data.materials.clear()
         gel.data.materials.append(digit_materials.new_coating(unit.coating))
@@ -52,7 +62,10 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         name = f"{sensors.title(unit.camera.sensor)} camera"
         lens = _child(gel, name, bpy.data.cameras.new(name), "NONE")
         place_camera(lens, gel, unit.camera)
-    if held_light.NODE not in coating_of(gel).node_tree.nodes:
+    if first and coating_of(gel).users > 1:  # of a copied gel: its light is that of its own LEDs
+        slot = next(slot for slot in gel.material_slots if slot.material == coating_of(gel))
+        slot.link, slot.material = "OBJECT", slot.material.copy()
+    if first or held_light.NODE not in coating_of(gel).node_tree.nodes:
         _hold_light(gel, unit)
     _link_light(gel)
 
@@ -83,7 +96,7 @@ def _link_light(gel: bpy.types.Object) -> None:
         return
     known = (led.light_linking.receiver_collection for led in leds)
     lit = next(filter(None, known), None) or bpy.data.collections.new("DIGIT lit by its LEDs")
-    for thing in (gel, *gel.children_recursive):
+    for thing in (gel, *parts_of(gel)):
         if thing.tactile.role in ("DIGIT", "BODY") and thing.name not in lit.objects:
             lit.objects.link(thing)
     for led in new:

@@ -30,7 +30,7 @@ class ShownUnit:
 
 def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
     """Read the objects; parts that a scene has none of are the calibration's. Raises TactileError."""
-    if not any(thing.tactile.role == "BODY" for thing in gel.children_recursive):
+    if not digit_body.has_body(gel):
         return ShownUnit(unit, Surroundings())
     camera = _camera(gel, depsgraph, unit.camera)
     leds, others = _leds(gel, depsgraph, unit, camera)

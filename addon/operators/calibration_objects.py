@@ -15,10 +15,7 @@ class _OnGel:
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a gel."""
-        if properties.gel_of(context.scene, context.object) is None:
-            cls.poll_message_set("Translate a recording first, or add a DIGIT")
-            return False
-        return True
+        return properties.can(cls, lambda: properties.needed_gel(context.scene))
 
 
 class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):

@@ -87,10 +87,7 @@ class TACTILE_OT_live_picture(TactileOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a gel to look at, or the picture is on: it can always be switched off."""
-        if not is_on() and properties.gel_of(context.scene) is None:
-            cls.poll_message_set("Translate a recording first, or add a DIGIT")
-            return False
-        return True
+        return is_on() or properties.can(cls, lambda: properties.needed_gel(context.scene))
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""

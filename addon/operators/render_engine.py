@@ -48,9 +48,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval.name
-        gel = properties.gel_of(scene)
-        if gel is None:
-            raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
+        gel = properties.needed_gel(scene)
         for left_out in digit_unit.left_out(scene):
             self.report({"WARNING"}, left_out)
         size, preset = (self.resolution_x, self.resolution_y), render_settings.preset_of(scene)

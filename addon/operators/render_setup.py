@@ -67,14 +67,20 @@ class TACTILE_OT_set_up_render(TactileOperator):
     bl_idname = "tactile.set_up_render"
     bl_label = "Set Up Render"
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where there is a gel."""
+        return properties.can(cls, lambda: properties.needed_gel(context.scene))
+
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         scene = context.scene
-        gel = properties.gel_of(scene, context.object)
-        if gel is None:
-            raise TactileError(scene.name, "no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
+        gel = properties.needed_gel(scene, context.object)
         properties.check_own(gel)
         unit = render_settings.calibration_of(scene, properties.sensor_name(gel))
+        if not digit_body.has_body(gel):
+            words = f"{gel.name} came without its LEDs and camera: the calibration's are added"
+            self.report({"WARNING"}, f"{words}. To have its own, append its collection")
         digit_body.add_body(gel, unit)
         camera = unit.camera
         render = scene.render
@@ -144,6 +150,8 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     coating = digit_body.coating_of(gel) if leds else None
     for name, socket in digit_materials.sockets_of(coating).items() if coating else ():
         layout.prop(socket, "default_value", text=name)
+    if not digit_body.has_body(gel):
+        layout.label(text="No LEDs of its own: Set Up Render adds them", icon="INFO")
     for words in digit_unit.left_out(context.scene)[:3]:
         layout.label(text=words, icon="INFO")
     row = layout.row(align=True)

@@ -1,10 +1,12 @@
 """The button "Simulate": contact mechanics over the frame range, in another process."""
 
+import os
 import shutil
 from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import SAMPLE_RATE
@@ -13,6 +15,8 @@ from ..settings import properties, render_settings
 from ..settings.reports import require
 from . import pictures, scene_bridge, simulation_result
 from .job_operator import JobOperator
+
+_FOLDER = "tactile_simulations"  # beside a .blend
 
 
 def _outputs(scene: bpy.types.Scene) -> list[str]:
@@ -30,6 +34,11 @@ class TACTILE_OT_simulate(JobOperator):
     bl_label = "Simulate"
 
     seed: bpy.props.IntProperty(name="Seed", description="Of the electrodes' noise: same seed, same recording", min=0)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where there are a sensor and what presses it."""
+        return properties.can(cls, lambda: (scene_bridge.indenter_of(context), scene_bridge.sensor_of(context)))
 
     stopped = "Simulation stopped; the scene is as it was"
 
@@ -66,20 +75,38 @@ class TACTILE_OT_simulate(JobOperator):
         self.report({"INFO"}, summary)
 
     def _keep(self, context: bpy.types.Context) -> None:
-        """Save the simulated recording beside the .blend, so that it can be translated like a real one."""
+        """Save the simulated recording beside the .blend, so that it can be translated like a real one.
+
+        Of a file that was never saved it is kept by Blender until the file is, see ``_move_beside``.
+        """
         from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 
         there = simulation_result.sensors_in(context.scene)
         skin = next((thing for thing in there if properties.sensor_name(thing) == ELECTRODES_OF), None)
-        if not bpy.data.is_saved or skin is None:
+        if skin is None:
             return
         name = f"{bpy.path.clean_name(self._thing)}.h5"
-        path = Path(bpy.path.abspath("//tactile_simulations")) / name
+        folder = f"//{_FOLDER}" if bpy.data.is_saved else os.path.join(bpy.app.tempdir, _FOLDER)
+        path = Path(bpy.path.abspath(folder)) / name
         path.parent.mkdir(exist_ok=True)
         shutil.copyfile(self._folder.path / "recording.h5", path)
-        skin.tactile.recording, skin.tactile.tare = f"//tactile_simulations/{name}", "auto"
+        skin.tactile.recording, skin.tactile.tare = f"{folder}/{name}", "auto"
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
         skin.tactile.samples = SAMPLE_RATE / scene_bridge.rate_of(context.scene)
 
 
+@persistent
+def _move_beside(file: str, *_: object) -> None:
+    """Copy recordings of a file that is saved for the first time beside it; called by Blender before it saves."""
+    kept = os.path.join(bpy.app.tempdir, _FOLDER)
+    for thing in bpy.data.objects:
+        recording = thing.tactile.recording
+        if file and recording.startswith(kept) and os.path.isfile(recording):
+            path = Path(file).parent / _FOLDER / os.path.basename(recording)
+            path.parent.mkdir(exist_ok=True)
+            shutil.copyfile(recording, path)
+            thing.tactile.recording = f"//{_FOLDER}/{path.name}"
+
+
 CLASSES = (TACTILE_OT_simulate,)
+HANDLERS = ((bpy.app.handlers.save_pre, _move_beside),)

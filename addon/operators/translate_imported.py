@@ -33,7 +33,7 @@ class TACTILE_OT_translate(JobOperator):
         """Return true where there is a skin with a recording."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         if skin is None or not skin.tactile.recording:
-            cls.poll_message_set("Import a BioTac recording first, or simulate one in a saved file")
+            cls.poll_message_set("Import a BioTac recording first, or simulate one")
             return False
         return True
 

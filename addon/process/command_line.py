@@ -138,7 +138,7 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
     _fresh()
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
     _claimed(folder, options)
-    bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    _save(folder)
     bpy.context.scene.tactile_render.error = options.error
     bpy.ops.tactile.simulate(seed=options.seed)
     _finish(folder, options)
@@ -171,9 +171,17 @@ def _finish(folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.tactile.set_up_render()
     bpy.context.scene.tactile_render.preset, bpy.context.scene.tactile_render.error = options.preset, options.error
     bpy.context.scene.render.filepath = "//images/"
-    bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    _save(folder)
     if options.pictures:
         _pictures(folder, options)
+
+
+def _save(folder: Path) -> None:
+    """Save the folder's .blend, without a copy of the one before."""
+    files = bpy.context.preferences.filepaths
+    copies, files.save_version = files.save_version, 0
+    bpy.ops.wm.save_as_mainfile(filepath=str((folder / f"{folder.name}.blend").resolve()))
+    files.save_version = copies
 
 
 def _pictures(folder: Path, options: argparse.Namespace) -> None:

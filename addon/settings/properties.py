@@ -2,6 +2,7 @@
 
 import functools
 import math
+from collections.abc import Callable
 
 import bpy
 
@@ -182,8 +183,31 @@ def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) ->
 def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
     """Return the gel that is meant: by ``near`` as in ``of_role``, else the scene camera's, else the scene's first."""
     seen = None if scene.camera is None else scene.camera.parent
-    seen = seen if seen is not None and seen.tactile.role == "DIGIT" else None
+    seen = seen if seen is not None and seen.tactile.role == "DIGIT" and seen.name in scene.objects else None
     return _beside(scene, "DIGIT", near) or seen or of_role(scene, "DIGIT")
+
+
+def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object:
+    """Return the gel that is meant, as ``gel_of``. Raises TactileError where the scene itself has none."""
+    gel = gel_of(scene, near)
+    if gel is not None:
+        return gel
+    for thing in scene.objects:
+        held = thing.instance_collection
+        if held is not None and any(part.tactile.role == "DIGIT" for part in held.all_objects):
+            advice = f"Drag the collection {held.name} into the scene in place of its instance"
+            raise TactileError(thing.name, "an instance of a gel", "a gel of the scene's own", advice)
+    raise TactileError(scene.name, "there is no DIGIT", "a gel to look at", "Translate a recording, or add a DIGIT")
+
+
+def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
+    """Return whether what an operator needs is there, for its poll: else its greyed button says why not."""
+    try:
+        need()
+    except TactileError as error:
+        kind.poll_message_set(str(error))
+        return False
+    return True
 
 
 def home_of(thing: bpy.types.Object) -> bpy.types.Collection:

@@ -306,6 +306,23 @@ def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
     assert 0.02 < np.abs(nodes_of(gel) - rest).max() < 0.5 and gel["force"][2] == pytest.approx(-0.1, rel=0.05)
 
 
+def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_path):
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball, skin = bpy.context.object, scene.objects["BioTac skin"]
+    scene.frame_start, scene.frame_end, ball.tactile.press_by = 1, 11, "FORCE"
+    _key(ball, 1, force=0.0)
+    _key(ball, 11, force=0.3)
+    bpy.ops.tactile.simulate()
+    assert Path(skin.tactile.recording).is_file()
+    bpy.ops.tactile.translate()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "press.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "press.blend"))
+    skin = bpy.context.scene.objects["BioTac skin"]
+    assert skin.tactile.recording == "//tactile_simulations/sphere.h5"
+    bpy.ops.tactile.translate()
+
+
 def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
     assert part("addon.operators.simulate")._outputs(scene) == ["electrodes", "displacement_biotac"]

@@ -184,3 +184,9 @@ def test_no_folder_of_a_job_is_named(part):
     with part("addon.process.jobs").JobFolder() as folder:
         said = f"{folder / 'scene.toml'}, recording: missing"
         assert part("addon.settings.reports").in_blender(said) == "scene.toml, recording: missing"
+
+
+def test_buttons_without_what_they_need_are_greyed(scene, part):
+    assert not bpy.ops.tactile.set_up_render.poll() and not bpy.ops.tactile.simulate.poll()
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    assert bpy.ops.tactile.set_up_render.poll() and not bpy.ops.tactile.simulate.poll()

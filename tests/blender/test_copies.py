@@ -1,0 +1,96 @@
+"""A gel that is copied, appended or instanced draws its own picture, or says what is missing."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def gel(imported):
+    """A translated gel, moved in the scene, its red LED dimmed, on a pressed frame."""
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    bpy.ops.tactile.set_up_render()
+    bpy.context.scene.frame_set(80)
+    found = bpy.context.scene.objects["DIGIT gel"]
+    found.location = (30, 20, 5)
+    bpy.data.objects["LED red"].data.energy *= 0.5
+    return found
+
+
+@pytest.fixture
+def draw(part):
+    """``draw(gel)``: its picture, float."""
+
+    def run(gel):
+        bpy.context.view_layer.update()
+        return (
+            part("addon.operators.pictures").draw(gel, bpy.context.evaluated_depsgraph_get(), "fast")[0].astype(float)
+        )
+
+    return run
+
+
+def duplicate(gel, *parts):
+    bpy.ops.object.select_all(action="DESELECT")
+    for thing in (gel, *parts):
+        thing.hide_select = False
+        thing.select_set(True)
+    bpy.context.view_layer.objects.active = gel
+    bpy.ops.object.duplicate()
+    bpy.context.object.location.x += 60
+    return bpy.context.object
+
+
+def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw):
+    before = draw(gel)
+    copy = duplicate(gel, *gel.children_recursive)
+    assert np.abs(draw(copy) - before).max() <= 1
+    lamp = next(thing for thing in copy.children if thing.tactile.colour == "red")
+    lamp.data.energy *= 2
+    assert np.abs(draw(copy) - before)[..., 0].mean() > 10 and np.abs(draw(gel) - before).max() <= 1
+
+
+def test_a_copy_alone_has_the_calibration_s_lights_and_says_so(gel, draw, capfd):
+    copy = duplicate(gel)
+    drawn, coating = draw(copy), gel.material_slots[0].material
+    bpy.ops.tactile.set_up_render()
+    assert "DIGIT gel.001 came without its LEDs and camera" in capfd.readouterr().out
+    assert np.abs(draw(copy) - drawn).max() <= 1
+    own = copy.material_slots[0].material
+    lamps = {target.id for curve in own.node_tree.animation_data.drivers for variable in curve.driver.variables
+             for target in variable.targets}  # fmt: skip
+    assert own != coating == gel.material_slots[0].material
+    assert {thing for thing in copy.children if thing.tactile.role == "LED"} <= lamps
+
+
+def test_a_gel_appended_alone_says_what_is_missing(gel, draw, tmp_path, capfd):
+    bpy.data.objects["LED red"].data.energy *= 2
+    whole = draw(gel)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "a.blend")) as (_, wanted):
+        wanted.objects = ["DIGIT gel"]
+    alone = wanted.objects[0]
+    bpy.context.scene.collection.objects.link(alone)
+    bpy.context.scene.frame_set(80)
+    assert np.abs(draw(alone) - whole).max() <= 1
+    bpy.ops.tactile.set_up_render()
+    assert "append its collection" in capfd.readouterr().out
+    assert np.abs(draw(alone) - whole).max() <= 1
+    assert sum(thing.tactile.role == "LED" for thing in bpy.context.scene.objects) == 3
+
+
+def test_an_instance_is_told_from_a_gel(gel, draw, tmp_path):
+    before, group = draw(gel), bpy.context.scene.collection.children[0]
+    bpy.context.scene.collection.children.unlink(group)
+    holder = bpy.data.objects.new("holder", None)
+    holder.instance_type, holder.instance_collection = "COLLECTION", group
+    bpy.context.scene.collection.objects.link(holder)
+    with pytest.raises(RuntimeError, match=f"holder: an instance of a gel.*collection {group.name}"):
+        bpy.ops.tactile.set_up_render()
+    bpy.context.scene.collection.children.link(group)
+    bpy.context.scene.frame_set(80)
+    assert np.abs(draw(gel) - before).max() <= 1
