@@ -24,7 +24,7 @@ def gel(imported):
 
 
 def _translation(part):
-    asked = SimpleNamespace(tare="auto", polarity="auto", frames="40:140", weights="")
+    asked = SimpleNamespace(tare="auto", polarity="auto", frames="40:140", weights="", columns="", unit="", apart=False)
     return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None).translation
 
 
