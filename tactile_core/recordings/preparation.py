@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import COUNT_MAX, contacts_of
+from ..sensors import contacts_of
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, Fluid
 from .doubt import LAW, Doubt, Reason, without
@@ -21,7 +21,7 @@ from .repair import fill, smooth
 from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
 from .signal_kind import detect, full_scale
 from .signals import EVERY, PrepareOptions, Rest, Signals, typical
-from .unit import contact_law, film
+from .unit import contact_law, film, pressure_counts
 from .unit.loaded_rest import as_contact
 
 # Frames to smooth over where the user gives none. Rectified signals need it: folded noise does not average out in the
@@ -42,7 +42,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
             kind, evidence = detect(readings)
     if kind == "raw" and recording.pdc is not None:
-        recording = replace(recording, pdc=_pdc_in_counts(recording.pdc, unit, warnings))
+        recording = replace(recording, pdc=pressure_counts.in_counts(recording.pdc, unit, recording.sensor, warnings))
     readings, flags, repaired = mended(recording, readings, flags, warnings, kind, repair=options.repair)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)
@@ -128,20 +128,6 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
         unit = full_scale(readings) if options.counts_per_unit is None else None
         return ("raw", f"{unit[1]}, all far above any change") if unit else detect(readings)
     return options.kind, f"given by the user (the samples look {detect(readings)[0]})"
-
-
-def pdc_unit(pdc: np.ndarray, unit: float) -> float:
-    """Return the counts a unit of PDC (T,) of a recording whose electrodes have so many: as many, or 1 where it has."""
-    most = pdc.max(where=np.isfinite(pdc), initial=0)
-    return unit if unit != 1 and (COUNT_MAX if unit < 1 else 0) < most <= 1.01 * COUNT_MAX / unit else 1.0
-
-
-def _pdc_in_counts(pdc: np.ndarray, unit: float, warnings: list[str]) -> np.ndarray | None:
-    """Return raw PDC (T,) in counts; None where it is 0 throughout, which no finger's is."""
-    if not pdc.any():
-        warnings.append("PDC is 0 in all frames: taken as not recorded")
-        return None
-    return pdc_unit(pdc, unit) * pdc
 
 
 def _unit_rest(

@@ -16,6 +16,7 @@ from ..recordings.rest_level import level
 from ..recordings.signal_kind import detect
 from ..recordings.signals import UNIT_DRIFT
 from ..recordings.tables.column_map import ColumnMap
+from ..recordings.unit.pressure_counts import in_counts
 from ..sensors import COUNT_MAX, divider
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
@@ -65,7 +66,7 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     if len(recordings) < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
-    pressures = [one.pdc for one in recordings if one.pdc is not None and np.isfinite(one.pdc).all()]
+    pressures = [pdc for pdc in map(_pressure, recordings) if pdc is not None and np.isfinite(pdc).all()]
     if len(pressures) < len(recordings):
         levels = np.array([level(_raw(one)) for one in recordings])
         low, middle, high = np.percentile(levels, [25, 50, 75], axis=0)
@@ -91,7 +92,8 @@ def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
     if spread.max() > UNIT_DRIFT:
         found = f"E{spread.argmax() + 1} moves by {spread.max():.0f} counts"
         raise TactileError(path, found, f"an untouched finger, at most {UNIT_DRIFT:g}", "Record it without contact")
-    pdc = None if recording.pdc is None else float(np.nanmedian(recording.pdc))
+    pressure = _pressure(recording)
+    pdc = None if pressure is None else float(np.nanmedian(pressure))
     return UnitRest(level(readings), spread / 2, pdc, 0)
 
 
@@ -133,6 +135,11 @@ def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: f
         off = change - size[row, nearest][:, None] * told[nearest]
         rest = np.clip(rest + weight @ off / weight.sum(), 1.0, COUNT_MAX - 1.0)
     return rest, share
+
+
+def _pressure(recording: Recording) -> np.ndarray | None:
+    """PDC (T,) counts, None where it was not recorded."""
+    return None if recording.pdc is None else in_counts(recording.pdc, 1.0, recording.sensor, [])
 
 
 def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:

@@ -11,7 +11,6 @@ from ...recordings.answers import prepare
 from ...recordings.doubt import REST, Reason, reason_of
 from ...recordings.electrode_faults import alike, silent
 from ...recordings.flags import Flag
-from ...recordings.preparation import pdc_unit
 from ...recordings.preparer import DOUBTS
 from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
@@ -19,6 +18,7 @@ from ...recordings.rest_level import Baseline, Changes
 from ...recordings.signal_kind import full_scale
 from ...recordings.signals import EVERY, PrepareOptions, Signals
 from ...recordings.unit import film
+from ...recordings.unit.pressure_counts import counts_a_unit
 from ...sensors import SAMPLE_RATE, SOURCE
 from ...sensors.descriptor import of_kind
 from ...sensors.fluid_sensor import FALLS, POLARITIES, Fluid
@@ -105,7 +105,7 @@ class LiveSignals:
         if self._known is None and (len(seen) == self._most or signals.quiet.any() or of_unit):
             self._known, self.found = signals, _source(signals)
             if seen.pdc is not None:
-                self._pdc_factor = pdc_unit(seen.pdc, self._factor)
+                self._pdc_factor, _ = counts_a_unit(seen.pdc, self._factor, self._sensor)
                 rest = (self._pdc_factor * seen.pdc - signals.pdc)[np.isfinite(signals.pdc)]
                 self._rest_pdc = np.median(rest) if len(rest) else np.nan
         self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
