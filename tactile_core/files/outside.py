@@ -12,6 +12,7 @@ import re
 import stat
 from io import BufferedReader
 from pathlib import Path
+from typing import Any
 
 from ..errors import TactileError
 
@@ -62,6 +63,15 @@ def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
 def toml_quoted(text: str) -> str:
     """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
     return json.dumps(text.encode(errors="replace").decode())
+
+
+def toml_value(value: Any, scale: float = 1.0) -> str:
+    """Format a text, a number with six digits, or a list of such as TOML; numbers times ``scale``."""
+    if isinstance(value, str):
+        return toml_quoted(value)
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(toml_value(each, scale) for each in value)}]"
+    return f"{scale * value + 0.0:.6g}"  # no negative zero
 
 
 def read_toml_text(path: str | os.PathLike) -> str:

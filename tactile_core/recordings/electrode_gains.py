@@ -13,7 +13,7 @@ from msgspec import Meta
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.outside import read_toml_text, toml_quoted
+from ..files.outside import read_toml_text, toml_quoted, toml_value
 from ..sensors import COUNT_MAX, SOURCE, divider, electrode_count, title, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import MOST_ELECTRODES, Fluid
@@ -194,13 +194,4 @@ def write(path: str | os.PathLike, sensor: SensorFile) -> None:
 
 
 def _lines(fields: dict[str, Any]) -> list[str]:
-    return [f"{name} = {_value(value)}" for name, value in fields.items() if value is not None]
-
-
-def _value(value: str | float | list[float]) -> str:
-    """Format a text, a number with six digits, or a list of numbers as TOML."""
-    if isinstance(value, str):
-        return toml_quoted(value)
-    if isinstance(value, list):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return f"{value + 0.0:.6g}"  # no negative zero
+    return [f"{name} = {toml_value(value)}" for name, value in fields.items() if value is not None]

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import TactileError
 from ..files import atomic, outside
-from ..files.outside import toml_quoted
+from ..files.outside import toml_value
 from .calibration import Calibration, Coating, Fit, Markers, Response
 from .camera import COLOURS, Camera, Led
 from .descriptor import describe, of_kind
@@ -145,34 +145,34 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
     Numbers keep six digits. A photograph is named as it lies beside the file.
     """
-    text = as_text(calibration)
+    text = astoml_value(calibration)
     atomic.write_bytes(path, text.encode())
 
 
-def as_text(unit: Calibration) -> str:
+def astoml_value(unit: Calibration) -> str:
     """Format a calibration, numbers with six digits; a photograph is named as it lies beside the file."""
     camera, coating, response = unit.camera, unit.coating, unit.response
-    sensor = "" if camera.sensor == Camera.sensor else f"sensor = {_text(camera.sensor)}\n"
+    sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"
     leds = "\n".join(
-        f"{led.colour} = {{ position_mm = {_text(led.position, MM)}, radius_mm = {_text(led.radius, MM)},"
-        f" radiance = {_text(led.radiance)} }}"
+        f"{led.colour} = {{ position_mm = {toml_value(led.position, MM)}, radius_mm = {toml_value(led.radius, MM)},"
+        f" radiance = {toml_value(led.radiance)} }}"
         for led in unit.leds
     )
-    ambient = "\n".join(f"{colour} = {_text(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))
+    ambient = "\n".join(f"{colour} = {toml_value(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))
     return f"""\
 # A {describe(camera.sensor).title} unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.
 # Image frame: right, down, toward the camera; origin in the picture's middle on the plane of height zero.
-format = {_text(FORMAT)}
-unit = {_text(unit.unit)}
+format = {toml_value(FORMAT)}
+unit = {toml_value(unit.unit)}
 {sensor}
 [camera]
 width_px = {camera.width}
 height_px = {camera.height}
-px_per_mm_x = {_text(camera.px_per_mm_x)}  # at height zero
-px_per_mm_y = {_text(camera.px_per_mm_y)}
-centre_x_mm = {_text(camera.centre_x, MM)}  # of the gel, in the picture's middle
-centre_z_mm = {_text(camera.centre_z, MM)}
-apparent_height_mm = {_text(camera.apparent_height, MM)}  # of the pinhole
+px_per_mm_x = {toml_value(camera.px_per_mm_x)}  # at height zero
+px_per_mm_y = {toml_value(camera.px_per_mm_y)}
+centre_x_mm = {toml_value(camera.centre_x, MM)}  # of the gel, in the picture's middle
+centre_z_mm = {toml_value(camera.centre_z, MM)}
+apparent_height_mm = {toml_value(camera.apparent_height, MM)}  # of the pinhole
 right_z = {camera.right_z}  # the way z goes to the right
 down_x = {camera.down_x}  # the way x goes down
 
@@ -180,32 +180,32 @@ down_x = {camera.down_x}  # the way x goes down
 {leds}
 
 [response]  # of the camera, levels a level: a row a channel of the picture, a column an LED
-centre = {_text(response.centre)}
-along_right_per_mm = {_text(response.along_right, PER_MM)}
-along_down_per_mm = {_text(response.along_down, PER_MM)}
+centre = {toml_value(response.centre)}
+along_right_per_mm = {toml_value(response.along_right, PER_MM)}
+along_down_per_mm = {toml_value(response.along_down, PER_MM)}
 
 [ambient]  # of each LED, held in gel and acrylic, of right^i down^j / (10 mm)^(i + j), by i + j, then j
 {ambient}
-rise_per_mm = {_text(unit.ambient_rise, PER_MM)}  # more of it on higher gel
+rise_per_mm = {toml_value(unit.ambient_rise, PER_MM)}  # more of it on higher gel
 
 [coating]  # diffuse, roughplastic or principled; albedo of each LED's light
-bsdf = {_text(coating.bsdf)}
-albedo = {_text(coating.albedo)}
-roughness = {_text(coating.roughness)}
-gloss = {_text(coating.gloss)}
-metallic = {_text(coating.metallic)}
-spread_mm = {_text(coating.spread, MM)}  # of light, sideways in it: standard deviation
+bsdf = {toml_value(coating.bsdf)}
+albedo = {toml_value(coating.albedo)}
+roughness = {toml_value(coating.roughness)}
+gloss = {toml_value(coating.gloss)}
+metallic = {toml_value(coating.metallic)}
+spread_mm = {toml_value(coating.spread, MM)}  # of light, sideways in it: standard deviation
 
 [gel]
-dome_scale = {_text(unit.dome_scale)}  # of the public mesh's dome
-index = {_text(unit.gel_index)}  # of gel and acrylic
+dome_scale = {toml_value(unit.dome_scale)}  # of the public mesh's dome
+index = {toml_value(unit.gel_index)}  # of gel and acrylic
 
 [background]  # a photograph of the untouched gel, beside this file, is then the picture at rest
-photograph = {_text(Path(unit.photograph).name)}
+photograph = {toml_value(Path(unit.photograph).name)}
 
 {"" if unit.markers is None else _markers(unit.markers)}\
 [noise]  # standard deviation, grey levels, red, green, blue; used when asked for
-levels = {_text(unit.noise)}
+levels = {toml_value(unit.noise)}
 
 {_fit(unit.fit)}"""  # noqa: E501
 
@@ -215,9 +215,9 @@ def _markers(markers: Markers) -> str:
 [markers]  # dots printed on the gel, a square grid in the picture's middle; may be left out
 rows = {markers.rows}  # down the picture
 columns = {markers.columns}
-pitch_mm = {_text(markers.pitch, MM)}
-diameter_mm = {_text(markers.diameter, MM)}
-albedo = {_text(markers.albedo)}  # share of the coating's light: 0 black
+pitch_mm = {toml_value(markers.pitch, MM)}
+diameter_mm = {toml_value(markers.diameter, MM)}
+albedo = {toml_value(markers.albedo)}  # share of the coating's light: 0 black
 
 """
 
@@ -225,10 +225,10 @@ albedo = {_text(markers.albedo)}  # share of the coating's light: 0 black
 def _fit(fit: Fit) -> str:
     return f"""\
 [fit]
-note = {_text(fit.note)}
-ball_diameter_mm = {_text(fit.ball_diameter, MM)}
-photographs = {_text(fit.photographs)}
-not_identified = {_text(fit.not_identified)}
+note = {toml_value(fit.note)}
+ball_diameter_mm = {toml_value(fit.ball_diameter, MM)}
+photographs = {toml_value(fit.photographs)}
+not_identified = {toml_value(fit.not_identified)}
 
 [fit.errors]  # on those photographs
 {_named(fit.errors)}
@@ -237,13 +237,4 @@ not_identified = {_text(fit.not_identified)}
 
 
 def _named(values: Mapping[str, float]) -> str:
-    return "".join(f"{_text(name)} = {_text(value)}\n" for name, value in values.items())
-
-
-def _text(value: Any, scale: float = 1.0) -> str:
-    """Format a text, a number with six digits, or a list of such as TOML; numbers times ``scale``."""
-    if isinstance(value, str):
-        return toml_quoted(value)
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(_text(each, scale) for each in value)}]"
-    return f"{scale * value + 0.0:.6g}"
+    return "".join(f"{toml_value(name)} = {toml_value(value)}\n" for name, value in values.items())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ from .toml_fields import read_table, read_toml
 FOLDER = Path(__file__).parent
 OWN = "TACTILE_SENSORS"  # environment variable: a folder with the user's own sensors
 FILE, FORMAT = "sensor.toml", "tactile-sensor-1"
+NODES = "_nodes_sha256"  # after a sensor's name in a file, the hash of its surface's nodes
 _S = TypeVar("_S", Fluid, GelSensor)
 
 KINDS: dict[str, type[Fluid] | type[GelSensor]] = {"fluid": Fluid, "gel": GelSensor}
@@ -47,6 +49,25 @@ def _advice() -> str:
 def names() -> tuple[str, ...]:
     """List the known sensors: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
     return tuple(sorted(_folders()))
+
+
+def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
+    """Return the sensor that is read and the gel whose nodes a file's keys name; None where they name no two sensors.
+
+    what : that is of them, in words. Raises TactileError for a sensor that is not known here, and for two that are not
+    one of each kind.
+    """
+    of = sorted(key.removesuffix(NODES) for key in keys if key.endswith(NODES))
+    if len(of) != 2:
+        return None
+    found, missing = f"{what} of {' and '.join(of)}", [name for name in of if name not in names()]
+    if missing:
+        put = f"Put the folder of {missing[0]} into the one that ${OWN} names"
+        raise TactileError(where, found, f"of {', '.join(names())}", put)
+    source, target = sorted(of, key=lambda name: isinstance(describe(name), GelSensor))
+    if not isinstance(describe(source), Fluid) or not isinstance(describe(target), GelSensor):
+        raise TactileError(where, found, "a sensor of skin and fluid, and a gel", advice)
+    return source, target
 
 
 @functools.cache

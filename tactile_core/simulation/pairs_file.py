@@ -16,8 +16,7 @@ from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked
 from ..mechanics.electrodes.biotac_sheet import LAWS
 from ..sensors import PAIR
-from ..sensors.descriptor import OWN
-from ..sensors.descriptor import names as known_sensors
+from ..sensors.descriptor import NODES, pair_of
 from ..sensors.fluid_sensor import FALLS
 
 if TYPE_CHECKING:
@@ -48,7 +47,6 @@ SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
 KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's surface, with its unit
-NODES = "_nodes_sha256"  # after a sensor's name, the attribute that says which nodes its surface has
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             found = str(file.attrs.get("format", ""))
             if found != FORMAT:
                 raise TactileError(path, f"format {found!r}", f"format {FORMAT!r}", ADVICE)
-            pair = _pair(file, path)
+            pair = pair_of(file.attrs, path, "pairs", ADVICE) or PAIR
             wanted = sorted((*ATTRIBUTES, *(f"{sensor}{NODES}" for sensor in pair)))
             missing = [name for name in wanted if name not in file.attrs]
             if missing:
@@ -153,24 +151,6 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
         pair=pair,
         **arrays,
     )
-
-
-def _pair(file: h5py.File, path: str | os.PathLike) -> tuple[str, str]:
-    """Source and target of the pairs: the sensors whose nodes the file names, first the one of skin and fluid.
-
-    Of a file that names no two sensors they are those that ship.
-    """
-    of = sorted(name.removesuffix(NODES) for name in file.attrs if name.endswith(NODES))
-    if len(of) != 2:
-        return PAIR
-    unknown = [name for name in of if name not in known_sensors()]
-    if unknown:
-        expected = f"known ones: {', '.join(known_sensors())}"
-        raise TactileError(path, f"pairs of {' and '.join(of)}", expected, f"Name the folder of {unknown[0]} in ${OWN}")
-    source, target = sorted(of, key=sensors.is_gel)
-    if sensors.is_gel(source) or not sensors.is_gel(target):
-        raise TactileError(path, f"pairs of {' and '.join(of)}", "a sensor of skin and fluid, and a gel", ADVICE)
-    return source, target
 
 
 def _named(pair: tuple[str, str]) -> dict[str, str]:

@@ -21,8 +21,9 @@ from ..files.provenance import sha256
 from ..files.version import __version__
 from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..sensors import PAIR, SOURCE, TARGET
+from ..sensors.descriptor import NODES
 from ..sensors.fluid_sensor import FALLS
-from .pairs_file import FORMAT, KEEPABLE, NODES, SCALE
+from .pairs_file import FORMAT, KEEPABLE, SCALE
 
 if TYPE_CHECKING:
     import h5py

@@ -10,9 +10,10 @@ import torch
 
 from ..files.version import __version__
 from ..sensors import places_of
+from ..sensors.descriptor import NODES
 from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
-from ..translation.card import ERROR_FEATURES, NETS, NODES, PLACE, POSTERIORS, REST, SURFACES
+from ..translation.card import ERROR_FEATURES, NETS, PLACE, POSTERIORS, REST, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts

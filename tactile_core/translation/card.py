@@ -19,9 +19,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from ..sensors import ELECTRODES, PAIR
-from ..sensors.descriptor import OWN
-from ..sensors.descriptor import names as known_sensors
+from ..sensors import ELECTRODES, PAIR, descriptor
 from .layers import DISTANCES, plain_shapes, residual_shapes
 from .weights import ADVICE
 
@@ -106,7 +104,6 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = 
             raise TactileError(f"{path}, nets.{net}", f"{size} {sizes[net][size]}", f"{expected}", ADVICE)
 
 
-NODES = "_nodes_sha256"  # after a sensor's name in a card, the hash of its surface
 DOUBT = "doubt"  # in a card: a sentence on what no real sensor has shown of its translations
 REST = "rest_counts"  # in a card: counts at rest that changes are those of, where the sensor's table holds none
 
@@ -115,21 +112,8 @@ WORSE = 0.8  # of the baseline, the error of no displacement at all: above it we
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
-    """Return the sensor that is read and the gel that is translated to.
-
-    Raises TactileError for a sensor that is not known here, and for two that are not one of each kind.
-    """
-    of = sorted(key.removesuffix(NODES) for key in card if key.endswith(NODES))
-    if len(of) != 2:
-        return PAIR
-    missing = [name for name in of if name not in known_sensors()]
-    if missing:
-        advice = f"Put the folder of {missing[0]} into the one that ${OWN} names"
-        raise TactileError(where, f"networks of {' and '.join(of)}", f"of {', '.join(known_sensors())}", advice)
-    source, target = sorted(of, key=sensors.is_gel)
-    if sensors.is_gel(source) or not sensors.is_gel(target):
-        raise TactileError(where, f"networks of {' and '.join(of)}", "a sensor of skin and fluid, and a gel")
-    return source, target
+    """Return the sensor that is read and the gel that is translated to; raises what ``descriptor.pair_of`` raises."""
+    return descriptor.pair_of(card, where, "networks", "") or PAIR
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:

@@ -14,9 +14,10 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals
 from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
+from ..sensors.descriptor import NODES
 from . import networks, reference_signals
 from .answer import Answer
-from .card import NODES, REST, check_pair, check_tables
+from .card import REST, check_pair, check_tables
 from .contact_track import Evidence, Tracker, needed
 from .simulated_likeness import patterns_of, shipped_patterns
 from .translator import Translation, Translator
