@@ -15,6 +15,7 @@ from ...tactile_core.sensors.camera import Camera
 from . import axes, digit_body, digit_materials, image_frame, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
+_VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
 _STEP = 1e-7  # m: no movement that anybody meant
 _STRAIGHT = 1e-3  # of a turned camera's axes
 _OFF_BAND = 1e-6  # brightness, levels m^2: a hundred-thousandth of an LED's
@@ -105,7 +106,9 @@ def left_out(scene: bpy.types.Scene) -> list[str]:
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
-    return found + ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
+    found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
+    view = scene.view_settings.view_transform
+    return found + [f"View transform {view} changes the levels; Set Up Render sets Raw"] * (view not in _VIEWS)
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202

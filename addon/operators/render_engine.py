@@ -18,6 +18,7 @@ ID = "TACTILE_DIGIT"
 _LOOK = 10.0  # s between two looks for workers that do nothing
 # Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
 _SHARED = {"properties_output", "properties_render", "properties_view_layer"}
+_EXR = "OPEN_EXR"  # how the names of EXR's file formats begin
 PASSES = {"Height": "V", "Normal": "XYZ", "Contact": "V", "Displacement": "XYZ"}  # name -> channels, beside Combined
 _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "simplify", "curves_render")
 
@@ -57,9 +58,13 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         for name, channels in PASSES.items():
             self.add_pass(name, len(channels), channels, layer=layer)
         fields = pictures.fields(gel, depsgraph, size)
+        # Raw writes the levels as they are; EXR holds linear light whatever the window shows.
+        raw = scene.view_settings.view_transform == "Raw" and not scene.render.image_settings.file_format.startswith(
+            _EXR
+        )
 
         def show(picture: np.ndarray) -> None:
-            self._show({"Combined": to_linear(picture)} | fields, scene.render, layer)
+            self._show({"Combined": to_linear(picture, raw)} | fields, scene.render, layer)
 
         show(pictures.draw(gel, depsgraph, preset, size, self.test_break, show)[0])
         self.update_progress(1.0)
@@ -91,13 +96,18 @@ def _describe_error(error: Exception) -> str:
     return reports.in_blender(str(error))
 
 
-def to_linear(picture: np.ndarray) -> np.ndarray:
+def to_linear(picture: np.ndarray, raw: bool = False) -> np.ndarray:
     """Convert a picture (H, W, 3) uint8 to Blender's scene-linear float32 (H, W, 4).
 
-    By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again.
+    By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again; raw : as
+    the view transform Raw does, without a curve
     """
     levels = np.arange(256) / 255
-    curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    curve = (
+        levels.astype(np.float32)
+        if raw
+        else np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    )
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
     pixels[..., :3] = curve[picture]
     return pixels

@@ -89,10 +89,11 @@ class TACTILE_OT_set_up_render(TactileOperator):
         right, down = camera.pixel_size
         render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, right / down), max(1.0, down / right)
         render.dither_intensity = 0.0  # noise of a grey level that the camera does not have
-        scene.view_settings.view_transform, scene.view_settings.look = "Standard", "None"
+        scene.view_settings.view_transform, scene.view_settings.look = "Raw", "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
         render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGB"
         scene.camera = digit_body.camera_of(gel)
+        self.report({"INFO"}, "View transform Raw: this engine, Cycles and EEVEE give the camera's own levels")
         pictures.prepare(scene, context.evaluated_depsgraph_get())
 
 
@@ -116,7 +117,15 @@ class TACTILE_PT_render(bpy.types.Panel):
 
 def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the bound on the toolkit's own error, of simulations and pictures."""
-    layout.prop(context.scene.tactile_render, "error", placeholder="50um,0.6levels")
+    scene = context.scene
+    layout.prop(scene.tactile_render, "error", placeholder="50um,0.6levels")
+    try:
+        chosen = render_settings.preset_of(scene) if render_settings.budget_of(scene).levels is not None else ""
+        words, icon = f"Preset chosen: {chosen.title()}", "CHECKMARK"
+    except TactileError as error:
+        chosen, words, icon = "none", reports.in_blender(str(error)), "ERROR"
+    if chosen:
+        layout.label(text=words, icon=icon)
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -124,7 +133,9 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
     settings = context.scene.tactile_render
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")
-    layout.prop(settings, "preset")
+    row = layout.row()
+    row.active = not settings.error
+    row.prop(settings, "preset")
     draw_error(layout, context)
     if settings.preset != "fast" and reports.missing("mitsuba"):
         layout.label(text="mitsuba is missing: see Preferences", icon="ERROR")

@@ -6,6 +6,7 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -39,8 +40,11 @@ def _wanted(part, frame=80):
     return part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
 
 
-def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path):
+@pytest.mark.parametrize("view", ["Raw", "Standard"])
+def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path, view):
     ready.frame_set(80)
+    assert ready.view_settings.view_transform == "Raw"
+    ready.view_settings.view_transform = view
     ready.render.filepath = str(tmp_path / "frame.png")
     bpy.ops.render.render(write_still=True)
     levels = np.rint(255 * _pixels(tmp_path / "frame.png"))
@@ -169,11 +173,12 @@ def test_what_cannot_be_drawn_is_refused(ready, change, words):
 
 def test_what_is_left_out_is_said(ready, part, capfd):
     ready.render.use_motion_blur = ready.camera.data.dof.use_dof = True
+    ready.view_settings.view_transform = "Filmic"
     area = bpy.data.objects.new("softbox", bpy.data.lights.new("softbox", "AREA"))
     ready.collection.objects.link(area)
     bpy.ops.render.render()
     said = capfd.readouterr()
-    for words in ("softbox: no point lamp", "depth of field", "Motion blur"):
+    for words in ("softbox: no point lamp", "depth of field", "Motion blur", "View transform Filmic"):
         assert words in said.out + said.err
 
 
@@ -362,6 +367,21 @@ def test_a_worker_that_aborts_leaves_blender_alive(traced, part):
     tracer._job._process.kill()
     with pytest.raises(part("tactile_core.errors").TactileError, match="ended"):
         draw(heights)
+
+
+def test_the_panel_names_the_preset_that_a_bound_picks(ready, part):
+    said = []
+    layout = SimpleNamespace(prop=lambda *_, **__: None, label=lambda text, icon: said.append((text, icon)))
+    draw, context = part("addon.operators.render_setup").draw_error, SimpleNamespace(scene=ready)
+    draw(layout, context)
+    assert not said
+    for bound in ("1levels", "1e-9levels"):
+        ready.tactile_render.error = bound
+        draw(layout, context)
+    (chosen, ticked), (refused, marked) = said
+    names = [preset.title() for preset in part("tactile_core.pictures.presets").measured()["presets"]]
+    assert chosen.removeprefix("Preset chosen: ") in names and ticked == "CHECKMARK"
+    assert "Largest Error" in refused and marked == "ERROR"
 
 
 def test_a_bound_on_pictures_picks_the_preset(ready, part):
