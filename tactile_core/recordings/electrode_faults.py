@@ -23,6 +23,9 @@ ALIKE = 0.75  # of the electrodes that read the same where a finger does not ans
 FROZEN = 50  # frames, half a second, of noise that stops in all electrodes (assumed)
 SHOWN = 8  # bad places spelled out one by one in the warnings
 MOST_STALE = 0.45  # of the rows; with more, they were recorded faster than the finger answers (assumed)
+# Share of the samples at which a reading that rises falls, or the reverse: .15 and more in 3 real units, .39 simulated
+# with noise, below .02 without (assumed: between)
+TURNS = 0.08
 STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
 # Impedance at rest over a typical unit's, or below it, that no unit's film and fluid give: .9 to 3.3 are seen (assumed)
 STRANGE_REST = 8.0
@@ -65,7 +68,7 @@ def silent(electrodes: np.ndarray) -> np.ndarray:
     change = electrodes[1:] != electrodes[:-1]
     if same.all() or (len(electrodes) >= FROZEN and not change.any()):
         return np.ones(len(electrodes), bool)
-    found = same | _frozen(change & ~same[1:, None])
+    found = same | _frozen(electrodes, change & ~same[1:, None])
     if not found.any():
         return found
     answers = electrodes[~same]
@@ -99,16 +102,19 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
     return list(zip(bounds[::2], bounds[1::2], strict=True))
 
 
-def _frozen(change: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) of long runs without a change (T - 1, e) in any electrode, where most are noisy else."""
+def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Mark the frames (T,) of long runs without a change (T - 1, e) in any electrode, where noise makes some else."""
     still = np.r_[False, ~change.any(axis=1)]
-    long = [(first, last) for first, last in runs(still) if last - first >= FROZEN]
     found = np.zeros(len(still), bool)
-    for first, last in long:
-        found[first:last] = True
-    if not long or found.all() or np.median(change[~found[1:]].mean(axis=0)) < NOISY:
-        return np.zeros(len(still), bool)
-    return found
+    for first, last in runs(still):
+        found[first:last] = last - first >= FROZEN
+    return found if found.any() and _noisy(electrodes[~still]) else np.zeros(len(still), bool)
+
+
+def _noisy(electrodes: np.ndarray) -> bool:
+    """Return whether readings (T, e), none of them like the one before, rise and fall as noise does."""
+    moves = np.diff(electrodes, axis=0)
+    return len(moves) > 1 and bool(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0)) >= TURNS)
 
 
 def mended(
@@ -136,17 +142,23 @@ def mended(
     }  # fmt: skip
 
 
+def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Mark the rows (T,) bool that equal the one before, and return whether noise should keep rows apart.
+
+    electrodes : (T, e) counts. Of a simulation without noise rows at rest are equal, too.
+    """
+    same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
+    return same, bool(same.mean() <= MOST_STALE) and _noisy(electrodes[~same])
+
+
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
     """Mark the frames (T,) bool that repeat the row before them, and those of longer runs, which are held.
 
-    A packet was lost, or the driver stood still, where `STALE` rows and more are equal although most electrodes are
-    noisy. electrodes : (T, e) counts; findings are added to the warnings
+    A packet was lost, or the driver stood still, where `STALE` rows and more are equal although noise should keep them
+    apart. electrodes : (T, e) counts; findings are added to the warnings
     """
-    change = electrodes[1:] != electrodes[:-1]
     found, long = np.zeros((2, len(electrodes)), bool)
-    noisy = len(change) > 0 and np.median(change.mean(axis=0)) >= NOISY
-    same = np.r_[False, ~change.any(axis=1)]
-    noisy &= same.mean() <= MOST_STALE
+    same, noisy = repeats(electrodes)
     again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
     for first, last in again:
         (long if last - first > SHORT else found)[first:last] = True

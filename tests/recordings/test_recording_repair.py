@@ -142,6 +142,7 @@ def test_rows_that_came_again_are_interpolated_and_long_runs_held_and_doubted(fr
     [
         held(noisy(1.2), slice(150, 151)), held(noisy(0.0, size=5.0), slice(150, 160)), noisy(1.2),
         noisy(1.2)[np.arange(400) * 2 // 5],  # recorded two and a half times as fast as the finger answers
+        held(held(noisy(0.0, size=300.0), slice(1, 60)), slice(300, 330)),  # a simulation without noise, at rest
     ],
 )  # fmt: skip
 def test_rows_that_came_twice_and_a_finger_without_noise_are_no_fault(values):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...recordings.answers import prepare
 from ...recordings.doubt import REST, Reason, reason_of
-from ...recordings.electrode_faults import alike, silent
+from ...recordings.electrode_faults import STALE, alike, repeats, silent
 from ...recordings.flags import Flag
 from ...recordings.preparer import DOUBTS
 from ...recordings.quiet import tare_frames, window_frames
@@ -70,11 +70,13 @@ class LiveSignals:
         self._factor = 1.0  # counts a unit of the file
         self.polarity = options.polarity if options.polarity in POLARITIES else FALLS
         self.sure, self.silent = options.polarity in POLARITIES, False
+        self._noisy, self._last = False, np.zeros((0, 0))  # whether noise keeps rows apart; the last rows
         self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
 
     def learn(self, rows: Recording) -> bool:
         """Look at new frames for rest, and for their polarity; returns true once rest is known."""
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
+        self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
             self._seen = seen = self._joined(rows)
             if len(seen) >= self._next_look and not silent(seen.electrodes).all():
@@ -99,7 +101,7 @@ class LiveSignals:
         self._next_look = len(seen) + AGAIN
         if self._known is None:
             unit = full_scale(seen.electrodes)
-            self._factor = unit[0] if unit else 1.0
+            self._factor, self._noisy = unit[0] if unit else 1.0, repeats(seen.electrodes)[1]
         signals = prepare(seen, dataclasses.replace(self._options, counts_per_unit=self._factor))
         of_unit = Reason.REST_OF_UNIT in map(reason_of, signals.warnings) or self._options.tare is not None
         if self._known is None and (len(seen) == self._most or signals.quiet.any() or of_unit):
@@ -110,6 +112,11 @@ class LiveSignals:
                 self._rest_pdc = np.median(rest) if len(rest) else np.nan
         self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
         self.sure = self._options.polarity in POLARITIES or not signals.flags[0] & DOUBTS
+
+    @property
+    def held(self) -> bool:
+        """Whether the last `STALE` rows are equal although noise should keep them apart: a driver stands still."""
+        return self._noisy and self.known.kind == "raw" and repeats(self._last)[0].sum() == STALE - 1
 
     @property
     def known(self) -> Signals:
@@ -127,6 +134,7 @@ class LiveSignals:
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)
         flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
+        flags[-1] |= np.uint16(Flag.DEAD_CHANNEL if self.held else 0)
         electrodes = electrodes * self._factor
         change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
         pdc = self._pdc_factor * pdc - self._rest_pdc

@@ -19,6 +19,7 @@ from tactile_core.jobs.live import playback
 from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.electrode_gains import ElectrodeGains, SensorFile
+from tactile_core.recordings.flags import Flag
 
 
 def rows_of(electrodes: np.ndarray, pdc: np.ndarray | None = None) -> recordings.Recording:
@@ -119,6 +120,18 @@ def test_live_signals_are_those_of_the_whole_recording(slide_csv):
     change = signals.signals(recording.electrodes, np.full(len(recording), np.nan)).change
     # Rest from 30 frames with noise of 1 count has an error of 0.2; the whole recording's quiet part is longer.
     np.testing.assert_allclose(change, recordings.prepare(recording).change, atol=1.0)
+
+
+def test_rows_that_come_again_are_flagged_where_noise_keeps_others_apart():
+    random, nothing = np.random.default_rng(0), np.full(1, np.nan)
+    for noise in (1.2, 0.0):
+        frames = np.rint(3300 + noise * random.standard_normal((120, 19)))
+        frames[100:] = frames[99]
+        signals, flagged = live.LiveSignals(), []
+        for i in range(0, 120, 2):
+            if signals.learn(rows_of(frames[i : i + 2])):
+                flagged.append(bool(signals.signals(frames[[i + 1]], nothing).flags[0] & Flag.DEAD_CHANNEL))
+        assert sum(flagged) == (10 if noise else 0) and all(flagged[-10:]) == (noise > 0)
 
 
 def test_without_a_quiet_part_rest_is_guessed_in_the_end():
