@@ -14,7 +14,6 @@ Stop it at any time: what the finite-strain tiers solved stays in DIR and is not
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 import tempfile
@@ -26,7 +25,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-from benchmarks.measured_rows import read_table
+from benchmarks.measured_rows import parser_of, read_table
 from benchmarks.mechanics import tiers
 from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved, write_truth
 from benchmarks.mechanics.random_contacts import RandomContact
@@ -55,10 +54,9 @@ SAYS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Solve by each tier, compare and write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--work", type=Path, metavar="DIR", help="where contacts that were solved are kept")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} random contacts, few test contacts")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the table here too")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as scratch:
         work = options.work or Path(scratch)

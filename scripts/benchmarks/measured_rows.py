@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import concurrent.futures
 import csv
 import io
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from tactile_core.accuracy import HEADER, Row, failed, line
-from tactile_core.files import atomic
+from tactile_core.files import atomic, threads
 
 COLUMNS = ("name", "value", "unit", "target", "baseline", "set", "ok")
 
@@ -32,6 +33,13 @@ def printed(rows: Iterable[Row]) -> list[Row]:
         found.append(each)
         print(line(each), flush=True)
     return found
+
+
+def in_processes(work: Callable[[Any], str], jobs: Sequence[Any], count: int) -> None:
+    """Do jobs in ``count`` processes of one thread each, and print the line that ends each."""
+    with threads.one_thread(), concurrent.futures.ProcessPoolExecutor(count) as pool:
+        for done, line_of in enumerate(pool.map(work, jobs), 1):
+            print(f"{done}/{len(jobs)} {line_of}", flush=True)
 
 
 def write_table(path: Path, parts: dict[str, list[Row]]) -> None:

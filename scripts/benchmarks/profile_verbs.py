@@ -27,11 +27,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is 
 from benchmarks.measured_rows import finished, parser_of, printed
 from tactile_core import recordings
 from tactile_core.accuracy import Row, row
+from tactile_core.files import threads
 from tactile_core.recordings import Truth, write_simulated
 
 ROOT = Path(__file__).resolve().parents[2]
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
-ONE_CORE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 LONG = 700  # frames of the long recording
 HEAVY = (
     "numpy", "scipy", "h5py", "PIL", "matplotlib", "tqdm", "msgspec", "torch", "mitsuba", "drjit", "OpenEXR", "trimesh",
@@ -157,7 +157,7 @@ def run(case: Case, folder: Path) -> Cost:
     began = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-X", "importtime", "-c", CHILD, str(file), *words], capture_output=True, text=True,
-        env={**os.environ, **ONE_CORE, "PYTHONPATH": str(ROOT)}, cwd=ROOT, timeout=300,
+        env={**os.environ, **threads.ONE, "PYTHONPATH": str(ROOT)}, cwd=ROOT, timeout=300,
     )  # fmt: skip
     wall = time.perf_counter() - began
     if not file.exists():

@@ -10,9 +10,7 @@ presses. All presses are solved without friction, the first ones with friction t
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
 import logging
-import os
 import pathlib
 import sys
 
@@ -22,6 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 
 from benchmarks.make import learn_correction  # noqa: E402
+from benchmarks.measured_rows import in_processes, parser_of  # noqa: E402
 from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
 from tactile_core.files import atomic  # noqa: E402
 from tactile_core.mechanics.fast import correction  # noqa: E402
@@ -81,25 +80,21 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
 
 def main() -> int:
     """Solve the presses, learn the correction, write and report it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--presses", type=int, default=155, help="presses a sensor, three contacts each (155)")
     parser.add_argument("--rubbing", type=int, default=49, help="of them also with friction (49)")
     parser.add_argument("--seed", type=int, default=0, help="of the presses (0)")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
-    parser.add_argument("--json", type=pathlib.Path, help="write the rows of errors here")
     arguments = parser.parse_args()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     arguments.work.mkdir(parents=True, exist_ok=True)
-    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
     jobs = [
         (arguments.work, sensor, arguments.seed, number, friction)
         for number, friction in wanted_contacts(arguments)
         for sensor in SENSORS
     ]
-    with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
-        for done, line in enumerate(pool.map(solve_one, jobs), 1):
-            print(f"{done}/{len(jobs)} {line}", flush=True)
+    in_processes(solve_one, jobs, arguments.workers)
     rows = learn_all(arguments)
     for row in rows:
         print(f"{row['name']}: {row['value']:.3g} {row['unit']} (uncorrected {row['baseline']:.3g}), {row['set']}")

@@ -11,8 +11,6 @@ The set that ships has the presses 0 to 129, of which 11 found no contact.
 from __future__ import annotations
 
 import argparse
-import concurrent.futures
-import os
 import pathlib
 import sys
 import tempfile
@@ -24,6 +22,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
 SCENE = ROOT / "scenes" / "training"
 
 from benchmarks.make import full_pairs  # noqa: E402
+from benchmarks.measured_rows import in_processes  # noqa: E402
 from tactile_core.files import array_pack, atomic  # noqa: E402
 from tactile_core.simulation import pairs_writer  # noqa: E402
 from tactile_core.simulation.pairs_writer import Made, card, card_path  # noqa: E402
@@ -105,11 +104,8 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
     arguments = parser.parse_args()
     arguments.work.mkdir(parents=True, exist_ok=True)
-    os.environ.update(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1")
     jobs = [(arguments.work, arguments.seed, number) for number in arguments.presses]
-    with concurrent.futures.ProcessPoolExecutor(arguments.workers) as pool:
-        for done, line in enumerate(pool.map(solve_one, jobs), 1):
-            print(f"{done}/{len(jobs)} {line}", flush=True)
+    in_processes(solve_one, jobs, arguments.workers)
     record = merge(arguments.work, arguments.seed, arguments.out)
     contacts = f"{record['contacts']} of {record['contacts_wanted']} contacts"
     print(f"{arguments.out}: {contacts}, {record['presses_solved']} presses")

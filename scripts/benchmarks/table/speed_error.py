@@ -18,21 +18,16 @@ import argparse
 import concurrent.futures
 import importlib
 import multiprocessing
-import os
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-for _threads in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ[_threads] = "1"  # of this process and of those it starts: times are of one core
-
-from benchmarks.table.method import Method  # noqa: E402
-from tactile_core.accuracy import HEADER, failed, line  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.files import atomic  # noqa: E402
+from benchmarks.measured_rows import finished, parser_of, printed
+from benchmarks.table.method import ROOT, Method
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic, threads
 
 STAGES = ("mechanics", "translation", "pictures", "chain", "photographs")
 WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
@@ -41,15 +36,15 @@ LEAVE_TRUTH = ("pictures", "chain")  # whose first method leaves the truth that 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results; returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = parser_of(__doc__)
     parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
     parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")
     parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
     options = parser.parse_args(arguments)
     unknown = [each for each in options.only if each.split(" ")[0] not in STAGES]
     if unknown:
         parser.error(f"--only: no stage {', '.join(unknown)}; there are {', '.join(STAGES)}")
+    threads.one_thread()  # here and in the processes that this starts: times are of one core
     missing: dict[str, str] = {}
     try:
         methods = list(all_measured(options, missing))
@@ -62,19 +57,15 @@ def main(arguments: list[str] | None = None) -> int:
     except TactileError as error:
         print(error, file=sys.stderr)
         return 2
-    print("\n".join([HEADER, *map(line, rows)]))
+    printed(rows)
     for name, why in missing.items():
         print(f"left out: {name}, {why}", file=sys.stderr)
-    if options.json:
-        atomic.write_json(options.json, rows)
     if not (options.quick or options.only):
         from benchmarks.table.benchmark_page import write_report
 
         write_report(ROOT / "docs", methods, rows, missing, tables)
         atomic.write_bytes(ROOT / "docs" / "promised.png", picture)
-    for each in failed(rows):
-        print(f"MISSED: {each['name']} = {each['value']}, right is 0.9 to 0.98", file=sys.stderr)
-    return int(bool(failed(rows)))
+    return finished(rows, options.json)
 
 
 def stage_measured(
