@@ -19,7 +19,8 @@ from ..recordings import flags
 from ..sensors import SOURCE, title
 from ..sensors.camera import Camera
 from ..translation.card import doubt
-from ..translation.trust_words import LOW_CONFIDENCE, SENTENCES
+from ..translation.simulated_likeness import contradicted
+from ..translation.trust_words import DENIED, LOW_CONFIDENCE, SENTENCES
 from .frame_pass import FramePass, Tools
 from .frames_file import described
 from .sampling_error import depth_share
@@ -49,6 +50,7 @@ class ConversionReport:
         self.share = 0.0
         self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
+        self._denied = 0  # frames that are unexplained because PDC shows another pressure
         self._explained: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
         change, at = rows.signals.change, rows.at(frames)
@@ -63,6 +65,9 @@ class ConversionReport:
         touching = np.isfinite(arrays["contact_center"][:, 0])
         self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
         self._pressure.append(arrays["pressure"])
+        measured = self._rows.read(frames)[1].pressure_measured
+        denied = contradicted(arrays["pressure"], measured) & (arrays["flags"] & flags.Flag.UNEXPLAINED > 0)
+        self._denied += int(np.count_nonzero(denied))
         self._explained.append(arrays["explained"])
         self.share = max(self.share, depth_share(arrays["displacement_digit"], self._tools.drawer.target))
         if "traction_force" in arrays:
@@ -85,9 +90,10 @@ class ConversionReport:
         found += drawer.describe_gel()
         for flag, words in SENTENCES.items():
             name = str(flag.name).lower()
-            if self.flagged[name]:
-                meaning = described(words, self._tools.pair)
-                found.append(f"{self.flagged[name]} of {len(self._frames)} frames: {meaning} (flag {name})")
+            denied = self._denied if flag is flags.Flag.UNEXPLAINED else 0
+            for count, meaning in ((self.flagged[name] - denied, described(words, self._tools.pair)), (denied, DENIED)):
+                if count:
+                    found.append(f"{count} of {len(self._frames)} frames: {meaning} (flag {name})")
         if self._made.folded:
             found.append(f"{self._made.folded} frames: the translated gel folds over itself; heights there are guesses")
         return tuple(found)

@@ -17,6 +17,7 @@ from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile
 from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
 from ..recordings.recording import FINGERS, short_of, split
+from ..recordings.tables.column_map import ColumnMap
 from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
 from ..recordings.unit.gain_matching import PRIOR, Match, match
@@ -24,7 +25,7 @@ from ..sensors import title, typical_rest
 from . import networks, reference_signals
 from .card import REST
 from .reference_signals import ReferenceSignals
-from .unit_rest import Simulated, UnitRest, find_rest, find_rest_sp
+from .unit_rest import Simulated, UnitRest, find_rest, find_rest_sp, read_rest
 from .weights import read_card
 
 FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
@@ -93,11 +94,11 @@ def adapt(
 
 def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
-    rest: UnitRest | None = None,
+    untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
     """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; with warnings.
 
-    rest : of the unit, where there is one and it is known
+    untouched : recording of the unit's rest, where there is one unit of a sensor whose typical rest is known
     Raises TactileError like `adapt`, and for files of hands and of single fingers together.
     """
     columns = None if options is None else options.columns
@@ -106,8 +107,7 @@ def adapt_hand(
     if len(found) > 1:
         raise TactileError(paths[0], f"recordings of {' and '.join(sorted(found))} together", "one sensor")
     units, sensor = _units(every), found.pop()
-    if rest is not None and len(units) > 1:
-        raise TactileError("--rest", f"given for {len(units)} units", "one", "Adapt to each finger by itself: FILE#0")
+    rest = None if untouched is None else _given_rest(untouched, len(units), sensor, columns)
     if typical_rest(sensor) is None:
         rests = {unit: _rest_of_files(files, sensor) for unit, files in units.items()}
         return units_file(rests, sensor), (
@@ -120,6 +120,20 @@ def adapt_hand(
         fitted[unit] = done.sensor
         warnings += [text if unit == "unit" else f"{unit}: {text}" for text in done.warnings]
     return units_file(fitted), tuple(warnings)
+
+
+def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | None) -> UnitRest:
+    """Read the rest of a unit; raises TactileError for several units, and where it is no use to the sensor."""
+    if units > 1:
+        raise TactileError("--rest", f"given for {units} units", "one", "Adapt to each finger by itself: FILE#0")
+    if typical_rest(sensor) is None:
+        advice = f"Leave --rest out: recordings of contacts give a {title(sensor)}'s rest"
+        raise TactileError("--rest", f"given for a {title(sensor)}", "a sensor whose typical rest is known", advice)
+    of = sensor_of(untouched, columns)
+    if of != sensor:
+        advice = "Give an untouched recording of the same unit"
+        raise TactileError(untouched, f"a recording of a {title(of)}", f"of a {title(sensor)}, as the others", advice)
+    return read_rest(untouched, columns)
 
 
 def _units(every: Sequence[str]) -> dict[str, list[str]]:

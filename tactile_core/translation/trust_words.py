@@ -41,9 +41,10 @@ SENTENCES = {
     Flag.BEYOND_PICTURE: "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
     Flag.UNDECIDED_PLACE: "by its own signals the contact may as well lie elsewhere",
     Flag.TWO_CONTACTS: "the signals look like two contacts at once; the translation shows one",
-    Flag.UNEXPLAINED: "the signals resemble no contact's, or PDC shows another pressure: drift, or rest under load",
+    Flag.UNEXPLAINED: "the signals resemble no contact's, or conductivity's more: drift, or rest under load",
     Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
+DENIED = "PDC shows another pressure than that of the contact: drift, rest under load, or PDC of another sensor"
 
 
 def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: float = 0.0) -> bool:

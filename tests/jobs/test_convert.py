@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -183,6 +184,18 @@ def test_flags_of_recording_and_translation_meet_and_are_told(run, slide_csv):
     assert beyond == note["flagged_frames"]["out_of_range"] > 0
     assert any("line 32, ele5" in warning for warning in note["warnings"])
     assert any(f"{beyond} of {FRAMES} frames" in warning for warning in note["warnings"])
+
+
+@pytest.mark.parametrize("denied", [False, True])
+def test_frames_that_the_fluid_s_pressure_denies_say_so(denied, request, tmp_path, no_sheet):
+    path = shutil.copy(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5", tmp_path / "touch.h5")
+    with h5py.File(path, "r+") as file:
+        if denied:
+            file["pdc"][...] = 80 + np.arange(len(file["pdc"])) % 2
+    tools = convert.load_tools(convert.ToolOptions())
+    folder = converted(str(path), tmp_path / "out", tools, frames=slice(100, 120), keep=())
+    said = [text for text in json.loads((folder / "note.json").read_text())["warnings"] if "unexplained" in text]
+    assert [text.split(": ")[1] for text in said] == ["PDC shows another pressure than that of the contact"] * denied
 
 
 def test_overwrite_replaces_the_whole_result(run, slide_csv):

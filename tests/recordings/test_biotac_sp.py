@@ -171,6 +171,12 @@ def test_a_rest_serves_its_own_sensor_alone(counts, write, tmp_path, press, in_l
     assert "24 electrodes, 'biotac_sp'; expected one of 19" in capsys.readouterr().err
     assert main(["adapt", path, touch, "--out", str(tmp_path / "both.toml")]) == 2
     assert "biotac and biotac_sp together" in capsys.readouterr().err
+    assert main(["adapt", path, "--rest", path, "--out", str(tmp_path / "given.toml")]) == 2
+    assert "--rest: given for 3 units; expected one" in capsys.readouterr().err
+    assert main(["adapt", f"{path}#0", "--rest", path, "--out", str(tmp_path / "given.toml")]) == 2
+    assert "Leave --rest out: recordings of contacts give a BioTac SP's rest" in capsys.readouterr().err
+    assert main(["adapt", touch, "--rest", f"{path}#0", "--out", str(tmp_path / "given.toml")]) == 2
+    assert "a recording of a BioTac SP; expected of a BioTac, as the others" in capsys.readouterr().err
     text = (tmp_path / "rest.toml").read_text()
     (tmp_path / "other.toml").write_text(text.replace('sensor = "biotac_sp"\n', ""))
     with pytest.raises(TactileError, match=r"finger0\.gain: 24 numbers; expected 19"):

@@ -55,14 +55,13 @@ def run(options: argparse.Namespace) -> int:
     """Fit and write the gains; returns the exit status."""
     from ...files import atomic
     from ...recordings import PrepareOptions, electrode_gains
-    from ...translation import adapt, force_scale, networks, reference_signals, unit_rest
+    from ...translation import adapt, force_scale, networks, reference_signals
     from ...translation.translate import load_translator
 
     atomic.claim(options.out)
     typical = reference_signals.read(options.weights or networks.WEIGHTS_FOLDER)
     prepare = PrepareOptions(polarity=options.polarity, columns=columns_of(options))
-    rest = None if options.rest is None else unit_rest.read_rest(options.rest, prepare.columns)
-    sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare, rest)
+    sensor, warnings = adapt.adapt_hand(options.recordings, typical, prepare, options.rest)
     for warning in warnings:
         say(f"warning: {warning}")
     if options.force is not None:
