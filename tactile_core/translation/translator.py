@@ -181,10 +181,8 @@ class Translator:
             state = evidence.average if self.answer.kind == MEAN else evidence.likely
         latent_source, latent_target = nets.latents(latent_signal, state, unsigned)
         touched = touches(state)
-        skin, gel = (
-            decode(latent) * touched[:, None, None]
-            for decode, latent in ((nets.decode_source, latent_source), (nets.decode_target, latent_target))
-        )
+        skin = nets.decode_source(latent_source) * touched[:, None, None]
+        gel = nets.decode_target(latent_target) * touched[:, None, None]
         gel = gel if self._shift is None else self._shift(gel)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
         least = self.silent("digit_m") if alone else STILL
