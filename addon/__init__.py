@@ -19,7 +19,6 @@ from .operators import (
     set_style,
     simulate,
     snap_to_gel,
-    stale_picture,
     translate_imported,
     view,
 )
@@ -37,7 +36,6 @@ PARTS = (
     translate_imported,
     set_style,
     preview,
-    stale_picture,
     render_engine,
     render_setup,
     calibration_objects,

@@ -15,9 +15,11 @@ from ...tactile_core.translation import gel_place
 from ..objects import axes, digit_objects, digit_unit, frame_attribute, images
 from ..process import tracer_process
 from ..settings import properties, render_settings, reports
-from . import stale_picture, view
+from . import view
 
 FAST = "fast"
+_STILL = 1e-7  # m, of displacements that are read back from float32 coordinates
+_drawn: tuple[str, np.ndarray, str] | None = None  # of what the picture was drawn last: the gel's name, and its state
 _renderers: dict[str, Renderer] = {}  # one at most: the frames of an animation share it
 
 
@@ -112,5 +114,34 @@ def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> 
     """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
     picture, heights = draw(gel, depsgraph, preset)
     images.show_heights(gel, heights)
-    stale_picture.remember(gel, depsgraph)
+    global _drawn
+    _drawn = (gel.name, *_state(gel, depsgraph))
     return images.show_picture(gel, picture)
+
+
+def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.ndarray, str]:
+    """What a picture is drawn of: the gel's displacement (n, 3) m, and the unit that the scene shows."""
+    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel))
+    shown = digit_unit.shown_unit(gel, depsgraph, unit)
+    return digit_objects.displacement_of(gel, depsgraph), repr(shown.unit)
+
+
+def is_stale(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    """Return whether the scene shows something else than the picture was drawn of. Raises as ``draw`` does."""
+    if _drawn is None or _drawn[0] != gel.name:
+        return True
+    moved, unit = _state(gel, depsgraph)
+    other = moved.shape != _drawn[1].shape  # a gel of another sensor
+    return other or unit != _drawn[2] or bool(np.abs(moved - _drawn[1]).max() > _STILL)
+
+
+def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the gel whose picture was drawn last, else the one that is meant."""
+    last = None if _drawn is None else scene.objects.get(_drawn[0])
+    return last if last is not None and last.tactile.role == "DIGIT" else properties.gel_of(scene)
+
+
+def forget() -> None:
+    """Take the picture to be of nothing that is known: another file is open."""
+    global _drawn
+    _drawn = None

@@ -1,6 +1,7 @@
-"""The live picture: while its toggle is on, each change of frame, LED, coating, camera or gel draws it again."""
+"""The gel's picture follows the scene: each change of frame, dent, LED, coating or camera draws it again, fast.
 
-from collections.abc import Callable
+While Live Picture is on, by the scene's preset, and without a window too.
+"""
 
 import bpy
 from bpy.app.handlers import persistent
@@ -10,15 +11,17 @@ from ..objects import images
 from ..process import tracer_process
 from ..settings import properties, render_settings, reports
 from ..settings.reports import TactileOperator
-from . import pictures, stale_picture, view
+from . import pictures, view
 
+SEEN = (bpy.types.Object, bpy.types.Light, bpy.types.Camera, bpy.types.Material, bpy.types.ShaderNodeTree)
+_live = False  # whether the toggle is on
 _drawing = False  # a picture's own update must not draw another
 _failed = ""  # why the last frame could not be drawn; shown in the panel
 
 
 def is_on() -> bool:
-    """Return true if the frame handler exists."""
-    return _draw in bpy.app.handlers.frame_change_post
+    """Return true while the toggle is on."""
+    return _live
 
 
 def failure() -> str:
@@ -26,34 +29,50 @@ def failure() -> str:
     return _failed
 
 
-@persistent
-def _draw(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Called at each change of the frame."""
+def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Draw the picture again where the scene shows something else than it was drawn of."""
     global _failed, _drawing
-    gel = stale_picture.shown_gel(scene)
-    if gel is None or depsgraph is None or _drawing:
+    gel = pictures.shown_gel(scene)
+    if gel is None or _drawing or not (_live or images.picture_of(gel)):
         return
     _drawing = True
     try:
-        pictures.show(gel, depsgraph, render_settings.preset_of(scene))
+        if _live:
+            pictures.show(gel, depsgraph, render_settings.preset_of(scene))
+        elif pictures.is_stale(gel, depsgraph):
+            pictures.update(gel, depsgraph)
         _failed = ""
     except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
         _failed = reports.in_blender(str(error))
-        stale_picture.check(scene, depsgraph)
     finally:
         _drawing = False
 
 
 @persistent
-def _draw_changes(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
+    """Called at each change of the frame."""
+    seen = _live or not (bpy.app.background or bpy.app.is_job_running("RENDER"))
+    if depsgraph is not None and seen:
+        follow(scene, depsgraph)
+
+
+@persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Called at each change of the scene: one of what the picture shows draws it again."""
-    if any(isinstance(update.id, stale_picture.SEEN) for update in depsgraph.updates):
-        _draw(scene, depsgraph)
+    if any(isinstance(update.id, SEEN) for update in depsgraph.updates):
+        _frame_changed(scene, depsgraph)
+
+
+@persistent
+def _opened(*_: object) -> None:
+    """Called when another file is open, whose picture may be of another frame than it opens on."""
+    pictures.forget()
+    _frame_changed(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
 
 
 @persistent
 def _end(*_: object) -> None:
-    """End the picture and its worker before another file is opened; called by Blender."""
+    """End the toggle and its worker before another file is opened; called by Blender."""
     switch_off()
 
 
@@ -64,17 +83,10 @@ def _keep_images(*_: object) -> None:
 
 
 def switch_off() -> None:
-    """Remove the handlers, and end the worker."""
-    stale_picture.leave_to_live_picture(False)
-    for handlers, function in _handlers():
-        if function in handlers:
-            handlers.remove(function)
+    """End the toggle, and the worker."""
+    global _live
+    _live = False
     tracer_process.close_all()
-
-
-def _handlers() -> list[tuple[list, Callable]]:
-    known = bpy.app.handlers
-    return [(known.frame_change_post, _draw), (known.depsgraph_update_post, _draw_changes), (known.load_pre, _end)]
 
 
 class TACTILE_OT_live_picture(TactileOperator):
@@ -91,14 +103,13 @@ class TACTILE_OT_live_picture(TactileOperator):
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
+        global _live
         if is_on():
             switch_off()
             return
         gel = properties.gel_of(context.scene, context.object)
         image = pictures.update(gel, context.evaluated_depsgraph_get())
-        for handlers, function in _handlers():
-            handlers.append(function)
-        stale_picture.leave_to_live_picture(True)
+        _live = True
         view.show_picture(context, image)
 
 
@@ -108,4 +119,8 @@ def unregister() -> None:
 
 
 CLASSES = (TACTILE_OT_live_picture,)
-HANDLERS = ((bpy.app.handlers.save_pre, _keep_images),)
+HANDLERS = (
+    (bpy.app.handlers.save_pre, _keep_images), (bpy.app.handlers.load_pre, _end),
+    (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.frame_change_post, _frame_changed),
+    (bpy.app.handlers.depsgraph_update_post, _changed),
+)  # fmt: skip

@@ -45,7 +45,9 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         except tracer_process.Stopped:
             tracer_process.close_all()
         except Exception as error:  # whatever it was: Blender shows in the log alone what a render raises
-            self.report({"ERROR"}, _describe_error(error))
+            words = _describe_error(error)
+            self.error_set(words)  # stands over the empty picture; the report ends an animation
+            self.report({"ERROR"}, words)
 
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval.name

@@ -8,7 +8,7 @@ import bpy
 
 from ...tactile_core.translation import trust_words
 from ..objects import style_nodes, styles
-from ..operators import preview, render_setup, snap_to_gel, stale_picture, view
+from ..operators import preview, render_setup, snap_to_gel, view
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
 from ..operators.render_setup import draw_parts, draw_settings
@@ -113,8 +113,6 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         layout = self.layout
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
-        if stale_picture.is_stale():
-            layout.label(text="The picture is out of date", icon="INFO")
         if preview.failure():
             layout.label(text=preview.failure(), icon="ERROR")
         draw_settings(layout, context)

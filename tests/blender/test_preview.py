@@ -1,0 +1,61 @@
+"""The picture follows the scene, in place of one of another moment."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def follow(imported, part):
+    """``follow(frame)``: what a window's handlers do, and the picture (H W, 3) as it is then seen."""
+    imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    preview = part("addon.operators.preview")
+
+    def look(frame=None):
+        if frame is not None:
+            bpy.context.scene.frame_set(frame)
+        preview.follow(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
+        return np.array(bpy.data.images["DIGIT picture"].pixels[:]).reshape(-1, 4)[:, :3]
+
+    return look
+
+
+def test_another_frame_draws_its_own_picture(follow, part):
+    first = bpy.context.scene.frame_current
+    pressed, resting = follow(), follow(70)
+    gel, depsgraph = bpy.context.scene.objects["DIGIT gel"], bpy.context.evaluated_depsgraph_get()
+    wanted = part("addon.operators.pictures").draw(gel, depsgraph, "fast")[0][::-1].reshape(-1, 3) / 255
+    np.testing.assert_allclose(resting, wanted, atol=1e-6)
+    assert np.abs(pressed - resting).max() > 0.05  # ten levels
+    np.testing.assert_array_equal(follow(first), pressed)
+
+
+def test_what_did_not_change_is_not_drawn_again(follow, part, monkeypatch):
+    follow()
+    monkeypatch.setattr(part("addon.operators.pictures"), "draw", None)
+    bpy.data.objects["E1"].location.x += 1
+    follow()
+    assert not part("addon.operators.preview").failure()
+
+
+def test_a_changed_lamp_draws_and_one_that_cannot_be_says_so(follow, part):
+    bright = follow()
+    bpy.data.lights["LED red"].energy *= 0.5
+    assert follow().mean() < 0.95 * bright.mean()
+    bpy.data.objects["LED red"].location.z += 100
+    follow()
+    assert "LED red" in part("addon.operators.preview").failure()
+
+
+def test_an_opened_file_draws_the_frame_it_opens_on(follow, tmp_path):
+    pressed = follow()
+    first = bpy.context.scene.frame_current
+    bpy.context.scene.frame_set(70)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "touch.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "touch.blend"))
+    resting = follow()
+    assert np.abs(pressed - resting).max() > 0.05  # ten levels
+    np.testing.assert_allclose(follow(first), pressed, atol=1 / 255)
