@@ -19,7 +19,7 @@ from . import view
 
 FAST = "fast"
 _STILL = 1e-7  # m, of displacements that are read back from float32 coordinates
-_drawn: tuple[str, np.ndarray, str] | None = None  # of what the picture was drawn last: the gel's name, and its state
+_drawn: tuple[str, np.ndarray, str] | None = None  # what the picture shows: the gel's name, its displacement, its unit
 _renderers: dict[str, Renderer] = {}  # one at most: the frames of an animation share it
 
 
@@ -46,9 +46,22 @@ def draw(
     up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` where
     stopped() is true.
     """
+    return _drawn_of(*_shown_state(gel, depsgraph, size), preset, stopped, better)
+
+
+def _shown_state(
+    gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int] | None = None
+) -> tuple[digit_unit.ShownUnit, np.ndarray]:
+    """Return what a picture is drawn of: the unit that the scene shows, and the gel's displacement (n, 3) m."""
     unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
-    shown = digit_unit.shown_unit(gel, depsgraph, unit)
-    heights = height_map.height_map(digit_objects.displacement_of(gel, depsgraph), shown.unit.camera)
+    return digit_unit.shown_unit(gel, depsgraph, unit), digit_objects.displacement_of(gel, depsgraph)
+
+
+def _drawn_of(
+    shown: digit_unit.ShownUnit, moved: np.ndarray, preset: str, stopped: Callable[[], bool] = lambda: False,
+    better: Callable[[np.ndarray], None] = lambda picture: None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    heights = height_map.height_map(moved, shown.unit.camera)
     if preset == FAST:
         return renderer_of(shown.unit)(heights), heights
     reports.require("mitsuba")
@@ -62,9 +75,8 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 
     And Contact, the share that is touched. Vectors are in the gel object's axes. Raises as ``draw`` does.
     """
-    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
-    unit = digit_unit.shown_unit(gel, depsgraph, unit).unit
-    moved = digit_objects.displacement_of(gel, depsgraph)
+    shown, moved = _shown_state(gel, depsgraph, size)
+    unit = shown.unit
     heights = height_map.height_map(moved, unit.camera)
     known = gel.evaluated_get(depsgraph).data.attributes.get(frame_attribute.PATCH)
     touched = np.empty(len(moved), np.float32)
@@ -97,9 +109,26 @@ def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
         return
 
 
-def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Image:
-    """Draw fast picture and height map of the current frame into their datablocks; returns the picture's."""
-    return show(gel, depsgraph, FAST)
+def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str = FAST) -> bpy.types.Image:
+    """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
+    return _show(gel, *_shown_state(gel, depsgraph), preset)
+
+
+def follow(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Draw the fast picture where the scene shows something else than it was drawn of. Raises as ``draw`` does."""
+    shown, moved = _shown_state(gel, depsgraph)
+    known = _drawn is not None and (_drawn[0], _drawn[2]) == (gel.name, repr(shown.unit))
+    if known and moved.shape == _drawn[1].shape and np.abs(moved - _drawn[1]).max() <= _STILL:
+        return
+    _show(gel, shown, moved, FAST)
+
+
+def _show(gel: bpy.types.Object, shown: digit_unit.ShownUnit, moved: np.ndarray, preset: str) -> bpy.types.Image:
+    global _drawn
+    picture, heights = _drawn_of(shown, moved, preset)
+    images.show_heights(gel, heights)
+    _drawn = gel.name, moved, repr(shown.unit)
+    return images.show_picture(gel, picture)
 
 
 def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: bpy.types.Object) -> None:
@@ -108,31 +137,6 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
         view.show_picture(context, update(gel, context.evaluated_depsgraph_get()))
     except (TactileError, OSError) as error:
         operator.report({"WARNING"}, reports.in_blender(str(error)))
-
-
-def show(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str) -> bpy.types.Image:
-    """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
-    picture, heights = draw(gel, depsgraph, preset)
-    images.show_heights(gel, heights)
-    global _drawn
-    _drawn = (gel.name, *_state(gel, depsgraph))
-    return images.show_picture(gel, picture)
-
-
-def _state(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[np.ndarray, str]:
-    """What a picture is drawn of: the gel's displacement (n, 3) m, and the unit that the scene shows."""
-    unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel))
-    shown = digit_unit.shown_unit(gel, depsgraph, unit)
-    return digit_objects.displacement_of(gel, depsgraph), repr(shown.unit)
-
-
-def is_stale(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-    """Return whether the scene shows something else than the picture was drawn of. Raises as ``draw`` does."""
-    if _drawn is None or _drawn[0] != gel.name:
-        return True
-    moved, unit = _state(gel, depsgraph)
-    other = moved.shape != _drawn[1].shape  # a gel of another sensor
-    return other or unit != _drawn[2] or bool(np.abs(moved - _drawn[1]).max() > _STILL)
 
 
 def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:

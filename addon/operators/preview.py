@@ -38,9 +38,9 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     _drawing = True
     try:
         if _live:
-            pictures.show(gel, depsgraph, render_settings.preset_of(scene))
-        elif pictures.is_stale(gel, depsgraph):
-            pictures.update(gel, depsgraph)
+            pictures.update(gel, depsgraph, render_settings.preset_of(scene))
+        else:
+            pictures.follow(gel, depsgraph)
         _failed = ""
     except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
         _failed = reports.in_blender(str(error))

@@ -35,7 +35,7 @@ def test_another_frame_draws_its_own_picture(follow, part):
 
 def test_what_did_not_change_is_not_drawn_again(follow, part, monkeypatch):
     follow()
-    monkeypatch.setattr(part("addon.operators.pictures"), "draw", None)
+    monkeypatch.setattr(part("addon.operators.pictures"), "_drawn_of", None)
     bpy.data.objects["E1"].location.x += 1
     follow()
     assert not part("addon.operators.preview").failure()
