@@ -108,6 +108,8 @@ def left_out(scene: bpy.types.Scene) -> list[str]:
         found.append(f"{camera.name}: depth of field is left out")
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
     view = scene.view_settings.view_transform
+    if view == "Raw" and scene.render.image_settings.file_format.startswith("OPEN_EXR"):
+        found.append("EXR holds linear light: the view transform Standard shows it as the picture is")
     return found + [f"View transform {view} changes the levels; Set Up Render sets Raw"] * (view not in _VIEWS)
 
 

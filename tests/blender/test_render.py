@@ -182,6 +182,14 @@ def test_what_is_left_out_is_said(ready, part, capfd):
         assert words in said.out + said.err
 
 
+def test_exr_by_raw_says_how_to_look_at_it(ready, part):
+    left_out = part("addon.objects.digit_unit").left_out
+    assert left_out(ready) == []
+    ready.render.image_settings.file_format = "OPEN_EXR"
+    (words,) = left_out(ready)
+    assert "view transform Standard" in words
+
+
 def test_a_fault_of_our_own_ends_the_render_too(ready, part, monkeypatch, tmp_path):
     monkeypatch.setattr(part("addon.operators.pictures"), "fields", lambda *_: 1 / 0)
     ready.render.filepath = str(tmp_path / "images") + "/"
