@@ -48,7 +48,7 @@ LEFT = 0.25
 FAINT = 8.0
 # Most of the estimated pressure over the fluid's own, and of that over it: .24 to 1.7 on real grips and slides.
 # FELT : Pa, some 4 counts of PDC, its noise (assumed).
-MOST_OVER, MOST_BELOW, FELT = 3.0, 5.0, 150.0
+MOST_OVER, MOST_BELOW, FELT = 2.0, 5.0, 150.0
 DRIFT = 1.1  # of the impedance, by which its pattern is drawn (assumed; it hardly depends on it)
 FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
 

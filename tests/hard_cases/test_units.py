@@ -68,7 +68,8 @@ def test_core(film: float, most: float) -> Found:
 def test_translated(film: float, fluid: float) -> Found:
     unit, contact = Unit(film, fluid), pressed(film)[5]
     still = np.tile(unit.rest(), (60, 1))
-    counts = np.concatenate([still, unit.readings([contact.linear])]).round()
+    held = np.tile(unit.readings([contact.linear]), (20, 1))  # for one frame, it would be a glitch
+    counts = np.concatenate([still, held]).round()
     recording = assemble("unit.npz", "NPZ", electrodes=counts, stamps=np.arange(len(counts)) / 100)
     signals = prepare(recording, PrepareOptions(film=film, tare=slice(0, 60), polarity=FALLS)).at(slice(-1, None))
     digit = solve("digit", BALL, MIDDLE, force=contact.axial_force, friction=0.0)
