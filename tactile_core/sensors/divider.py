@@ -2,7 +2,8 @@
 
 Each electrode forms a voltage divider with a load, over which counts are read, so that they fall as its film thins
 (SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). With the impedance grown by a factor g since rest that is
-COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest.
+COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest. Of Z, the
+film's part grows as the film thins; its contact with the fluid resists in series and stays, which units share.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ _LEAST_LEFT = 0.05  # of a film, share below which it is not thinned: the laws k
 _ENDS = 0.4, COUNT_MAX - 0.4  # counts, which round to the converter's ends: there nothing is known of the impedance
 # Counts that an electrode may rest at; real ones rest at 3,010 to 3,670 (two units, PHAC). One that is dead or
 # saturated rests elsewhere, and its noise would be blown up without end.
-_RESTS = 500.0, 3900.0
+_RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
@@ -27,31 +28,39 @@ def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
-def growth(counts: np.ndarray, rest: np.ndarray | float) -> np.ndarray:
-    """Return the factors (..., 19) by which impedances grew from rest counts (19,): the inverse of ``reading``."""
-    now, before = np.clip(counts, *_ENDS), np.clip(rest, *_ENDS)
-    return (COUNT_MAX / now - 1) / (COUNT_MAX / before - 1)
+def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
+    """Return the counts (..., 19) after the films' part of impedances alone grew by factors from rest counts (19,)."""
+    return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
     """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,).
 
-    A unit at 3,500 counts responds to a contact with four fifths, one at 2,800 with seven fifths of the latter's
-    change.
+    A unit at 3,500 counts responds to a contact with seven tenths, one at 2,800 with one and a half times the change of
+    one at 3,300.
     """
-    rest = np.clip(rest, *_RESTS)
-    return reading(growth(rest + change, rest), to) - to
+    return _converted(change, rest, to)
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
     """Convert changes of a unit at counts ``of`` (19,) to one at rest counts (19,): the inverse of ``typical``."""
-    rest = np.clip(rest, *_RESTS)
-    return reading(growth(of + change, of), rest) - rest
+    return _converted(change, of, rest)
+
+
+def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
+    """Convert changes of a unit at counts rest to one at counts to: the film's part of the impedance grows alike."""
+    rest, to = np.clip(rest, *_RESTS), np.clip(to, *_RESTS)
+    return of_films(_film(rest + change) / _film(rest), to) - to
+
+
+def _film(counts: np.ndarray | float) -> np.ndarray:
+    """Return the film's impedance over the load, below 0 where counts are higher than any film leaves them."""
+    return COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES
 
 
 def film_impedance(counts: np.ndarray) -> np.ndarray:
     """Return the impedance (..., 19) of the film over each electrode at counts (..., 19), over the load."""
-    return np.maximum(COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES, 1e-3)
+    return np.maximum(_film(counts), 1e-3)
 
 
 def of_typical_film(

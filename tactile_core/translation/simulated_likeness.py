@@ -49,7 +49,7 @@ FAINT = 8.0
 # Most of the estimated pressure over the fluid's own, and of that over it: .24 to 1.7 on real grips and slides.
 # FELT : Pa, some 4 counts of PDC, its noise (assumed).
 MOST_OVER, MOST_BELOW, FELT = 2.0, 5.0, 150.0
-DRIFT = 1.1  # of the impedance, by which its pattern is drawn (assumed; it hardly depends on it)
+DRIFT = 1.1  # of the films' impedance, by which its pattern is drawn (assumed; it hardly depends on it)
 FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
 
 
@@ -69,7 +69,7 @@ class Patterns:
 def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
     """Return the patterns of simulated contacts whose signals are (P, e) counts, of a unit at rest counts (e,)."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
-    drift = divider.reading(DRIFT, rest) - rest
+    drift = divider.of_films(DRIFT, rest) - rest
     return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))
 
 

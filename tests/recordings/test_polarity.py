@@ -12,11 +12,11 @@ from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, polarity
 from tactile_core.recordings.flags import Flag
-from tactile_core.sensors import PRESSURE_PER_COUNT, contact_pressures_of
+from tactile_core.sensors import PRESSURE_PER_COUNT, contact_pressures_of, divider
 
 
 def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, share: float = 1.0) -> recordings.Recording:
-    """Rest, simulated contacts one after another, rest; whole counts of rest 3,300 plus or minus the change.
+    """Rest, simulated contacts one after another, rest; whole counts of a unit that rests at 3,300.
 
     share : of the fluid's pressure as simulated
     """
@@ -28,7 +28,8 @@ def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, share: 
     change = np.zeros((frames, 19))
     order = np.arange(frames - 120) * 8 // (frames - 120)
     change[60:-60] = strength[:, None] * chosen[order]
-    electrodes = np.rint(3300 + sign * change * np.exp(0.1 * random.standard_normal(19)))
+    own = divider.of_unit(change, np.full(19, 3300.0)) * np.exp(0.1 * random.standard_normal(19))
+    electrodes = np.rint(3300 + sign * own)
     electrodes += np.rint(random.normal(0, 1, electrodes.shape))
     pressure = np.zeros(frames)
     pressure[60:-60] = strength * fluid[order]

@@ -1,30 +1,27 @@
 """Counts of a divider: what a unit's rest makes of a change, both ways."""
 
 import numpy as np
+import pytest
 
 from tactile_core.sensors import COUNT_MAX, REST_COUNTS, divider
 
 REST = np.linspace(3000.0, 3700.0, 19)
 
 
-def test_counts_fall_as_impedance_grows_and_never_leave_the_converter():
-    counts = divider.reading(np.array([1e-9, 0.5, 1.0, 2.0, 1e9])[:, None], REST)
+@pytest.mark.parametrize("read", [divider.reading, divider.of_films])
+def test_counts_fall_as_impedance_grows_and_never_leave_the_converter(read):
+    counts = read(np.array([1e-9, 0.5, 1.0, 2.0, 1e9])[:, None], REST)
     assert (np.diff(counts, axis=0) < 0).all() and counts.min() >= 0 and counts.max() <= COUNT_MAX
     np.testing.assert_allclose(counts[2], REST)
-
-
-def test_growth_is_the_inverse_of_reading():
-    growth = np.linspace(0.8, 5, 7)[:, None] * np.ones(19)
-    np.testing.assert_allclose(divider.growth(divider.reading(growth, REST), REST), growth)
 
 
 def test_units_turn_into_the_typical_one_and_back():
     change = np.random.default_rng(0).uniform(-800, 80, (20, 19))
     np.testing.assert_allclose(divider.typical(divider.of_unit(change, REST), REST), change, atol=1e-6)
     np.testing.assert_allclose(divider.typical(change, REST_COUNTS), change, atol=1e-6)
-    small = divider.typical(np.full((1, 19), -1.0), REST)[0]  # near rest: by E (1 - E / 4095)
-    slope = REST * (1 - REST / COUNT_MAX)
-    np.testing.assert_allclose(small, -REST_COUNTS * (1 - REST_COUNTS / COUNT_MAX) / slope, rtol=2e-3)
+    small = divider.typical(np.full((1, 19), -1.0), REST)[0]  # near rest: by E^2 of the film's impedance
+    slope, typical = (rest**2 * divider.film_impedance(rest) for rest in (REST, REST_COUNTS))
+    np.testing.assert_allclose(small, -typical / slope, rtol=1e-2)
 
 
 def test_noise_of_dead_and_saturated_electrodes_is_not_blown_up():

@@ -23,7 +23,7 @@ def test_a_unit_reads_changes_by_its_own_rest():
     counts = readings(change, TIME, dataclasses.replace(IDEAL, rest_spread=300), seed=2)
     rest = counts[0]
     assert np.ptp(rest) > 200 and np.ptp(counts[1] - rest) > 50
-    np.testing.assert_allclose(divider.typical(counts - rest, rest), change, atol=0.9)  # half a count, up to 1.7 times
+    np.testing.assert_allclose(divider.typical(counts - rest, rest), change, atol=1.1)  # half a count, up to 2.1 times
 
 
 def test_ideal_wiring_rounds_and_saturates():

@@ -46,7 +46,10 @@ def test_a_typical_change_is_taken_back_to_the_unit_that_was_read(film):
     here = signals(typical, rest, film)
     own = here.of_typical(typical, REST_COUNTS)
     back = divider.typical(divider.of_typical_film(own, rest, film), rest)
-    np.testing.assert_allclose(back, typical, atol=1e-6)  # rounding: each is a closed formula
+    thinned = 1 - divider.film_impedance(REST_COUNTS) / divider.film_impedance(REST_COUNTS + typical)
+    borne = thinned < 0.95 * film  # where the unit's skin does not meet the core: 95 % is as thin as films get
+    assert borne.mean() > 0.99
+    np.testing.assert_allclose(back[borne], typical[borne], atol=1e-6)  # rounding: each is a closed formula
     assert np.median(np.abs(own) / np.abs(typical)) > 1 / film  # a thinner film, and counts lower at rest, change more
 
 

@@ -29,17 +29,17 @@ TYPICAL, CLEARLY, DRIFTS = 8, 2.0, 3.0  # which is 1; nats by which another, and
 CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 4 counts apart at rest
 # Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of five units, whose
 # films are .4 (two) and 1 (three), and conductivities .5 to 1.1 of a typical one's.
-THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.3
+THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.4
 # The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
 # second (assumed: an idle finger drifted by .25 in 225 s, steadily).
 AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
 # Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s. A
-# change that is no larger is no contact.
+# change no larger than that of the recording's largest drift is no contact.
 DRIFT_LEFT = 0.3
 # Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
 # times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa of
 # the fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
-REST_OFF, PRESSED = 0.0136, 450.0
+REST_OFF, PRESSED = 0.0131, 450.0
 # Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
@@ -67,22 +67,25 @@ class Film:
     def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
-        They are zero where they are no larger than what a drift leaves. A rest of another recording may be off by
-        `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
+        They are zero where they are no larger than what the largest drift leaves. A rest of another recording may be
+        off by `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
 
         perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself
         """
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change
 
+        most = float(np.exp(self.conductivity[np.abs(self.conductivity).argmax()]))
+
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
-            drift = divider.of_typical_film(seen, still, self.thickness) - found
+            drift = divider.of_typical_film(np.zeros_like(seen), still, self.thickness, most)
             contact = np.linalg.norm(found, axis=1) > DRIFT_LEFT * np.linalg.norm(drift, axis=1)
             if perhaps_idle is not None:
-                grown = np.log(divider.film_impedance(still + seen) * since_rest / divider.film_impedance(still))
+                grown = np.log(divider.film_impedance(still + seen) / divider.film_impedance(still))
+                grown -= grown.mean(axis=1, keepdims=True)  # the conductivity's part
                 as_rest = np.square(grown).mean(axis=1) < (REST_OFF / self.thickness) ** 2
                 contact &= ~(as_rest & perhaps_idle[frames])
             return found * contact[:, None]

@@ -25,7 +25,7 @@ def as_contact(level: np.ndarray, sensor: str) -> float | None:
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None
-    rest = divider.reading(np.exp(CONDUCTIVITIES)[:, None], typical)
+    rest = divider.of_films(np.exp(CONDUCTIVITIES)[:, None], typical)
     change = divider.typical(level - rest, rest, typical)
     known = contact_signals(sensor)
     onto = (change @ (known / np.linalg.norm(known, axis=1, keepdims=True)).T).max(axis=1)
