@@ -108,5 +108,14 @@ def _move_beside(file: str, *_: object) -> None:
             thing.tactile.recording = f"//{_FOLDER}/{path.name}"
 
 
+@persistent
+def _move_back(*_: object) -> None:
+    """Name Blender's own recordings again after a copy of a never saved file was saved, which stays unsaved."""
+    for thing in () if bpy.data.is_saved else bpy.data.objects:
+        kept = os.path.join(bpy.app.tempdir, _FOLDER, os.path.basename(thing.tactile.recording))
+        if thing.tactile.recording.startswith(f"//{_FOLDER}/") and os.path.isfile(kept):
+            thing.tactile.recording = kept
+
+
 CLASSES = (TACTILE_OT_simulate,)
-HANDLERS = ((bpy.app.handlers.save_pre, _move_beside),)
+HANDLERS = ((bpy.app.handlers.save_pre, _move_beside), (bpy.app.handlers.save_post, _move_back))

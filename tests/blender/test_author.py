@@ -307,6 +307,7 @@ def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
 
 
 def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_path):
+    (tmp_path / "copies").mkdir()
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball, skin = bpy.context.object, scene.objects["BioTac skin"]
@@ -316,6 +317,8 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_
     bpy.ops.tactile.simulate()
     assert Path(skin.tactile.recording).is_file()
     bpy.ops.tactile.translate()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copies" / "press.blend"), copy=True)
+    assert Path(skin.tactile.recording).is_file() and (tmp_path / "copies/tactile_simulations/sphere.h5").is_file()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "press.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "press.blend"))
     skin = bpy.context.scene.objects["BioTac skin"]
