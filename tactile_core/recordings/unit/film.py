@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...sensors import divider, places_of
+from ...sensors import SOURCE, divider, places_of
 from ..polarity import SCALE, TOUCHING, contact_signals, spread_out
 from ..rest_level import Baseline, Changes, Framewise
 from .contact_law import FEWEST, FEWEST_PRESSED, pressure_ratio
@@ -34,8 +34,11 @@ THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.4
 # second (assumed: an idle finger drifted by .25 in 225 s, steadily).
 AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
 # Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s. A
-# change no larger than that of the recording's largest drift is no contact.
-DRIFT_LEFT = 0.3
+# change no larger than that of the recording's largest drift is no contact, unless its cosine to a simulated one is
+# ALIKE: 99 % of an idle finger's are below .69, 95 % of simulated contacts of .2 N above .83 (chosen by these). Where
+# the conductivity moves by WARMED (a logarithm) and 99 of 100 changes are below IDLE times that share, none is one: .6
+# and 1.2 on the idle finger, moved by .16 and .23; 33 on a pressed one, moved by .06.
+DRIFT_LEFT, ALIKE, IDLE, WARMED = 0.3, 0.75, 1.5, 0.12
 # Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
 # times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa of
 # the fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
@@ -43,7 +46,9 @@ REST_OFF, PRESSED = 0.0131, 450.0
 # Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
+TOO_SMALL = "no change is larger than what the fluid's drift leaves: taken for no contact, light touches with it"
 SKIN = 0.75, 0.35  # measured over simulated pressure of real skins (descriptor of the BioTac), and its spread (assumed)
+NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another unit or sensor: four spreads
 
 
 @dataclass(frozen=True)
@@ -52,12 +57,15 @@ class Film:
 
     thickness : over a typical unit's; evidence : what shows it, in words
     conductivity : (P,) logarithms of the fluid's over that at rest, at rising frames (P,); linear between them
+    sensor : whose simulated contacts are told from drift; idle : whether no change is larger than drift leaves
     """
 
     thickness: float
     evidence: str
     frames: np.ndarray
     conductivity: np.ndarray
+    sensor: str = SOURCE
+    idle: bool = False
 
     @classmethod
     def given(cls, thickness: float) -> Film:
@@ -67,22 +75,25 @@ class Film:
     def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
-        They are zero where they are no larger than what the largest drift leaves. A rest of another recording may be
-        off by `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
+        They are zero where they are no larger than what the largest drift leaves, and like no simulated contact. A rest
+        of another recording may be off by `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
 
         perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself
         """
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change
 
-        most = float(np.exp(self.conductivity[np.abs(self.conductivity).argmax()]))
+        known = contact_signals(self.sensor)
+        known = known / np.linalg.norm(known, axis=1, keepdims=True)
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
-            drift = divider.of_typical_film(np.zeros_like(seen), still, self.thickness, most)
-            contact = np.linalg.norm(found, axis=1) > DRIFT_LEFT * np.linalg.norm(drift, axis=1)
+            size, left = np.linalg.norm(found, axis=1), _left(self.conductivity, still, self.thickness)
+            contact = size > (IDLE if self.idle else 1.0) * left
+            if self.conductivity.any() and not self.idle:
+                contact |= (found @ known.T).max(axis=1) > ALIKE * size
             if perhaps_idle is not None:
                 grown = np.log(divider.film_impedance(still + seen) / divider.film_impedance(still))
                 grown -= grown.mean(axis=1, keepdims=True)  # the conductivity's part
@@ -147,7 +158,17 @@ def find(
     else:
         evidence = "given"
     middle = np.bincount(seen.window_of, frames) / np.bincount(seen.window_of)
-    return Film(thickness, evidence, middle, log)
+    found = divider.of_typical_film(seen.change, seen.rest, thickness, np.exp(log)[seen.window_of, None])
+    beyond = np.linalg.norm(found, axis=1) / np.maximum(_left(log, seen.rest, thickness), 1e-9)
+    idle = bool(np.abs(log).max() > WARMED and np.percentile(beyond, 99) < IDLE)
+    return Film(thickness, evidence, middle, log, sensor, idle)
+
+
+def _left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
+    """Root of the sum of squares (T,) counts that the largest drift leaves of a film; 0 without one. rest : (T, e)"""
+    most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
+    drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
+    return DRIFT_LEFT * np.linalg.norm(drift, axis=1)
 
 
 def _impedance_at_rest(seen: _Seen) -> float:
@@ -204,6 +225,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
     if contacts < FEWEST:
         return _believed(doubt), evidence
     pressure = None if pressure is None else pressure[touching]
+    by_pressure = np.full(len(THICKNESSES), np.inf)  # nats, where enough is pressed hard enough to judge
     for row, thickness in enumerate(THICKNESSES):
         typical = seen.typical(thickness, conductivity)[touching]
         apart, _, length = seen.apart(typical)
@@ -212,5 +234,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
         if pressure is not None:
             ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)
             if pressed >= FEWEST_PRESSED:
-                doubt[row] += (np.log(ratio / SKIN[0]) / SKIN[1]) ** 2 / 2
+                by_pressure[row] = (np.log(ratio / SKIN[0]) / SKIN[1]) ** 2 / 2
+    if by_pressure.min() < NO_SKIN:
+        doubt += np.where(np.isfinite(by_pressure), by_pressure, by_pressure.min())
     return _believed(doubt), f"{evidence}, {contacts} different contacts"

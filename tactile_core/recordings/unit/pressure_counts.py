@@ -12,7 +12,7 @@ PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
 # Of the readings, counts that were converted: how well they lie on the steps of one (1 is all), and how many they span.
 ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
 AT_REST = 800.0, 3000.0  # counts between which untared PDC rests: 915 to 2,405 in three units (assumed: some room)
-NOISE = 4.0  # counts, half of all neighbours differ by less (assumed)
+NOISE, LEAST_NOISE = 4.0, 0.2  # counts, half of all neighbours differ by less, and by more: else averaged (assumed)
 MOST = 1.01 * COUNT_MAX
 
 
@@ -40,19 +40,26 @@ def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str
     """
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
-    if not len(values) or (unit != 1 and (COUNT_MAX if unit < 1 else 0) < values[-1] <= MOST / unit):
+    if not len(values):
         return unit, ""
-    whole, within = np.ptp(values - np.rint(values)) < 1e-6, np.percentile(known, 99) <= MOST
-    if whole and within:
-        return 1.0, ""
+    parts = np.append(values - np.rint(values), 0.0 if len(values) == 1 else [])  # of one value alone it has to be 0
+    whole, within = np.ptp(parts) < 1e-6, np.percentile(known, 99) <= MOST
+    of_electrodes = values[-1] > COUNT_MAX if unit < 1 else unit > 1 and whole and values[-1] > 0
+    if of_electrodes and values[-1] <= MOST / unit:
+        return unit, ""
     factors = {words: pascal / of_kind(sensor, Fluid).readout.pressure for words, pascal in PRESSURES.items()}
+    gap = np.diff(values).min() if len(values) > 1 else 1.0
+    if whole and within and gap * factors["Pa"] < 0.9:  # else Pa in whole numbers, a count apart
+        return 1.0, ""
     for words, factor in factors.items():  # the finest first: the steps of others are multiples of its
         steps = abs(np.exp(2j * np.pi * factor * values).mean())
         if steps > ON_STEPS and factor * np.ptp(values) >= FEWEST_STEPS and factor * values[-1] <= MOST:
             return factor, words
     del factors["hPa"]  # averaged counts rest there, too
     noise = np.median(np.abs(np.diff(known, prepend=known[0])))
-    for words, factor in factors.items():  # rounded, or at rest throughout: by its level
-        if AT_REST[0] <= factor * values[0] <= AT_REST[1] and factor * max(values[-1], noise * MOST / NOISE) <= MOST:
+    low, high = np.percentile(known, 5), max(values[-1], noise * MOST / NOISE)
+    for words, factor in factors.items():  # rounded, or at rest throughout: by its level, if it has a count's noise
+        averaged = 0 < factor * noise < LEAST_NOISE
+        if AT_REST[0] <= factor * low <= AT_REST[1] and factor * high <= MOST and not averaged:
             return factor, words
     return float(within), ""

@@ -22,7 +22,7 @@ def test_a_pressure_is_told_by_its_steps(words, decimals, rest):
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.3, 80.0, 962.0, 2405.0])
-@pytest.mark.parametrize("averaged", [1, 5])
+@pytest.mark.parametrize("averaged", [1, 5, 20])
 def test_counts_stay_counts_tared_or_averaged(rest, averaged):
     pdc = np.convolve(rest + RISE, np.full(averaged, 1 / averaged), "valid")
     assert counts_a_unit(pdc, 1.0, "biotac") == (1.0, "")
@@ -35,6 +35,11 @@ def test_a_single_glitch_makes_no_pressure_of_counts():
 @pytest.mark.parametrize(("words", "decimals", "rest"), [("kPa", 1, 2405), ("psi", 2, 2405), ("Pa", -2, 2405)])
 def test_a_coarsely_rounded_pressure_is_told_by_its_level(words, decimals, rest):
     assert counts_a_unit(np.round((rest + RISE) * COUNT / PRESSURES[words], decimals), 1.0, "biotac")[1] == words
+
+
+def test_a_held_or_whole_pressure_is_told():
+    assert counts_a_unit(np.full(30, 56.502), 1.0, "biotac")[1] == "kPa"
+    assert counts_a_unit(np.rint(COUNT * RISE), 1.0, "biotac")[1] == "Pa"
 
 
 def test_what_is_neither_is_taken_as_not_recorded():
