@@ -89,13 +89,15 @@ class Camera:
         return self.height, self.width
 
     def at_size(self, width: int, height: int) -> Camera:
-        """Return the same view in other pixels; raises TactileError for another aspect ratio.
+        """Return the same view in other pixels; raises TactileError for another aspect ratio or fewer than 3 pixels.
 
         Width and height may each be a share's of this picture's less a part of a pixel: the view is then cut by it.
         """
         if not -self.height < width * self.height - height * self.width < self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)
+        if min(width, height) < 3:
+            raise TactileError("camera, size", f"{width} x {height} pixels", "3 x 3 and more, between which slopes lie")
         factor = height / self.height
         scale_x, scale_y = self.px_per_mm_x * factor, self.px_per_mm_y * factor
         return dataclasses.replace(self, width=width, height=height, px_per_mm_x=scale_x, px_per_mm_y=scale_y)

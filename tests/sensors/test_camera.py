@@ -44,6 +44,8 @@ def test_the_same_view_in_other_pixels() -> None:
     np.testing.assert_allclose(large.gel_z.reshape(-1, 2).mean(1), DIGIT_CAMERA.gel_z, atol=1e-12)
     with pytest.raises(TactileError, match="aspect ratio"):
         DIGIT_CAMERA.at_size(640, 480)
+    with pytest.raises(TactileError, match="2 x 3 pixels"):
+        DIGIT_CAMERA.at_size(2, 3)
 
 
 def test_pixel_centres_agree_with_the_conversion() -> None:
