@@ -90,7 +90,7 @@ class Film:
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
-            size, left = np.linalg.norm(found, axis=1), _left(self.conductivity, still, self.thickness)
+            size, left = np.linalg.norm(found, axis=1), _drift_left(self.conductivity, still, self.thickness)
             contact = size > (IDLE if self.idle else 1.0) * left
             if self.conductivity.any() and not self.idle:
                 contact |= (found @ known.T).max(axis=1) > ALIKE * size
@@ -159,12 +159,12 @@ def find(
         evidence = "given"
     middle = np.bincount(seen.window_of, frames) / np.bincount(seen.window_of)
     found = divider.of_typical_film(seen.change, seen.rest, thickness, np.exp(log)[seen.window_of, None])
-    beyond = np.linalg.norm(found, axis=1) / np.maximum(_left(log, seen.rest, thickness), 1e-9)
+    beyond = np.linalg.norm(found, axis=1) / np.maximum(_drift_left(log, seen.rest, thickness), 1e-9)
     idle = bool(np.abs(log).max() > WARMED and np.percentile(beyond, 99) < IDLE)
     return Film(thickness, evidence, middle, log, sensor, idle)
 
 
-def _left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
+def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
     """Root of the sum of squares (T,) counts that the largest drift leaves of a film; 0 without one. rest : (T, e)"""
     most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
     drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
