@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_core import recordings
+from tactile_core import recordings, sensors
 from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, polarity
 from tactile_core.recordings.flags import Flag
@@ -47,6 +47,14 @@ def test_it_is_found_and_the_change_is_that_of_a_raw_reading(pdc, sign, name, se
     assert found.report["polarity"] == name and not found.flags.any() and not found.warnings
     raw = recordings.prepare(pressed(1.0, pdc=pdc, seed=seed))
     np.testing.assert_allclose(found.change, raw.change, atol=10)  # noise of the counts, which does not turn round
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_fluid_whose_conductivity_moves_shows_no_rising_counts(sign):
+    warmed = np.linspace(0, sign * 0.2, 400)[:, None]
+    counts = divider.of_films(np.exp(-warmed), sensors.REST_COUNTS) + np.random.default_rng(0).normal(0, 1, (400, 19))
+    still = dataclasses.replace(pressed(1.0, pdc=False), electrodes=np.rint(counts))
+    assert recordings.prepare(still, PrepareOptions(tare=slice(0, 20))).report["polarity"] == "falls"
 
 
 def test_what_shows_nothing_is_taken_to_fall_and_flagged():

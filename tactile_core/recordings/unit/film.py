@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...sensors import SOURCE, divider, places_of
-from ..polarity import SCALE, TOUCHING, contact_signals, spread_out
+from ..polarity import DRIFT_LEFT, SCALE, TOUCHING, contact_signals, spread_out
 from ..rest_level import Baseline, Changes, Framewise
 from .contact_law import FEWEST, FEWEST_PRESSED, pressure_ratio
 
@@ -33,12 +33,11 @@ THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.4
 # The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
 # second (assumed: an idle finger drifted by .25 in 225 s, steadily).
 AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
-# Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s. A
-# change no larger than that of the recording's largest drift is no contact, unless its cosine to a simulated one is
+# A change below `DRIFT_LEFT` of the recording's largest drift is no contact, unless its cosine to a simulated one is
 # ALIKE: 99 % of an idle finger's are below .69, 95 % of simulated contacts of .2 N above .83 (chosen by these). Where
 # the conductivity moves by WARMED (a logarithm) and 99 of 100 changes are below IDLE times that share, none is one: .6
 # and 1.2 on the idle finger, moved by .16 and .23; 33 on a pressed one, moved by .06.
-DRIFT_LEFT, ALIKE, IDLE, WARMED = 0.3, 0.75, 1.5, 0.12
+ALIKE, IDLE, WARMED = 0.75, 1.5, 0.12
 # Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
 # times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa of
 # the fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
