@@ -35,6 +35,7 @@ QUIET = 50  # frames at the shipped recording's start without contact
 NOTHING, HALF = 0.05, 0.5  # N; share of the force
 TARGET, TRIALS = 2.0, ("01", "02", "03")  # % of the frames; of PHAC, those to choose by
 Rng = np.random.Generator
+LEAST_LOAD = 15.0  # counts, that no noise and drift of an idle finger make
 Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19), rest (19,) counts; broken ones
 
 
@@ -179,8 +180,11 @@ def bits(by: float) -> Fault:
 
 
 def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Begin and end within the largest contact."""
-    first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
+    """Begin and end within the largest contact, where there is one."""
+    change = np.abs(electrodes - rest)
+    if change.max() < LEAST_LOAD:
+        return electrodes
+    first = int(change.sum(axis=1).argmax())
     electrodes[:QUIET] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
     electrodes[-QUIET:] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
     return electrodes
