@@ -91,7 +91,10 @@ class TACTILE_OT_set_up_render(TactileOperator):
         render.dither_intensity = 0.0  # noise of a grey level that the camera does not have
         scene.view_settings.view_transform, scene.view_settings.look = "Raw", "None"
         scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
-        render.image_settings.file_format, render.image_settings.color_mode = "PNG", "RGB"
+        image = render.image_settings
+        if bpy.app.version >= (5, 0, 0):  # Blender 5.0 cannot write an EXR of parts whose pixels are not square
+            image.media_type, image.use_exr_interleave = "IMAGE", True
+        image.file_format, image.color_mode = "PNG", "RGB"
         scene.camera = digit_body.camera_of(gel)
         self.report({"INFO"}, "View transform Raw: this engine, Cycles and EEVEE give the camera's own levels")
         pictures.prepare(scene, context.evaluated_depsgraph_get())

@@ -117,6 +117,8 @@ def test_each_view_layer_and_each_eye_has_the_picture(ready, rendered):
 
 def test_a_multilayer_exr_holds_what_the_pixels_see(ready, rendered, part, tmp_path):
     kind = ready.render.image_settings
+    if bpy.app.version >= (5, 0, 0):
+        kind.media_type = "MULTI_LAYER_IMAGE"
     kind.file_format, kind.exr_codec, kind.color_depth = "OPEN_EXR_MULTILAYER", "NONE", "32"
     ready.frame_set(80)
     ready.render.filepath = str(tmp_path / "frame.exr")
