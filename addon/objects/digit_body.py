@@ -27,7 +27,7 @@ def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def has_body(gel: bpy.types.Object) -> bool:
-    """Whether a body was made for the gel: without LEDs it is then dark. One appended or copied alone has none."""
+    """Return true if a body was made for the gel: without LEDs it is then dark. A gel appended alone has none."""
     return any(thing.tactile.role == "BODY" for thing in parts_of(gel))
 
 

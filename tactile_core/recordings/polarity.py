@@ -36,7 +36,7 @@ MOST = 500  # frames looked at, evenly spread
 # by a likeness of .9; the right sign has .98, which separates them.
 MARGIN, LEFT = 0.15, 0.7
 # Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s; of
-# real grips, soft ones too, it leaves .36 and more.
+# twelve real grips (PHAC, trial 04), soft ones too, it leaves .36 and more.
 DRIFT_LEFT = 0.3
 LIKE = 0.6  # likeness that is one: 95 of 100 random changes reach .62, changes with real pressure .66 to .87
 SCALE = 15.0  # counts, of the arcsinh that the networks see changes through

@@ -81,8 +81,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")
     as_typical = change.then(lambda each: typical(each, kind, at_start, recording.sensor))
     flags, doubt = contact_law.flagged(as_typical, kind, quiet.mask, flags, pdc, recording.sensor)
-    report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired
-    report |= {
+    report = _report(recording, kind, evidence, options, unit, quiet, slope) | repaired | {
         "smoothed_frames": window, "polarity": polarity.name, "polarity_evidence": polarity.evidence,
         "film": None if fluid is None else fluid.report(),
     }  # fmt: skip

@@ -115,7 +115,7 @@ class LiveSignals:
 
     @property
     def held(self) -> bool:
-        """Whether the last `STALE` rows are equal although noise should keep them apart: a driver stands still."""
+        """Return true if the last `STALE` rows are equal though noise should keep them apart: a driver stands still."""
         return self._noisy and self.known.kind == "raw" and repeats(self._last)[0].sum() == STALE - 1
 
     @property
