@@ -8,9 +8,6 @@ less its size, did, as strong as this signal says.
 
 from __future__ import annotations
 
-import functools
-from pathlib import Path
-
 import numpy as np
 
 from tactile_core import accuracy, sensors
@@ -32,11 +29,8 @@ SETS = {
         0.3e-3, np.inf, {"place_mm": 0.5, "force_size_percent": 6.0, "peak_percent": 18.0, "iou": 0.47},
     ),
 }  # fmt: skip
-SETS_FROM = 0.3e-3  # m
 # Of rectified signals: share of the true depth (120 of 254 um), mm, share of contacts (docs/sources.md, Targets).
 RECTIFIED_PEAK, RECTIFIED_PLACE, RECTIFIED_SILENT = 120 / 254, 0.8, 0.05
-TABLE = Path(__file__).with_name("gel_force.npy")  # by scripts/benchmarks/make/make_gel_force.py
-ABOVE_CEILING = 1.2  # times what the functional itself is off by (docs/sources.md, Targets)
 REGIONS = {0.5: (0.45, 0.55), 0.9: (0.86, 0.94)}  # share of the posterior -> between which shares of truths lie in it
 DRAWS = 200  # of each posterior: a share is known to .035 a contact, to .002 over 368 of them
 
@@ -60,32 +54,6 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
             found.append(row(f"mean_{metric}", mean, unit, baseline=baseline, of=of))
             if metric != "force_size_percent":  # which solving takes as it is
                 found.append(row(f"solved_{metric}", solved, unit, baseline=baseline, of=of))
-    return found
-
-
-def gel_force_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """Errors of the force that a translated gel carries against the translated force, beside the same of true gels.
-
-    The second is the ceiling of the functional (`carried_force`). Over contacts that press without sliding from 0.3 mm.
-    """
-    ratios: dict[str, list[np.ndarray]] = {"gel_force": [], "gel_force_ceiling": []}
-    for part in parts(len(change)):
-        read = nets.encode_signal(change[part])
-        state = nets.posterior(read).likely
-        gel = nets.decode_target(nets.latents(read, state)[1])
-        known = (gel, FORCE_SCALE * np.sinh(state[:, PLACE])), (true_displacement(pairs, "digit", part), None)
-        for name, (surface, force) in zip(ratios, known, strict=True):
-            size = accuracy.lengths(pairs.force[part]) if force is None else force
-            ratios[name].append(100 * np.abs(accuracy.lengths(carried_force(surface)) / size - 1))
-    inside = ~pairs.slide.any(-1) & (pairs.depth_biotac >= SETS_FROM)
-    off = {name: np.concatenate(values)[inside] for name, values in ratios.items()}
-    of = f"{inside.sum()} contacts deeper than 0.3 mm; baseline: a gel at rest"
-    found = []
-    for word, quantile in (("median", 50), ("90", 90)):
-        ceiling = float(np.percentile(off["gel_force_ceiling"], quantile))
-        value = float(np.percentile(off["gel_force"], quantile))
-        found.append(row(f"gel_force_{word}_percent", value, "%", ABOVE_CEILING * ceiling, baseline=100.0, of=of))
-        found.append(row(f"gel_force_ceiling_{word}_percent", ceiling, "%", baseline=100.0, of=of))
     return found
 
 
@@ -214,17 +182,3 @@ def nearest_example(pairs: Pairs, change: np.ndarray) -> tuple[np.ndarray, np.nd
 def _median(values: np.ndarray) -> float | None:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if len(known) else None
-
-
-@functools.cache
-def functional() -> np.ndarray:
-    """Forces (3 M, 3) float32 N by a metre's displacement of each coordinate of the DIGIT's M nodes."""
-    return np.load(TABLE, allow_pickle=False).astype(np.float32)
-
-
-def carried_force(displacement: np.ndarray) -> np.ndarray:
-    """Force (T, 3) float32 N that a gel carries whose surface is displaced by (T, M, 3) m: linear in that.
-
-    In a linear gel it would be exact; how far it is off on gels solved at finite strain is its ceiling.
-    """
-    return np.asarray(displacement, np.float32).reshape(len(displacement), -1) @ functional()

@@ -20,7 +20,6 @@ import numpy as np
 from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.translation import (
     fluid_pressure,
-    followed_rows,
     grips,
     made_up_units,
     prints,
@@ -100,9 +99,8 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
-    found = [*test_set.seen_rows(network, pairs, bodies), *followed_rows.rows(network)]
+    found = test_set.seen_rows(network, pairs, bodies)
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
-    found += sequence_rows.full_rows(network, pairs)
     found += two_contact_rows.rows(pairs)
     few = (2, 2) if options.quick else ()
     found += made_up_units.rows(network, *few) + made_up_units.reliability(network, *few)

@@ -21,7 +21,7 @@ from tactile_core.training.step_errors import (
 from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translator import Translator
 
-from .contact_rows import answer_rows, gel_force_rows, posterior_rows, rectified_rows
+from .contact_rows import answer_rows, posterior_rows, rectified_rows
 from .mechanics_rows import mechanics_rows
 from .slide_metrics import rank_correlation
 
@@ -44,7 +44,6 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
     change = as_read(pairs.signal, SEED)
     columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
     found = answer_rows(translator.nets, pairs, change, bodies) + posterior_rows(translator.nets, pairs, change)
-    found += gel_force_rows(translator.nets, pairs, change)
     found += rectified_rows(translator.nets, pairs, change, bodies)
     found += metric_rows(columns, pairs, rows, "seen indenters", TARGETS)
     for name, mask in slices(pairs, rows):

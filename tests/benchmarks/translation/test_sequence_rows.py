@@ -53,6 +53,7 @@ def test_rows_are_of_some_sequences_or_all():
     names = {f"sequence_{rest}{metric}" for metric in sequence_rows.UNITS for rest in ("", "rest_off_")}
     assert set(whole) == names
     assert all(whole[name]["value"] > 0 for name in whole)
+    assert whole["sequence_place"]["value"] < whole["sequence_place"]["baseline"]  # each frame alone
 
 
 def test_a_unit_whose_rest_is_off_keeps_its_gains_and_noise(truth):
