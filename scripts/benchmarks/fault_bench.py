@@ -17,7 +17,6 @@ SHARD = 40  # frames: many shards of little work
 MOST = 600  # s that a single command may take; a machine may be slow, but a hang must end
 LONG = 3000  # s, of one on very many frames or recordings
 started: list[subprocess.Popen] = []
-SMALL_DISK = 2**20  # bytes that a file may grow to: less than a shard of displacements
 
 HEADER_ROW = "timestamp,tdc,tac,pdc," + ",".join([f"pac{i}" for i in range(1, 23)] + [f"ele{i}" for i in range(1, 20)])
 
@@ -28,7 +27,7 @@ class Bench:
     def __init__(self, folder: Path, quick: bool, seed: int) -> None:
         self.folder, self.random = folder, random.Random(seed)
         self.blows = 2 if quick else 10
-        self.tiny, self.long = (100, 5_000) if quick else (10_000, 1_000_000)
+        self.long = 5_000 if quick else 1_000_000  # frames
         self.inputs = folder / "in"
         self.inputs.mkdir()
         for index, frames in enumerate((130, 45) if quick else (400, 90, 7, 1000)):

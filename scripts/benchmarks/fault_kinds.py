@@ -1,4 +1,7 @@
-"""The ways to break a job, for ``fault_test.py``: each returns files lost and blows that struck."""
+"""The ways to break a job, for ``fault_test.py``: each returns files lost and blows that struck.
+
+``tests/jobs/engine/test_batch_run.py`` has the others: flipped bits, cut files, a file too large, parts of an array.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,6 @@ from pathlib import Path
 from benchmarks.fault_bench import (
     LONG,
     MOST,
-    SMALL_DISK,
     TACTILE,
     Bench,
     Lost,
@@ -27,7 +29,6 @@ from benchmarks.fault_bench import (
     start,
     workers_of,
     write_hdf5,
-    write_recording,
 )
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
@@ -64,21 +65,6 @@ def killed_client(bench: Bench) -> Lost:
         process.kill()
         process.wait()
     call(bench.command(out))
-    return bench.lost(out), blows
-
-
-def array_runners(bench: Bench) -> Lost:
-    """Run two parts of an array at once; one of them is killed and started again."""
-    out = bench.run("array", "--plan")
-    first, second = (start([*TACTILE, "--out", str(out), "--array", f"{i}/2"]) for i in range(2))
-    while first.poll() is None and not list(out.glob("*/*.h5")):
-        time.sleep(0.01)
-    blows = int(first.poll() is None)
-    first.kill()
-    first.wait()
-    second.wait(MOST)
-    call([*TACTILE, "--out", str(out), "--array", "0/2"])
-    call([*TACTILE, "--out", str(out)])
     return bench.lost(out), blows
 
 
@@ -130,61 +116,6 @@ def power_cuts(bench: Bench) -> Lost:
 def one_error(said: str) -> bool:
     """Return true if one line of stderr is an error, and none a traceback; lines of progress may stand beside it."""
     return said.count("tactile: error:") == 1 and "Traceback" not in said
-
-
-def full_disk(bench: Bench) -> Lost:
-    """Limit files to 1 MB, like a full disk; then remove the limit."""
-    import resource
-
-    out = bench.folder / "full"
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (SMALL_DISK, before[1]))
-    try:
-        done = call(bench.command(out), expected=2)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-    half = [name for name in contents(out) if "tactile-partial" in name]
-    call(bench.command(out))
-    return bench.lost(out) + len(half) + (not one_error(done.stderr)), 1
-
-
-def bit_flips(bench: Bench) -> Lost:
-    """Flip one bit of each file, anywhere: --verify names them all, the next run makes them again."""
-    out = bench.folder / "flips"
-    shutil.copytree(bench.calm, out)
-    files = sorted([*out.glob("prepared/*.h5"), *out.glob("shards/*.h5")])
-    for file in files:
-        data = bytearray(file.read_bytes())
-        data[bench.random.randrange(len(data))] ^= 1 << bench.random.randrange(8)
-        file.write_bytes(data)
-    output = call([*TACTILE, "--out", str(out), "--verify"], expected=2).stderr
-    unseen = sum(file.name not in output for file in files)
-    call(bench.command(out))
-    return bench.lost(out) + unseen, len(files)
-
-
-def cut_files(bench: Bench) -> Lost:
-    """A power cut that keeps names and loses data: files cut anywhere, empty ones, and leftovers of writers."""
-    out = bench.folder / "cuts"
-    shutil.copytree(bench.calm, out)
-    files = sorted([*out.glob("prepared/*.h5"), *out.glob("shards/*.h5")])
-    for file in files:
-        os.truncate(file, bench.random.choice([0, 100, 511, 512, bench.random.randrange(file.stat().st_size)]))
-        shutil.copy(file, file.with_name(f".{file.name}.abcdef123456.tactile-partial"))
-    (out / "manifest.json").write_text("{")
-    call(bench.command(out))
-    return bench.lost(out), len(files)
-
-
-def clock_backwards(bench: Bench) -> Lost:
-    """Files from the future and from 1970 in the folder, as after a clock was set back: no decision looks at times."""
-    out = bench.folder / "clock"
-    shutil.copytree(bench.calm, out)
-    for index, file in enumerate(sorted(out.glob("*/*.h5"))):
-        os.utime(file, (4e9, 4e9) if index % 2 else (0, 0))
-    next(out.glob("shards/*.h5")).unlink()
-    output = call(bench.command(out)).stdout
-    return bench.lost(out) + ("1 shard made" not in output), 1
 
 
 def dask_worker_dies(bench: Bench) -> Lost | None:
@@ -244,16 +175,6 @@ def small_disk(bench: Bench) -> Lost | None:
         subprocess.run(["umount", disk], check=True)
 
 
-def tiny_recordings(bench: Bench) -> Lost:
-    """Very many recordings of three frames; the command is killed half-way and given again."""
-    folder, out = bench.folder / "tiny", bench.folder / "tiny_job"
-    folder.mkdir()
-    write_recording(folder / "0.csv", 3, 0)
-    for number in range(1, bench.tiny):
-        shutil.copy(folder / "0.csv", folder / f"{number}.csv")
-    return _killed_half_way(out, [*TACTILE, str(folder), "--out", str(out), "--keep", "latent"], bench.tiny)
-
-
 def long_recording(bench: Bench) -> Lost:
     """Process one recording of very many frames, latents alone; the command is killed half-way and given again."""
     out, file = bench.folder / "long_job", bench.folder / "long.h5"
@@ -283,15 +204,9 @@ def _killed_half_way(out: Path, command: list[str], shards: int) -> Lost:
 FAULTS: dict[str, Callable[[Bench], Lost | None]] = {
     "worker_sigkill": killed_workers,
     "client_kill_9": killed_client,
-    "two_array_runners_one_killed": array_runners,
     "power_cut_at_each_write": power_cuts,
-    "disk_full": full_disk,
     "small_disk": small_disk,
-    "bit_flips": bit_flips,
-    "cut_files_and_leftovers": cut_files,
-    "clock_backwards": clock_backwards,
     "dask_worker_dies_another_joins": dask_worker_dies,
-    "tiny_recordings": tiny_recordings,
     "long_recording": long_recording,
 }
 ABSENT = {  # why a fault was not tried

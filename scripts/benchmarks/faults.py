@@ -1,6 +1,6 @@
 """Break `tactile batch` in every way we know, and see that nothing is lost: bytes as those of an undisturbed run.
 
-    python scripts/fault_test.py --quick --json FILE     about two minutes on one core
+    python scripts/fault_test.py --quick --json FILE     about a minute on one core
     python scripts/fault_test.py                         more recordings, more blows, an hour
 
 Prints a row for each fault: shards that differ from the undisturbed run, are missing or half-written (target 0;

@@ -4,8 +4,7 @@ A wrong polarity, gains, order of channels or rest turns each contact into a sig
 frame hardly shows it. What a few neighbouring simulated contacts leave unexplained, averaged over different contacts of
 a recording, does, and so does how much less is left with two electrodes exchanged, or where each electrode may have a
 gain of its own and those that fit best are far apart. A softer skin, or one that is filled otherwise, moves the
-electrodes alike at another pressure: the fluid's, where it is recorded, shows that
-(``scripts/benchmarks/translation/wrong_laws.py``; docs/accuracy.md has the table).
+electrodes alike at another pressure: the fluid's, where it is recorded, shows that (docs/accuracy.md has the table).
 """
 
 from __future__ import annotations

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
-from benchmarks.translation import wrong_laws
+from benchmarks.translation import sensor_faults
+from benchmarks.translation.test_set import GAIN, NOISE
 
 from tactile_core import recordings
 from tactile_core.recordings import electrode_gains
@@ -17,26 +20,55 @@ from tactile_core.recordings.preparation import doubt_law
 from tactile_core.recordings.unit import contact_law
 from tactile_core.sensors import PRESSURE_PER_COUNT
 
+TEST_SET = Path(__file__).parents[3] / "scenes" / "training" / "test_contacts.h5"
+TARGET, ALARMS, FROM = 0.9, 0.05, 20  # shares of recordings (docs/sources.md, Targets); contacts from which on
+REST = np.zeros(19)  # of changes
+PDC_NOISE = 1.5 * PRESSURE_PER_COUNT  # Pa (assumed, as the electrodes')
+WRONG = {
+    "inverted": sensor_faults.inverted,
+    "gains_doubled": sensor_faults.louder,
+    "channels_swapped": sensor_faults.swapped,
+    "rest_off": lambda change, rest, random: change + 40.0 * random.choice([-1.0, 1.0]),
+    "skin_softer": lambda change, rest, random: change,
+}
 
-def share_doubted(law, contacts, recordings=60):
-    found = wrong_laws.recordings(contacts, law, seed=2)[:recordings]
-    return np.mean([bool(contact_law.doubt(*each)) for each in found])
+
+def touches():
+    """Changes (n, 19) counts and pressures (n,) Pa of the test set's odd presses, by which no limit was chosen."""
+    with h5py.File(TEST_SET) as file:
+        odd = file["press"][:] % 2 == 1
+        return tuple(file[name][:].astype(float)[odd] for name in ("signal", "pressure"))
 
 
-@pytest.mark.parametrize("law", wrong_laws.WRONG.values(), ids=wrong_laws.WRONG)
+def share_doubted(name, contacts, recordings=60):
+    """Share of recordings, each of a unit with gains 10 % apart, that are doubted; name : of WRONG, or right."""
+    random, doubted = np.random.default_rng([2, contacts]), []
+    change, pressure = touches()
+    for _ in range(recordings):
+        gain = 1 + GAIN * random.standard_normal(19)
+        chosen = random.choice(len(change), contacts, replace=False)
+        seen = WRONG.get(name, WRONG["skin_softer"])(change[chosen] * gain, REST, random)
+        seen = seen + NOISE * random.standard_normal(seen.shape)
+        fluid = pressure[chosen] * (0.5 if name == "skin_softer" else 1) + random.normal(0, PDC_NOISE, contacts)
+        contact = contact_law.touching(seen)
+        doubted.append(bool(contact_law.doubt(seen[contact], fluid[contact])))
+    return np.mean(doubted)
+
+
+@pytest.mark.parametrize("law", WRONG)
 def test_a_hundred_contacts_of_a_wrong_law_are_doubted(law):
-    assert share_doubted(law, contacts=100) >= wrong_laws.TARGET
+    assert share_doubted(law, contacts=100) >= TARGET
 
 
-@pytest.mark.parametrize("law", [wrong_laws.doubled, wrong_laws.swapped])
+@pytest.mark.parametrize("law", ["gains_doubled", "channels_swapped"])
 def test_twenty_contacts_show_wrong_gains_and_exchanged_electrodes(law):
-    assert share_doubted(law, wrong_laws.FROM, recordings=150) >= wrong_laws.TARGET
-    assert share_doubted(wrong_laws.right, wrong_laws.FROM, recordings=150) <= wrong_laws.ALARMS
+    assert share_doubted(law, FROM, recordings=150) >= TARGET
+    assert share_doubted("right", FROM, recordings=150) <= ALARMS
 
 
 @pytest.mark.parametrize("pair", [(0, 5), (3, 12), (7, 16)])
 def test_the_electrodes_that_are_exchanged_are_named(pair):
-    change = wrong_laws.touches()[0]
+    change = touches()[0]
     change = change[contact_law.touching(change)]
     change[:, pair] = change[:, pair[::-1]]
     less, found = contact_law.exchanged_share(change)
@@ -46,18 +78,18 @@ def test_the_electrodes_that_are_exchanged_are_named(pair):
 
 def test_one_contact_unlike_simulated_ones_says_nothing_of_gains_and_exchanges():
     """Within one grip of a real finger, gains and exchanges explain what makes it unlike simulated contacts."""
-    noise = wrong_laws.NOISE * np.random.default_rng(0).standard_normal((200, 19))
-    grip = wrong_laws.touches()[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
+    noise = NOISE * np.random.default_rng(0).standard_normal((200, 19))
+    grip = touches()[0][100] * np.where(np.arange(19) % 3, 1.0, 2.5) + noise
     assert contact_law.apart(grip) < contact_law.FEWEST_APART and contact_law.exchanged_share(grip)[0] > 0
     assert reason_of(contact_law.doubt(grip)) not in (Reason.LAW_GAINS, Reason.LAW_EXCHANGED)
 
 
 def test_contacts_as_simulated_are_not_doubted():
-    assert share_doubted(wrong_laws.right, contacts=100) <= wrong_laws.ALARMS
+    assert share_doubted("right", contacts=100) <= ALARMS
 
 
 def test_a_skin_of_half_the_stiffness_is_seen_by_the_fluid_s_pressure_alone():
-    change, pressure, _ = wrong_laws.touches()
+    change, pressure = touches()
     contact = contact_law.touching(change)
     change, pressure = change[contact], pressure[contact]
     assert contact_law.doubt(change) is contact_law.doubt(change, pressure) is None
@@ -85,7 +117,7 @@ def signals_of(change, pdc=None):
 
 
 def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
-    change = wrong_laws.touches()[0]
+    change = touches()[0]
     gain = np.where(np.arange(19) % 4 == 0, 2.5, 1.0)
     doubted = signals_of(change * gain)
     contact = contact_law.touching(change * gain)
@@ -99,7 +131,7 @@ def test_the_doubt_flags_contacts_alone_and_a_unit_s_gains_take_it_back():
 
 
 def test_pressure_is_not_judged_where_its_rest_is_a_guess():
-    change, pressure, _ = wrong_laws.touches()
+    change, pressure = touches()
     doubted = signals_of(change, pressure / 2 / PRESSURE_PER_COUNT)
     assert (doubted.flags & Flag.LAW_DOUBTED).any() and "pressure" in doubted.warnings[0]
     guessed = doubt_law(dataclasses.replace(doubted, flags=0 * doubted.flags + np.uint16(Flag.NO_QUIET_PART)))
