@@ -96,11 +96,12 @@ def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[F
     stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
     for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
         times, last = measure(sensor, steps, contacts)
-        yield f"{sensor}, {name}", times, stated, last
+        settled = sum(each is not None for each in last) / len(last)
+        yield f"{sensor}, {name}", times, f"{stated}; {settled:.1%} of paths settled", list(filter(None, last))
 
 
-def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact]]:
-    """Times of random contacts, and the contacts at the ends of their paths."""
+def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
+    """Times of random contacts, and the contacts at the ends of their paths, None where there is none."""
     times: Times = []
     last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):
@@ -111,7 +112,7 @@ def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContac
             took, solved = timed(lambda p=press, d=contact.depth * thick * step / steps: at_depth(p, d))
             if number >= WARM and (step > 1 or steps == 1):
                 times.append(took)
-        last += [solved] if solved else []
+        last.append(solved)
     return times, last
 
 

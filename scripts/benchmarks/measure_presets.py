@@ -3,7 +3,6 @@
     python scripts/benchmarks/measure_presets.py                       everything; writes data/optics_presets.json
     python scripts/benchmarks/measure_presets.py --fields 4            on fewer fields, which the file says; 10 else
     python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
-    python scripts/benchmarks/measure_presets.py --coatings            standard, quality against paths, by coating
 
 Errors are grey levels rms over the picture, its channels and the fields, before rounding: `_direct` from converged
 direct light, the others from the full model of a matte coating: 64 pictures from 512 points an LED, four bounces
@@ -33,15 +32,13 @@ from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.placement import pose_at, thickness_under
 from tactile_core.mechanics.solve import solve
-from tactile_core.pictures.calibrate.ball_pictures import FastPictures
 from tactile_core.pictures.coating_spread import CoatingSpread
 from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
-from tactile_core.pictures.mitsuba.gel_light import PATHS_A_PASS, GelLight
 from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import LLVM, SCALAR, choose_variant
-from tactile_core.pictures.presets import FAST, NAMES, PRESETS, QUALITY, REFERENCE, STANDARD, TABLE, Preset
+from tactile_core.pictures.presets import FAST, NAMES, PRESETS, REFERENCE, TABLE, Preset
 from tactile_core.pictures.renderer import Renderer
-from tactile_core.sensors.calibration import Calibration, Coating
+from tactile_core.sensors.calibration import Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 
 SEED = 20261122  # of the fields
@@ -49,10 +46,7 @@ FIELDS = 10
 # Depths are drawn evenly up to this share of the gel's thickness: 1.2 mm, as deep as a ball of 6 mm is photographed.
 # Farther down, the walls round a small punch fold over, where a height map is a guess.
 DEEPEST = 0.3
-SMALL, LARGE = (120, 160), (480, 640)
-# Levels from paths, by the depth of a ball, m, and preset.
-PATHS_TARGET = {1.2e-3: {"standard": 0.6, "quality": 0.5}, 2e-3: {"standard": 0.9, "quality": 0.9}}
-COATINGS = (Coating(), Coating("roughplastic"), Coating("principled", roughness=0.4))
+LARGE = 480, 640
 # Grey levels and ms on one core that the presets are meant to reach, by variant.
 DIRECT_TARGET = {FAST: 0.5}
 FULL_TARGET = {"standard": 0.6, "quality": 0.5}
@@ -66,13 +60,12 @@ def main(arguments: list[str] | None = None) -> int:
     parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="two fields, the small size")
     parser.add_argument("--fields", type=int, default=FIELDS, metavar="N", help="contacts to draw")
-    parser.add_argument("--coatings", action="store_true", help="only standard and quality against paths, by coating")
     parser.add_argument("--calibration", metavar="FILE", help="another than the shipped one")
     options = parser.parse_args(arguments)
     unit = load_calibration(options.calibration)
     count = 2 if options.quick else options.fields
-    rows = printed(against_paths(unit) if options.coatings else measure(unit, count, options.quick))
-    if not (options.quick or options.calibration or options.coatings):
+    rows = printed(measure(unit, count, options.quick))
+    if not (options.quick or options.calibration):
         atomic.write_json(TABLE, table(rows, count))
     return finished(rows, options.json)
 
@@ -178,31 +171,6 @@ def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> f
     """Root mean square of all numbers, or of their differences."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
-
-
-def against_paths(unit: Calibration) -> Iterator[Row]:
-    """Rows of standard and quality against Mitsuba's path integrator, pixel by pixel, by coating and depth of a ball.
-
-    At 120 x 160, as everything there is a quarter of the work; the paths' noise, half the difference of two seeds, is
-    taken off.
-    """
-    unit = unit.at_size(*SMALL)
-    ours = [dataclasses.replace(preset, bounce_step=preset.bounce_step // 2) for preset in (STANDARD, QUALITY)]
-    for coating in COATINGS:
-        painted = dataclasses.replace(unit, coating=coating).with_gain(unit.gain)
-        bench = FastPictures(painted)
-        heights = [bench.rest, *(bench.heights((1e-3, 0.5e-3, depth, 3e-3)) for depth in PATHS_TARGET)]
-        lights = [GelLight(painted, preset, bench.rest, seed) for preset, seed in ((REFERENCE, 0), (REFERENCE, 1))]
-        lights += [GelLight(painted, preset, bench.rest, 0) for preset in ours]
-        found = np.array([[light.radiance(height) for height in heights] for light in lights])
-        one, other, *drawn = (found[:, 1:] - found[:, :1]) @ np.asarray(painted.response.centre).T
-        for k, (depth, targets) in enumerate(PATHS_TARGET.items()):
-            paths, noise = (one[k] + other[k]) / 2, np.mean(np.square(one[k] - other[k])) / 4
-            of = f"rms, {2 * PATHS_A_PASS * REFERENCE.paths} paths, their noise of {np.sqrt(noise):.2f} taken off"
-            for preset, pictures in zip(ours, drawn, strict=True):
-                error = float(np.sqrt(max(np.mean(np.square(pictures[k] - paths)) - noise, 0)))
-                name = f"{preset.name}_{coating.bsdf}_{1e3 * depth:g}mm_from_paths"
-                yield row(name, error, "levels", targets[preset.name], baseline=rms([paths]), of=of)
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:

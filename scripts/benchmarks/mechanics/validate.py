@@ -1,6 +1,6 @@
 """Hold contact mechanics against known answers, and its fast tier against its reference tier.
 
-    python scripts/validate_mechanics.py                       every row; tables and plots of docs/mechanics.md
+    python scripts/validate_mechanics.py                       every row; tables of docs/mechanics.md
     python scripts/validate_mechanics.py --quick --json FILE   under five minutes; writes FILE alone
     python scripts/validate_mechanics.py --only hertz golden   some checks; writes no report
 
@@ -22,7 +22,6 @@ from benchmarks.mechanics import (
     hertz,
     incompressible,
     manufactured,
-    many,
     oracle,
     patch,
     symmetry,
@@ -52,7 +51,6 @@ CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
     "symmetry": (symmetry.rows, "Turned and mirrored sensors give the turned and mirrored answer"),
     "fluid": (fluid.rows, "The fluid keeps its volume"),
     "incompressible": (incompressible.rows, "Poisson's ratio up to .4999"),
-    "many": (many.rows, "Random contacts of nine indenters: how many settle in the fast tier, and how long one takes"),
     "tiers": (tiers.rows, "The fast and the full tier against the reference tier: error beside time"),
 }
 

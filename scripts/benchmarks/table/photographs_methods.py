@@ -1,9 +1,8 @@
 """Pictures beside photographs: the DIGIT's pictures, ours beside others', on presses that were not fitted.
 
 Photographs are of a 6 mm ball pressed into a DIGIT; those that the calibration was not fitted on are the truth. The
-baseline is the background alone; a table after Taxim is fitted on the photographs the calibration was fitted on
-(taxim_like.py); each preset of `tactile render`. Where and how deep the ball was pressed
-is three numbers a photograph, found once by the fast picture; the table finds its own.
+baseline is the background alone. Where and how deep the ball was pressed is three numbers a photograph, found once by
+the fast picture.
 """
 
 from __future__ import annotations
@@ -20,11 +19,9 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration
 
 from .method import Method, best_ms, peak_mb
-from .taxim_like import TableBench, fit_table, try_table
 
 BALL = 3e-3  # m, radius
-TABLE = "taxim_like"
-NAMES = (TABLE, "fast", "standard", "quality")  # the reference takes minutes: see docs/optics.md
+NAMES = ("fast", "standard", "quality")  # the reference takes minutes: see docs/optics.md
 UNITS = {"roi_l1": "levels", "roi_psnr": "dB", "roi_ssim": "1", "frame_l1": "levels", "lobe_iou": "1"}
 
 
@@ -38,22 +35,15 @@ def measure(name: str, quick: bool, presses: str) -> Method:
     test = chosen(photographs, [press.name for press in photographs.presses if press.name not in fitted])
     tried = evaluate_unit(unit, test, BALL, search_radius=False)
     baseline, of = mean_metrics(tried)[1], f"{len(test.presses)} held-out photographs"
-    label = name
-    if name == TABLE:
-        table = fit_table(unit, chosen(photographs, fitted), BALL)
-        change = TableBench(FastPictures(unit), table).change
-        ms = best_ms(lambda: change(tried[0].ball))
-        each = try_table(table, unit, test, BALL)
-    else:
-        pressed = FastPictures(unit)
-        renderer = Renderer(unit, name, background=test.background, rest=pressed.rest)
-        label = name if name == "fast" else f"{name}_{choose_variant().name}"
-        heights = [pressed.heights(each.ball) for each in tried]
-        ms = best_ms(lambda: renderer(heights[0]))
-        each = [
-            metrics(_drifted(renderer(height), one.press), one.press.picture, test.background, one.press.region)
-            for height, one in zip(heights, tried, strict=True)
-        ]
+    pressed = FastPictures(unit)
+    renderer = Renderer(unit, name, background=test.background, rest=pressed.rest)
+    label = name if name == "fast" else f"{name}_{choose_variant().name}"
+    heights = [pressed.heights(each.ball) for each in tried]
+    ms = best_ms(lambda: renderer(heights[0]))
+    each = [
+        metrics(_drifted(renderer(height), one.press), one.press.picture, test.background, one.press.region)
+        for height, one in zip(heights, tried, strict=True)
+    ]
     values = _means(each)
     more = [
         row(f"photographs_{label}_{what}", values[what], unit_, baseline=baseline[what], of=of)

@@ -1,46 +1,30 @@
-"""Stated bounds against measured errors: mechanics, translation, pictures, scenes, photographs, all held out."""
+"""Stated bounds against measured errors of mechanics and translation, all held out."""
 
 from __future__ import annotations
 
-import re
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from benchmarks.measured_rows import png_of
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
 from benchmarks.translation.test_set import SEED, as_read
-from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
-from tactile_core.pictures.presets import measured as measured_presets
-from tactile_core.recordings import prepare, read
-from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
-from tactile_core.simulation.scene_recording import simulate_recording
 from tactile_core.training.step_errors import error_columns, joined, our_bodies, parts
 from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translate import load_translator
-from tactile_core.translation.translator import Translator
 
 from .mechanics_methods import EVERY
-from .method import ROOT, TEST_SET, TRAINING
+from .method import TEST_SET, TRAINING
 
 COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (assumed)
 FEWEST = 200  # contacts: of fewer, such a share is 1.5 % off and more by chance, and has no target
 TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |", "|---|---|---|---|---|---|"
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
-SCENES = "press", "press_roll_slide", "edge", "ring", "roll", "slide", "user_mesh"
-PICTURES = "| preset | stated | measured, each field |", "|---|---|---|"
-SCENES_TABLE = (
-    "| scene | frames | BioTac, expected | measured | below the bound | DIGIT, expected | measured | below the bound |",
-    "|---|---|---|---|---|---|---|---|",
-)
-PHOTOGRAPHS = "| photograph | stated | measured | baseline |", "|---|---|---|---|"
 
 
 @dataclass(frozen=True)
@@ -77,16 +61,11 @@ class Promise:
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
 
 
-def promised(rows: Sequence[Row], quick: bool) -> tuple[list[Row], dict[str, list[str]], bytes]:
-    """Rows, the page's tables and a PNG; rows : of the pictures and photographs that were measured in this run."""
+def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]], bytes]:
+    """Rows, the page's table and a PNG."""
     promises = [*of_mechanics(quick), *of_translation(quick)]
-    scenes = [] if quick else [scene_rows(load_translator(), name) for name in SCENES]
-    found = [promise.row() for promise in promises] + [each for part, _ in scenes for each in part]
-    tables: dict[tuple[str, ...], list[str]] = {
-        TABLE: [line for promise in promises for line in promise.lines()], PICTURES: list(of_pictures(rows)),
-        SCENES_TABLE: [line for _, line in scenes], PHOTOGRAPHS: list(of_photographs(rows)),
-    }  # fmt: skip
-    return found, {head[0]: [*head, *lines] for head, lines in tables.items() if lines}, plot(promises)
+    lines = [line for promise in promises for line in promise.lines()]
+    return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}, plot(promises)
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
@@ -132,44 +111,6 @@ def of_translation(quick: bool) -> Iterator[Promise]:
         found, groups = columns[f"{surface}_max_m"], [names[number] for number in order]
         of = f"{len(rows)} test contacts, largest node error"
         yield Promise(f"translation_{surface}", "um", 1e6 * bound[order], 1e6 * found[order], groups, of)
-
-
-def of_pictures(rows: Sequence[Row]) -> Iterator[str]:
-    """A line a preset that was measured."""
-    for name, entry in measured_presets()["presets"].items():
-        fields = [each["value"] for each in rows if re.fullmatch(rf"pictures_{name}(_\w+)?_field_\d+", each["name"])]
-        if fields:
-            yield f"| `{name}` | {entry['error']:.2f} | {', '.join(f'{value:.2f}' for value in fields)} |"
-
-
-def of_photographs(rows: Sequence[Row]) -> Iterator[str]:
-    """A line a photograph, drawn by the fast preset."""
-    promised_ = load_calibration().fit.errors["roi_l1"]
-    for each in rows:
-        match = re.fullmatch(r"photographs_fast_of_(.+)", each["name"])
-        if match:
-            yield f"| {match[1]} | {promised_:.1f} | {each['value']:.1f} | {each['baseline']:.1f} |"
-
-
-def scene_rows(translator: Translator, name: str) -> tuple[list[Row], str]:
-    """A scene's recording, simulated, then translated: rows of coverage, and a line of the table."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / f"{name}.h5"
-        simulate_recording(ROOT / "scenes" / name, file)
-        recording = read(file)
-    translation, truth = translator(prepare(recording)), recording.truth
-    touching = np.linalg.norm(truth.force, axis=1) > 0
-    cells, found = [f"`{name}`", str(touching.sum())], []
-    for surface in SURFACES:
-        true, answer = (getattr(each, f"displacement_{surface}")[touching] for each in (truth, translation))
-        miss = 1e6 * accuracy.max_error(answer, true)
-        expected, bound = (
-            1e6 * getattr(translation, f"{what}_{surface}")[touching] for what in ("expected_error", "error_bound")
-        )
-        covered = float((miss <= bound).mean())
-        cells += [f"{np.median(expected):.0f}", f"{np.median(miss):.0f}", f"{covered:.0%}"]
-        found.append(row(f"promised_scene_{name}_{surface}_covered", covered, "1", of=f"{touching.sum()} frames"))
-    return found, "| " + " | ".join(cells) + " |"
 
 
 def plot(promises: Sequence[Promise]) -> bytes:

@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not options.only:
             from benchmarks.table.promised import promised
 
-            found, tables, picture = promised(rows, options.quick)
+            found, tables, picture = promised(options.quick)
             rows += found
     except TactileError as error:
         print(error, file=sys.stderr)
