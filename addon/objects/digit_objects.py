@@ -8,7 +8,7 @@ import numpy as np
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ..settings import properties
-from . import axes, mesh_cache, styles, surfaces
+from . import axes, mesh_cache, motion, styles, surfaces
 from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
@@ -41,13 +41,14 @@ def add_gel(
 def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """Return the displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
 
-    Raises TactileError for a gel that is hidden, which Blender leaves at rest, where modifiers have changed the number
-    of vertices, and where they lack the file that moves the gel.
+    Raises TactileError for a gel that is hidden, which Blender leaves at rest, or whose mesh itself was moved, where
+    modifiers have changed the number of vertices, and where they lack the file that moves the gel.
     """
     if not any(each.object.original == gel for each in depsgraph.object_instances):
         found = f"hidden in view layer {depsgraph.view_layer.name}"
         raise TactileError(gel.name, found, "a gel that is shown", "Show it, and its collection, in renders too")
     mesh_cache.check(gel)
+    motion.check_rest(gel)
     rest = properties.surface_of(gel).rest
     mesh = gel.evaluated_get(depsgraph).data
     vertices = mesh.vertices

@@ -5,7 +5,25 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...tactile_core.errors import TactileError
+from ..settings import properties
 from . import axes, curves, mesh_cache
+
+_APPLIED = 1e-4  # m that half of the nodes must be off: no dent is as wide (assumed)
+
+
+def check_rest(*things: bpy.types.Object) -> None:
+    """Raise TactileError for a sensor whose mesh itself was moved, as Apply Location does: all places would be off."""
+    for thing in things:
+        keys = thing.data.shape_keys
+        own = np.empty(3 * len(thing.data.vertices), np.float32)
+        (keys.reference_key.data if keys else thing.data.vertices).foreach_get("co", own)
+        rest, nodes = properties.surface_of(thing).rest, axes.to_sensor(own.reshape(-1, 3), thing.tactile.per_metre)
+        off = np.median(np.linalg.norm(nodes - rest, axis=1)) if nodes.shape == rest.shape else 0.0
+        if off > _APPLIED:
+            found = f"its mesh lies {1e3 * off:.1f} mm off the sensor's own: a location, rotation or scale was applied"
+            advice = "Undo that (Ctrl Z), or delete the sensor and import, translate or add it again"
+            raise TactileError(thing.name, found, "a sensor moved as an object", advice)
 
 
 def animate(

@@ -47,9 +47,10 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
     properties.set_up_part(legend, thing, "LEGEND")
     legend.hide_select = True
     legend["text"] = [title, *(ends or ())]
-    styles.make_colour_active(legend.data)
     shown = np.column_stack([colours, np.ones(len(colours))]).astype(np.float32)
-    legend.data.color_attributes[style_nodes.COLOUR].data.foreach_set("color", shown.ravel())
+    held = legend.data.color_attributes.new(style_nodes.COLOUR, "FLOAT_COLOR", "POINT")
+    held.data.foreach_set("color", shown.ravel())
+    styles.make_colour_active(legend.data)
     legend.data.materials.append(style_nodes.legend_material())
     return legend
 

@@ -78,12 +78,8 @@ def arrow_of(sensor: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def make_colour_active(mesh: bpy.types.Mesh) -> None:
-    """Let Solid views colour by the attribute that the nodes write: they show the mesh's active one of that name."""
-    if style_nodes.COLOUR not in mesh.color_attributes:
-        made = mesh.color_attributes.new(style_nodes.COLOUR, "FLOAT_COLOR", "POINT")
-        grey = np.tile(np.array([*style_nodes.STILL, 1.0], np.float32), len(mesh.vertices))
-        made.data.foreach_set("color", grey)
-    mesh.color_attributes.active_color = mesh.color_attributes[style_nodes.COLOUR]
+    """Let Solid views colour by the attribute that the nodes write; without nodes they show the object's own colour."""
+    mesh.attributes.active_color_name = style_nodes.COLOUR
 
 
 def _add_nodes(thing: bpy.types.Object, style: str, values: dict[str, object]) -> bpy.types.NodesModifier:

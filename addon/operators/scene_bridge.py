@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ..objects import curves, indenter_objects
+from ..objects import curves, indenter_objects, motion
 from ..settings import properties
 
 DEFAULTS = {"format": "tactile-scene-1", "name": "scene", "description": "Made in Blender."}
@@ -51,6 +51,7 @@ def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
     found = properties.gel_of(context.scene) or properties.of_role(context.scene, "BIOTAC")
     if found is None:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+    motion.check_rest(found)
     return found
 
 

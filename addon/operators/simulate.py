@@ -10,6 +10,7 @@ from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import SAMPLE_RATE
+from ..objects import motion
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import require
@@ -47,7 +48,9 @@ class TACTILE_OT_simulate(JobOperator):
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene import write_scene
 
-        properties.check_own(*simulation_result.sensors_in(context.scene))
+        sensors = simulation_result.sensors_in(context.scene)
+        properties.check_own(*sensors)
+        motion.check_rest(*sensors)
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")

@@ -6,7 +6,7 @@ import numpy as np
 from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import gel_place
-from ..objects import curves, digit_body, digit_objects
+from ..objects import curves, digit_body, digit_objects, motion
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import require, shown
@@ -42,6 +42,8 @@ class TACTILE_OT_translate(JobOperator):
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin)
+        beside = properties.home_of(skin).objects
+        motion.check_rest(*(thing for thing in beside if thing.tactile.role in properties.OF_ROLE))
         about = skin.tactile
         with shown(context) as progress:
             found = recording_data.load(bpy.path.abspath(about.recording), about, progress)

@@ -68,21 +68,22 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
         if editor is not None:
             editor.type = "IMAGE_EDITOR"
             look_again(context)
-    if editor is not None:
+    if editor is not None and editor.spaces.active.image != image:
         editor.spaces.active.image = image
+        look_again(context, pictures_alone=True)
 
 
-def look_again(context: bpy.types.Context) -> None:
+def look_again(context: bpy.types.Context, pictures_alone: bool = False) -> None:
     """Frame pictures and the selection again once the window is drawn: until then, a view keeps its old size."""
-    look = functools.partial(_look_at_selected, context.window_manager, context.window)
+    look = functools.partial(_look_at_selected, context.window_manager, context.window, pictures_alone)
     bpy.app.timers.register(look, first_interval=DRAWN)
 
 
-def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:
+def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window, pictures_alone: bool) -> None:
     """Look once more at pictures and at what is selected, an indenter with its sensor."""
     if window not in windows.windows[:]:
         return
-    selected = bpy.context.selected_objects
+    selected = [] if pictures_alone else bpy.context.selected_objects
     with bpy.context.temp_override(window=window):
         if selected:
             look_at(bpy.context, [*selected, *(thing.parent for thing in selected if thing.parent is not None)])

@@ -94,3 +94,17 @@ def test_an_instance_is_told_from_a_gel(gel, draw, tmp_path):
     bpy.context.scene.collection.children.link(group)
     bpy.context.scene.frame_set(80)
     assert np.abs(draw(gel) - before).max() <= 1
+
+
+@pytest.mark.parametrize("applied", ["location", "rotation", "scale"])
+def test_a_sensor_whose_place_was_applied_to_its_mesh_is_advised_on(gel, draw, part, applied):
+    skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
+    draw(gel)  # moved as an object, it is right
+    for thing, press in ((gel, lambda: draw(gel)), (skin, bpy.ops.tactile.translate)):
+        bpy.ops.object.select_all(action="DESELECT")
+        thing.select_set(True)
+        bpy.context.view_layer.objects.active = thing
+        thing.location, thing.rotation_euler, thing.scale = (0, 0, 2), (0, 0, 0.2), (1.1, 1.1, 1.1)
+        bpy.ops.object.transform_apply(**dict.fromkeys(("location", "rotation", "scale"), False) | {applied: True})
+        with pytest.raises(Exception, match=f"{thing.name}: its mesh lies .* was applied.*Undo that"):
+            press()

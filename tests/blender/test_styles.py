@@ -47,6 +47,11 @@ def test_styles_take_each_other_s_place(gel):
     colours, patch = shown(gel, "Tactile colour", 4, "color"), shown(gel, "contact_patch", 1, "value")[:, 0] > 0.5
     assert patch.any() and (colours[patch, 0] > 0.9).all() and (colours[~patch, 0] < 0.6).all()
     assert legend_of(gel) == ["orange: in contact"]
+    skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
+    assert skin.active_material.name == "Tactile object colour" and skin.color[3] < 0.5  # see-through
+    depsgraph = bpy.context.evaluated_depsgraph_get()  # Solid views show what has no colours by its object's
+    seen = {thing: thing.evaluated_get(depsgraph).data.color_attributes.active_color for thing in (skin, gel)}
+    assert seen[skin] is None and seen[gel].name == "Tactile colour"
     bpy.ops.tactile.set_style(style="NONE")
     assert not [thing for thing in gel.children if thing.tactile.role == "LEGEND"]
 
