@@ -1,23 +1,35 @@
-"""Hard contacts through the whole translation: from the counts that they make to the gel's nodes."""
+"""Hard contacts through the whole translation, from the counts that they make to the gel's nodes, and drift."""
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
+from conftest import ROOT
 
 from hard_cases.case import TRANSLATION, Found, case
 from hard_cases.test_shapes import CONTACTS, HARD_OF, SHOWN
-from hard_cases.test_signals import prepared, translator
-from tactile_core import accuracy
+from tactile_core import accuracy, recordings
 from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
 from tactile_core.mechanics.force_search import UnreachableError
 from tactile_core.mechanics.solve import solve
-from tactile_core.recordings import Signals
+from tactile_core.recordings import Recording, Signals
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors import REST_COUNTS
+from tactile_core.translation.translate import load_translator
 
 WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
+SHIPPED = ROOT / "scenes/press_roll_slide/press_roll_slide.h5"
+
+translator = functools.cache(load_translator)
+
+
+@functools.cache
+def prepared() -> tuple[Recording, Signals]:
+    """The recording that ships, which knows its truth, and its signals."""
+    recording = recordings.read(SHIPPED)
+    return recording, recordings.prepare(recording)
 
 
 @case("faint_touch_translated", "tiny depth (0.1 um)", TRANSLATION,
@@ -81,3 +93,23 @@ def test_still() -> Found:
     found = translator()(signals)
     broken = () if not found.force.any() and np.isnan(found.contact_center).all() else ("a force or a place",)
     return Found(float(np.abs(found.displacement_digit).max()) * 1e6, "um", 20.0, broken=broken)
+
+
+@case("drift_over_an_hour", "drift over an hour", TRANSLATION,
+      "88 counts an hour (Ruppel) taken off between quiet parts: 2 counts at most are left of 88")  # fmt: skip
+def test_drift() -> Found:
+    """An hour at 10 Hz: a press of 8 s every minute on the shipped recording's counts, every electrode drifting."""
+    random = np.random.default_rng(2)
+    time = np.arange(36000) / 10.0
+    strength = np.clip(np.sin((time % 60 - 20) / 8 * np.pi), 0, None) * ((time % 60 > 20) & (time % 60 < 28))
+    press = strength[:, None] * np.linspace(-40, 120, 19)
+    slope = np.linspace(-88, 88, 19) / 3600
+    counts = np.rint(3300 + press + time[:, None] * slope + random.normal(0, 1, press.shape))
+    recording = dataclasses.replace(
+        prepared()[0], time=time, electrodes=counts, rows=np.arange(len(time)), truth=None, pdc=None, tac=None,
+        tdc=None, pac=None, position=None, force=None, flags=np.zeros(len(time), np.uint16),
+    )  # fmt: skip
+    signals = recordings.prepare(recording)
+    off = np.abs((signals.change - press).reshape(-1, 50, 19).mean(axis=1)).max()  # over 5 s: 0.14 counts of noise
+    words = f"{len(signals.report['quiet_parts'])} quiet parts, slopes off by {np.abs(signals.drift - slope).max():.4f}"
+    return Found(float(off), "counts", 2.0, words=words + " counts/s")

@@ -13,7 +13,7 @@ from slab import slab_compliance
 
 from hard_cases.case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TIERS, TRANSLATION, Found, case, refusal
 from hard_cases.contacts import MIDDLE, broken_fast, broken_full, full, over_stated, press
-from hard_cases.test_signals import prepared
+from hard_cases.test_chain import prepared
 from tactile_core import sensors
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.fast.contact import ContactProblem
