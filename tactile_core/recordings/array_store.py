@@ -65,6 +65,7 @@ class Store:
         cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
 
         def load(name: str) -> np.ndarray:
+            """Load an array, of long ones the rows alone."""
             return self.load_rows(name, rows) if self.load_rows and name in long else self.load(name)
 
         return replace(self, shapes=self.shapes | cut, load=load)

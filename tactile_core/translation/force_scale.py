@@ -81,6 +81,7 @@ def with_stiffness(
     forces = [read_force(named, recording) for recording in recordings]
 
     def found_of(one: ElectrodeGains) -> ForceScale:
+        """Fit the scale and lag of the force that is translated with a unit's gains."""
         times, sizes = zip(*(_translated(translator, recording, one, options) for recording in recordings), strict=True)
 
         def measured(lag: float) -> np.ndarray:

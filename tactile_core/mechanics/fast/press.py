@@ -162,6 +162,7 @@ class CorrectedPress:
         """
 
         def move(depth: float, before: FastContact) -> FastContact:
+            """Return the corrected contact at a depth m from first touch, starting from the contact before."""
             contact = self.problem.at_pose(pose.moved(depth + fall), before.linear)
             if not contact.converged:
                 raise UnsolvedError(f"no contact at {depth * 1e3:g} mm")

@@ -162,6 +162,7 @@ class ContactSet:
         stiffness -= float(np.einsum("ki,kij,kj->", along, self._gripping, along))
 
         def residual_force(share: float) -> float:
+            """Force N left along the step after a share of it: zero where the energy along it is least."""
             rubbing, _ = self._capped(self._trial - share * self.grip * along)
             return force + share * stiffness - float((along * rubbing).sum())
 

@@ -41,6 +41,7 @@ def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy
         raise NotPositiveDefiniteError(str(error)) from error
 
     def solve(b: np.ndarray) -> np.ndarray:
+        """Solve b (n, k) in parts that cholespy takes, each copied, since it wants its rows contiguous."""
         x = np.empty_like(b)
         for start in range(0, b.shape[1], _BATCH):
             part = np.ascontiguousarray(b[:, start : start + _BATCH])
@@ -168,6 +169,7 @@ class DampedFactor:
             raise NotPositiveDefiniteError("the solid is unstable, damped or not")
 
         def solve(force: np.ndarray) -> np.ndarray:
+            """Return the displacements (n, 3) m of all nodes under forces (n, 3) N on those that are not held."""
             moved = np.zeros(force.size)
             moved[free] = fast(np.where(held, 0.0, force).ravel()[free, None])[:, 0]
             return moved.reshape(-1, 3)

@@ -57,6 +57,7 @@ def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
 
 class _LlvmTracer(Tracer):
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Tracer.trace``; all pixels and points in one compiled kernel."""
         mi = activate(self.variant)
         import drjit as dr
 
@@ -94,6 +95,7 @@ class _ScalarTracer(Tracer):
         self._lit = self.mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
 
     def around(self) -> dict[str, Any]:
+        """Return a point light, which goes to each point in turn, and the camera."""
         camera = self.camera
         half_width = camera.width / 2 * camera.pixel_size[0]
         transform = self.mi.ScalarTransform4f()
@@ -110,6 +112,7 @@ class _ScalarTracer(Tracer):
         return {"light": {"type": "point", "position": [0, 0, 10]}, "eye": eye}
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """See ``Tracer.trace``; a point is seen where its light arrives."""
         mi = activate(self.variant)
         for axis, size, move in (("x", self.camera.width, shift[0]), ("y", self.camera.height, shift[1])):
             self.values[f"eye.principal_point_offset_{axis}"] = float(move / size)

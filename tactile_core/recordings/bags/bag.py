@@ -150,7 +150,10 @@ def _bound_unpacking() -> None:
     from rosbags.rosbag2 import storage_mcap
 
     def bounded(unpacker: Callable[[], Any]) -> Callable[..., bytes]:
+        """Make a function that unpacks a chunk by an ``unpacker()`` and stops at MAX_CHUNK."""
+
         def unpack(data: bytes, size: int = 0) -> bytes:
+            """Unpack a chunk, whatever size it declares; raises ValueError for one of MAX_CHUNK and more."""
             found = unpacker().decompress(data, max_length=MAX_CHUNK)
             if len(found) >= MAX_CHUNK:
                 raise ValueError(f"a chunk of over {MAX_CHUNK // 2**20} MB")

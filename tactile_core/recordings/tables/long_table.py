@@ -28,6 +28,7 @@ def refuse_several(table: Table, columns: ColumnMap) -> None:
     keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
 
     def different(places: list[int]) -> int:
+        """Count the different values that columns have together in the first rows."""
         rows = np.column_stack([table.exact.get(place, table.values[:, place])[:LOOKED_AT] for place in places])
         return len(np.unique(rows, axis=0))
 
