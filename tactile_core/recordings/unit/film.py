@@ -86,7 +86,7 @@ class Film:
         known = known / np.linalg.norm(known, axis=1, keepdims=True)
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
-            """Return the changes (len(frames), 19) counts that a typical unit would show, without those that are drift."""
+            """Return what a typical unit would show, (len(frames), 19) counts, without what is drift."""
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
