@@ -14,6 +14,7 @@ PROPERTIES = {  # custom ones of a sensor, keyframed: for drivers of the user's 
     "pdc": "Fluid pressure as recorded, counts",
     "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
     "confidence": "1: signals like those of the training, 0: far from them",
+    "explained": "Share of the electrodes' change that the translated contact explains; 0 without contact",
     "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres;"
     " below 0 where it is not known",
     "dent_um": "Largest displacement of a node of this surface, micrometres",

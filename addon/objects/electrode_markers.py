@@ -15,22 +15,21 @@ _REST = np.array([0.85, 0.85, 0.85])
 _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film thinner, film thicker
 
 
-def add_markers(
-    skin: bpy.types.Object, group: bpy.types.Collection, change: np.ndarray, frames: np.ndarray
-) -> list[bpy.types.Object]:
-    """Add the markers E1, E2, ..., children of the skin; red where the reading rose, blue where it fell.
+def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> list[bpy.types.Object]:
+    """Add the markers E1, E2, ..., in place of former ones; red where the reading rose, blue where it fell.
 
     change : (T, e) counts; the strongest colour stands for the recording's largest change
     """
+    for old in [thing for thing in skin.children if thing.tactile.role == "ELECTRODE"]:
+        bpy.data.objects.remove(old)
     colours = colours_of(change)
     ball = _ball(skin.tactile.per_metre)
     markers = []
     places = sensors.electrodes(properties.sensor_name(skin))
     for k, place in enumerate(axes.to_blender(places, skin.tactile.per_metre)):
         marker = bpy.data.objects.new(f"E{k + 1}", ball)
-        properties.set_up(marker, "ELECTRODE", skin.tactile.per_metre)
-        group.objects.link(marker)
-        marker.parent, marker.location = skin, place
+        properties.set_up_part(marker, skin, "ELECTRODE")
+        marker.location = place
         if not ball.materials:
             surfaces.paint(marker, (*_REST, 1.0))
         marker.color = (*colours[0, k], 1.0)

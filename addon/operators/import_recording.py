@@ -9,9 +9,10 @@ from bpy_extras.io_utils import ImportHelper
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
+from ...tactile_core.recordings.info import unit_rows
 from ...tactile_core.recordings.opened_file import ENDINGS
 from ...tactile_core.sensors.electrodes import table_of
-from ..objects import axes, biotac_objects, electrode_markers
+from ..objects import axes, biotac_objects, curves, electrode_markers
 from ..settings import properties
 from ..settings.properties import MOTIONS, RecordingOptions
 from ..settings.reports import TactileOperator, in_blender, shown
@@ -81,9 +82,9 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         view.hide_untouched(scene)
         kept = self._keep_scene(scene)
         frames = self.first_frame + found.chosen.astype(float)
-        skin = self._objects(scene, path, found, frames, placed)
-        moved = found.translation.displacement_biotac
-        summary = set_style.animate(skin, moved, frames, self.motion, found.columns())
+        skin = self._skin(scene, path, found)
+        skin.tactile.motion = self.motion
+        summary = play(skin, found, frames)
         if self.set_timeline:
             view.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
             firmest = np.linalg.norm(found.translation.force, axis=1).argmax()
@@ -118,9 +119,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         asked = {"title": os.path.basename(self.filepath), "confirm_text": "Import", "translate": False}
         return context.window_manager.invoke_props_dialog(self, **asked)
 
-    def _objects(
-        self, scene: bpy.types.Scene, path: str, found: recording_data.Translated, frames: np.ndarray, placed: bool
-    ) -> bpy.types.Object:
+    def _skin(self, scene: bpy.types.Scene, path: str, found: recording_data.Translated) -> bpy.types.Object:
         group = biotac_objects.new_collection(scene, found.recording.name)
         before = [thing for thing in scene.objects if thing.tactile.role == "BIOTAC"]
         skin = biotac_objects.add_skin(group, axes.units_per_metre(scene), found.translator.source)
@@ -133,10 +132,24 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             setattr(about, name, getattr(self, name))
         about.first_frame = self.first_frame
         biotac_objects.add_core(group, skin)
-        if placed:
-            electrode_markers.add_markers(skin, group, found.signals.change, frames)
-            electrode_markers.add_counts(skin, found.signals.change, frames)
         return skin
+
+
+def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> str:
+    """Let a skin and its electrodes play a recording at frames (T,) of the scene; returns a sentence."""
+    skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in unit_rows(found.signals))
+    if table_of(properties.sensor_name(skin)).is_file():
+        electrode_markers.add_markers(skin, found.signals.change, frames)
+        electrode_markers.add_counts(skin, found.signals.change, frames)
+    return set_style.animate(skin, found.translation.displacement_biotac, frames, skin.tactile.motion, found.columns())
+
+
+def plays(skin: bpy.types.Object, found: recording_data.Translated) -> bool:
+    """Return true if an imported skin's signals and forces are these; false once another unit or tare is chosen."""
+    values = found.columns()
+    shown = {name: values[name].astype(np.float32).T for name in ("electrodes", "force")}
+    return all(np.array_equal(curves.values_of(skin, f'["{name}"]', k), row) for name, rows in shown.items()
+               for k, row in enumerate(rows))  # fmt: skip
 
 
 class TACTILE_FH_recording(bpy.types.FileHandler):

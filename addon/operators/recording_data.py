@@ -43,6 +43,7 @@ class Translated:
             "electrodes": self.signals.change,
             "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
             "confidence": translation.confidence,
+            "explained": translation.explained,
             "expected_error_um": 1e6 * translation.expected_error_biotac,
             "dent_um": 1e6 * accuracy.lengths(translation.displacement_biotac).max(axis=1),
             "flags": translation.flags,

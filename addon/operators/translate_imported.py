@@ -11,6 +11,7 @@ from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import require, shown
 from . import pictures, recording_data, set_style, view
+from .import_recording import play, plays
 from .job_operator import JobOperator
 
 _READ = ("displacement_digit", "contact_center", "force", "flags")  # of a translation, to solve its contacts
@@ -75,10 +76,12 @@ class TACTILE_OT_translate(JobOperator):
         if skin is None:
             raise TactileError(self._skin, "no longer in the scene", "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
+        if "confidence" in skin and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
+            play(skin, self._found, frames)
         gel, new = _gel_beside(skin, self._target)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
         values = self._found.columns()
-        told = {name: values[name] for name in ("force", "confidence")}
+        told = {name: values[name] for name in ("force", "confidence", "explained")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
         told |= {"dent_um": 1e6 * accuracy.lengths(self._moved).max(axis=1)}
         summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)

@@ -88,6 +88,7 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
     recording: bpy.props.StringProperty(
         name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=RELATIVE
     )
+    known: bpy.props.StringProperty(name="Known", description="What the recording was read with of its unit, in words")
     sensor: bpy.props.StringProperty(name="Sensor", description="Whose skin or gel it is, as its descriptor is named")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
     colour: bpy.props.StringProperty(name="Colour", description="Which LED of the calibration this is")

@@ -76,10 +76,11 @@ def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.t
     column = layout.column(align=True)
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
     words, guess = trust_of(skin, properties.gel_of(context.scene, context.object or skin))
-    icon = "ERROR" if guess else "CHECKMARK"
-    for line in _wrapped(words, context.region.width):
-        column.label(text=line, icon=icon)
-        icon = "BLANK1"
+    _text(column, context, words, "ERROR" if guess else "CHECKMARK")
+    for line in numbers_of(skin) if words else ():
+        _text(column, context, line)
+    for line in skin.tactile.known.splitlines():
+        _text(column, context, line, "OUTLINER_DATA_LATTICE")
 
 
 def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str, bool]:
@@ -96,10 +97,21 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
     return words, trust_words.is_guess(*trust)
 
 
-def _wrapped(text: str, width: int) -> list[str]:
-    """Break a text into lines that fit a panel of so many pixels beside an icon."""
-    scale = bpy.context.preferences.system.ui_scale
-    return textwrap.wrap(text, max(16, int((width / scale - 60) / 6.2)))
+def numbers_of(skin: bpy.types.Object) -> list[str]:
+    """Return an imported skin's numbers of the current frame in words: confidence, what is explained, all flags."""
+    lines = [f"Confidence {skin['confidence']:.2f}"]
+    if any(skin["force"]) and "explained" in skin:
+        lines[0] += f", {100 * skin['explained']:.0f} % of the signals explained"
+    flags = trust_words.remarks(int(skin["flags"]))
+    return [*lines, f"Flags: {', '.join(flags)}"] if flags else lines
+
+
+def _text(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "BLANK1") -> None:
+    """Draw a text in lines that fit the panel, an icon beside the first."""
+    scale = context.preferences.system.ui_scale
+    for line in textwrap.wrap(text, max(16, int((context.region.width / scale - 60) / 6.2))):
+        column.label(text=line, icon=icon)
+        icon = "BLANK1"
 
 
 class TACTILE_PT_picture(_Panel, bpy.types.Panel):

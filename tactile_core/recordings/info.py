@@ -74,8 +74,7 @@ def _rows(recording: Recording, signals: Signals, pac: int) -> list[tuple[str, s
         ("polarity", f"{report['polarity']}: {report['polarity_evidence']}"),
         ("tare", f"{report['quiet_evidence']}{_parts(recording, signals)}"),
         ("drift", _drift(signals)),
-        *_film(signals),
-        *_stiffness(signals),
+        *unit_rows(signals),
         (
             "suspicious",
             f"{report['samples_glitch']} glitch samples, {report['samples_interpolated']} unreadable samples"
@@ -139,6 +138,12 @@ def _drift(signals: Signals) -> str:
         return "not removed: " + ("its sign is lost" if signals.kind == "rectified" else "it needs two quiet parts")
     worst = int(np.argmax(np.abs(signals.drift)))
     return f"removed, up to {abs(signals.drift[worst]):.3f} counts/s (E{worst + 1})"
+
+
+def unit_rows(signals: Signals) -> list[tuple[str, str]]:
+    """Return what is known of the unit as label and words: its file's note, film, fluid and stiffness."""
+    note = signals.report.get("sensor", {}).get("note")
+    return [*([("unit", note)] if note else []), *_film(signals), *_stiffness(signals)]
 
 
 def _film(signals: Signals) -> list[tuple[str, str]]:

@@ -56,6 +56,11 @@ def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: f
     return bool(doubted or (dent > 0 and expected_error > MOST_OF_DENT * dent))
 
 
+def remarks(flags: int) -> list[str]:
+    """Return the words of a frame's flags, the gravest first."""
+    return [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
+
+
 def in_words(
     confidence: float, flags: int, expected_error: float, dent: float, force: Sequence[float] | np.ndarray
 ) -> str:
@@ -64,7 +69,7 @@ def in_words(
     confidence, flags, expected_error, dent : see `is_guess`
     force : (3,) N of the translation, zero where it finds no contact; of a gel at rest no error is told
     """
-    reasons = [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
+    reasons = remarks(flags)
     touching = bool(np.any(force))
     guess = is_guess(confidence, flags, expected_error if touching else 0.0, dent)
     untold = guess and not any(flags & bit for bit in _DOUBTS)

@@ -190,3 +190,25 @@ print("played")
         command = [sys.executable, "-c"]
     done = subprocess.run([*command, code], capture_output=True, text=True, timeout=120)
     assert "played" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_unit_s_file_is_told_and_moves_the_skin_too(imported, part, tmp_path, needs):
+    needs("msgspec")
+    gains = part("tactile_core.recordings.electrode_gains")
+    unit = gains.ElectrodeGains("made for this test", [2.0] * 19, [0.0] * 19, film=1.3)
+    gains.write(tmp_path / "unit.toml", gains.units_file({"unit": unit}))
+    skin = imported(frames="70:90")
+    assert "fluid film: 1.00 as thick" in skin.tactile.known and "different contacts" in skin.tactile.known
+    force, markers = skin.tactile.largest, len(skin.children)
+    skin.tactile.unit = str(tmp_path / "unit.toml")
+    bpy.ops.tactile.translate()
+    told = skin.tactile.known.splitlines()
+    assert told[0] == "unit: made for this test" and told[1].startswith("fluid film: 1.30 as thick")
+    assert skin.tactile.largest < 0.9 * force and len(skin.children) == markers
+    bpy.context.scene.frame_set(80)
+    lines = part("addon.ui.panels").numbers_of(skin)
+    found = part("addon.operators.recording_data")
+    explained = next(iter(found._KEPT.values())).translation.explained[10]
+    assert f"{100 * explained:.0f} % of the signals explained" in lines[0]
+    bpy.ops.tactile.translate()  # again: nothing else was chosen
+    assert len(skin.children) == markers
