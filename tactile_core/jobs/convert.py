@@ -65,6 +65,7 @@ class ToolOptions:
         translate, None for whichever they do
     calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``, for
         all pictures but fast ones
+    object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
     gel : the networks', or the found contact solved on the target (``solved_gel``), as for any target to which the
         shipped weights do not lead; target : the gel, to which the weights must translate unless it is solved
@@ -78,6 +79,7 @@ class ToolOptions:
     gel: GelKind = TRANSLATED
     target: str = TARGET
     source: str | None = SOURCE
+    object_reflectance: float | None = None
 
     def load_networks(self) -> tuple[Translator, bool]:
         """Load the networks, and tell whether the target is solved under the contacts that they find."""
@@ -93,7 +95,7 @@ def load_tools(options: ToolOptions) -> Tools:
     """
     translator, solves = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
-    return Tools(translator, load_drawer(*unit, translator.target, solves=solves))
+    return Tools(translator, load_drawer(*unit, translator.target, options.object_reflectance, solves=solves))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -228,6 +230,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
                     "error": None if options.error is None else str(options.error), "preset": tools.drawer.preset,
+                    "object_reflectance": tools.drawer.object_reflectance,
                     "answer": dataclasses.asdict(tools.translator.answer),
                     "gel": TRANSLATED if tools.drawer.solve is None else SOLVED},
         "frames_converted": len(frames),

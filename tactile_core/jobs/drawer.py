@@ -30,6 +30,7 @@ class Drawer:
     solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
     dots : on the gel that is drawn; None: it has none
     target : the gel; found_on : the gel of the networks, on which contacts are found that are solved on another
+    object_reflectance : 0 black to 1 white, of what touches the gel
     """
 
     height_map: Callable[[np.ndarray], np.ndarray]
@@ -40,6 +41,7 @@ class Drawer:
     dots: MarkerField | None = None
     target: str = TARGET
     found_on: str = TARGET
+    object_reflectance: float = 0.0
 
     def gel(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return arrays by the names of frames.h5 with the gel that is drawn: the networks', or solved."""
@@ -82,19 +84,21 @@ def load_drawer(
     variant: str | None = None,
     target: str = TARGET,
     found_on: str = TARGET,
+    object_reflectance: float | None = None,
     *,
     solves: bool = False,
 ) -> Drawer:
     """Load camera and lights of a gel: the unit's that ships, or a file's.
 
     preset, variant : of ``renderer.Renderer``, for all pictures but fast ones; solves : whether contacts are solved
+    object_reflectance : of what touches the gel; None for the calibration's
     The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
     Raises TactileError for a bad calibration, and what ``renderer.Renderer`` raises.
     """
     from ..pictures import background, height_map, renderer
     from ..sensors.calibration_file import load_calibration
 
-    unit = load_calibration(calibration, target)
+    unit = load_calibration(calibration, target, object_reflectance)
     mapper, dots = height_map.gel_mapper(unit.camera), None
     if preset == "fast" and unit.markers is None:
         if unit.photograph:
@@ -110,4 +114,4 @@ def load_drawer(
 
         solved_gel.prepare(target)
         solve = functools.partial(solved_gel.solved, gel=target, found_on=found_on)
-    return Drawer(mapper, shade, unit.camera, preset, solve, dots, target, found_on)
+    return Drawer(mapper, shade, unit.camera, preset, solve, dots, target, found_on, unit.object_reflectance)

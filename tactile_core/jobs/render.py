@@ -52,6 +52,7 @@ class Options:
     """Options of rendering.
 
     preset : its name, None to choose by error; error : what will do, None for the default preset and the fast tier
+    object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
     frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
     noise : whether PNG pictures have the camera's noise, the same in every run
@@ -67,6 +68,7 @@ class Options:
     noise: bool = False
     overwrite: bool = False
     scene_out: str | os.PathLike | None = None
+    object_reflectance: float | None = None
 
 
 def render(
@@ -242,7 +244,7 @@ def pictures(
 
     Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
     """
-    unit = at_size(load_calibration(options.calibration), heights, options.size)
+    unit = at_size(load_calibration(options.calibration, None, options.object_reflectance), heights, options.size)
     about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
     renderer = Renderer(unit, preset, options.variant)
     return Pictures(renderer, clock or Stopwatch(), about, heights is not None, options.noise, options.exr)
@@ -262,6 +264,7 @@ def note_of(
         "frames": {"selected": frames_text(options.frames), "rendered": count},
         "calibration": {"file": calibration.name, "sha256": provenance.sha256(calibration), "unit": unit},
         "background": background_of(renderer),
+        "object_reflectance": renderer.calibration.object_reflectance,
         "noise": options.noise,
         "size": {"width": renderer.camera.width, "height": renderer.camera.height},
         "preset": {

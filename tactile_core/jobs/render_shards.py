@@ -60,8 +60,9 @@ def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> J
     unit = "" if options.calibration is None else inputs.unit_hash(Path(options.calibration))
     frames = frames_text(options.frames).replace("all", ":")
     recipe = Render(
-        preset, variant_for(preset, options.variant), frames, options.size, options.exr, options.noise, unit
-    )
+        preset, variant_for(preset, options.variant), frames, options.size, options.exr, options.noise, unit,
+        options.object_reflectance,
+    )  # fmt: skip
     calibration = None if options.calibration is None else os.fspath(options.calibration)
     return jobs.make(inputs.hashed([file], lambda done, total: None), recipe, None, calibration)
 
@@ -148,6 +149,7 @@ def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] 
     """The renderer, once a process; heights : (H, W) of height maps, None for displacements."""
     check_unit(calibration, recipe.calibration)
     options = Options(
-        calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise
-    )
+        calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise,
+        object_reflectance=recipe.object_reflectance,
+    )  # fmt: skip
     return pictures(options, recipe.preset, heights)

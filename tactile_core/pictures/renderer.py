@@ -21,6 +21,7 @@ from .mitsuba.gel_light import GelLight
 from .mitsuba.gel_scene import NOTHING, Surroundings
 from .mitsuba.matte_light import MatteLight
 from .mitsuba.variant import LLVM, choose_variant
+from .object_light import object_light
 from .perspective import Perspective
 from .presets import DEFAULT, FAST, preset_named
 
@@ -143,8 +144,14 @@ class Renderer:
         return self._completed(light, seen)
 
     def _completed(self, light: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3)."""
-        return np.moveaxis(self._spread(light + raised_light(self.calibration, seen)), 0, -1)
+        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3).
+
+        With the light of the object that touches it.
+        """
+        spread = self._spread(light + raised_light(self.calibration, seen))
+        if self.calibration.through:
+            spread += object_light(self.calibration, seen - self.view.start)
+        return np.moveaxis(spread, 0, -1)
 
     def picture(
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None

@@ -71,6 +71,8 @@ class Coating:
     gloss : 0..1, size of highlights; not of diffuse
     metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
     spread : m, standard deviation of how far light goes sideways in it, at most 2 mm; over the picture, in every preset
+    transmission : 0..1, light that comes back through it from a white object that touches it, as a share of what it
+        reflects itself where it faces the LED at the picture's middle
     """
 
     bsdf: str = DIFFUSE
@@ -79,6 +81,7 @@ class Coating:
     gloss: float = number(default=0.5)
     metallic: float = number(default=0.0)
     spread: float = number("mm", default=0.0, may_miss=True)  # earlier versions' files have none
+    transmission: float = number(default=0.0, may_miss=True)
 
     def __post_init__(self) -> None:
         if self.bsdf not in MATERIALS:
@@ -87,6 +90,7 @@ class Coating:
             raise TactileError("coating, albedo", f"{len(self.albedo)} numbers", "three, one a LED")
         ranges = [("albedo", value, 0.0) for value in self.albedo]
         ranges += [("roughness", self.roughness, 0.02), ("gloss", self.gloss, 0.0), ("metallic", self.metallic, 0.0)]
+        ranges += [("transmission", self.transmission, 0.0)]
         for name, value, least in ranges:
             if not least <= value <= 1:  # false for NaN
                 raise TactileError(f"coating, {name}", f"{value:g}", f"{least:g} to 1")
@@ -173,6 +177,7 @@ class Calibration:
     ambient : (3, 21) or (3, 36), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a
         coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by
         i + j, then by j
+    object_reflectance : 0 black to 1 white, of what touches the gel
     ambient_rise : of each LED, share by which the ambient light's unit grows for each metre that gel stands higher
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, taken as equal
@@ -197,6 +202,7 @@ class Calibration:
     photographed: tuple[tuple[Led, Led, Led], tuple[float, float, float]] | None = None
     markers: Markers | None = None
     ambient_rise: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    object_reflectance: float = 0.0
 
     def __post_init__(self) -> None:
         if tuple(led.colour for led in self.leds) != COLOURS:
@@ -212,6 +218,7 @@ class Calibration:
         if not even or not np.isfinite(self.ambient).all():
             expected = f"3 rows of {AMBIENT_TERMS} or {PHOTOGRAPHED_TERMS} finite numbers"
             raise TactileError("ambient", f"rows of {lengths} numbers", expected)
+        _check_range("object reflectance", self.object_reflectance, 0.0, 1.0)
         for share in self.ambient_rise:
             _check_range("ambient, rise_per_mm", 1e-3 * share, -MOST_RISE, MOST_RISE)
         if self.markers is not None and self.photograph:
@@ -236,6 +243,17 @@ class Calibration:
         a sphere of even brightness (Lambert's law).
         """
         return self._lit([float(np.square(led.position).sum()) for led in self.leds])
+
+    @property
+    def through(self) -> float:
+        """Light from the object through the coating that it touches, as a share of ``facing``."""
+        return self.coating.transmission * self.object_reflectance
+
+    def with_through(self, through: float) -> Calibration:
+        """Return the unit with that much light from the object; a coating that a white one needs lets more through."""
+        most = max(self.coating.transmission, through)
+        coating = dataclasses.replace(self.coating, transmission=most)
+        return dataclasses.replace(self, coating=coating, object_reflectance=through / most if most else 0.0)
 
     @property
     def ambient_unit(self) -> np.ndarray:

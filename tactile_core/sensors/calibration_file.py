@@ -27,16 +27,21 @@ MM, PER_MM = 1e3, 1e-3  # of a file, in a metre and in 1/m
 EXPECTED, ADVICE = "a file of `tactile calibrate`", "Make it again with `tactile calibrate`"
 
 
-def load_calibration(path: str | os.PathLike | None = None, sensor: str | None = None) -> Calibration:
+def load_calibration(
+    path: str | os.PathLike | None = None, sensor: str | None = None, object_reflectance: float | None = None
+) -> Calibration:
     """Load the calibration in a TOML file; None for the one that ships with a sensor's descriptor, None the DIGIT's.
 
     path : written by ``tactile calibrate``, or by hand; its lengths are in mm, those of the result in m
     sensor : name of the sensor whose calibration it must be; None for any
+    object_reflectance : 0 black to 1 white, of what touches the gel; None for the file's
     A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
     be read, is unknown, missing or out of its range, and for a file of another sensor.
 
     >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))
     """
+    if object_reflectance is not None:
+        return dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
     if path is None:
         return _shipped(sensor or Camera.sensor)
     file = Path(path)
@@ -98,6 +103,11 @@ class _Noise:
 
 
 @dataclasses.dataclass(frozen=True)
+class _Object:
+    reflectance: float = number()
+
+
+@dataclasses.dataclass(frozen=True)
 class _File:
     """The tables of a file."""
 
@@ -114,6 +124,7 @@ class _File:
     format: str = one_of((FORMAT, WITHOUT_SPREAD))
     markers: Markers | None = dataclasses.field(default=None, metadata=MAY_MISS)
     sensor: str = dataclasses.field(default=Camera.sensor, metadata=MAY_MISS)
+    object: _Object = dataclasses.field(default=_Object(0.0), metadata=MAY_MISS)
 
 
 def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
@@ -137,6 +148,7 @@ def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
         photographed=(leds, found.coating.albedo) if photograph else None,
         markers=found.markers,
         ambient_rise=ambient.rise,
+        object_reflectance=found.object.reflectance,
     )
 
 
@@ -195,6 +207,10 @@ roughness = {toml_value(coating.roughness)}
 gloss = {toml_value(coating.gloss)}
 metallic = {toml_value(coating.metallic)}
 spread_mm = {toml_value(coating.spread, MM)}  # of light, sideways in it: standard deviation
+transmission = {toml_value(coating.transmission)}  # light from a white object behind it, as a share of its own
+
+[object]  # that touches the gel
+reflectance = {toml_value(unit.object_reflectance)}  # 0 black to 1 white, where --object-reflectance says no other
 
 [gel]
 dome_scale = {toml_value(unit.dome_scale)}  # of the public mesh's dome

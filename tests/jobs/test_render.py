@@ -109,6 +109,14 @@ def test_another_size(render, tmp_path):
     assert picture(tmp_path / "out" / "images" / "00300.png").shape == (640, 480, 3)
 
 
+def test_a_white_object_shows_through(render, heights, tmp_path, small):
+    assert render(heights, "--object-reflectance", "1")[0] == 0
+    drawn = picture(tmp_path / "out" / "images" / "00001.png").astype(int)
+    assert (drawn - Renderer(small, "fast")(np.load(heights)["height_map"][1]))[..., 0].max() > 20
+    note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
+    assert note["object_reflectance"] == 1
+
+
 def test_exr_holds_radiance_and_the_picture_follows_from_it(render, heights, tmp_path, small):
     pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
     from tactile_core.files.exr_file import read_exr
@@ -245,6 +253,7 @@ def test_a_bad_input_ends_in_one_message_and_leaves_nothing(name, write, words, 
         (["--error", "1e-9levels"], "or more, which"),
         (["--error", "1levels", "--preset", "fast"], "one of the two"),
         (["--calibration", "absent.toml"], "absent.toml"),
+        (["--object-reflectance", "1.5"], "0 to 1"),
     ],
 )
 def test_bad_options_end_in_one_message(more, words, render, heights, tmp_path):

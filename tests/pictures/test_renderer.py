@@ -57,6 +57,23 @@ def test_ambient_light_grows_with_the_gel_s_height(preset, any_variant, small, p
     assert not changes[1][..., 0].any() and more[..., 1].max() > 4 and more[..., 2].min() < -7
 
 
+@pytest.mark.parametrize("preset", ["fast", "standard"])
+def test_object_shows_through_the_coating_where_it_touches(preset, any_variant, small, press):
+    """As bright in every preset, in light and in shadow, in each LED's band; nowhere else, and not at rest."""
+    thin = dataclasses.replace(small, coating=dataclasses.replace(small.coating, transmission=0.2))
+    black, white = (
+        Renderer(dataclasses.replace(thin, object_reflectance=share), preset, any_variant) for share in (0.0, 1.0)
+    )
+    np.testing.assert_array_equal(black.rest_radiance, white.rest_radiance)
+    height = press.on(small.camera)
+    more = white.radiance(height) - black.radiance(height)
+    right, down = np.meshgrid(small.camera.right, small.camera.down)
+    distance = np.hypot(right - press.right, down - press.down)
+    inside, reach = distance < 0.5e-3, np.sqrt(2 * press.ball * press.depth)
+    np.testing.assert_allclose(more[inside], np.broadcast_to(0.2 * small.facing, more[inside].shape), rtol=1e-4)
+    assert np.abs(more[distance > 1.3 * reach]).max() < 1e-3 * more.max()
+
+
 def test_a_mirrored_scene_makes_the_mirrored_picture(any_variant, small):
     flat = np.zeros(small.camera.shape, np.float32)
     mirrored = dataclasses.replace(

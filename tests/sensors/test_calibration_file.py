@@ -61,6 +61,8 @@ def test_ambient_light_of_higher_gel_is_kept_and_may_be_left_out(tmp_path: Path)
         ("albedo =", "# albedo =", "coating: albedo missing"),
         ("radius_mm =", "radius =", "leds, red: radius; expected radius_mm"),
         ("[noise]", "[other]", "unknown other"),
+        ("reflectance = 0", "reflectance = 1.2", "object reflectance: 1.2; expected 0 to 1"),
+        ("transmission = 0.2", "transmission = 2", "coating, transmission"),
         ('format = "tactile-calibration-3"', 'format = "tactile-calibration-9"', "format"),
         (
             'format = "tactile-calibration-3"',

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import statistics
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import bar, next_step, say, tell
-from .common import NOTHING, progress_argument
+from .common import NOTHING, object_argument, progress_argument
 
 if TYPE_CHECKING:
     from ...pictures.calibrate.evaluate import Evaluation
     from ...pictures.calibrate.fit import Calibrated
     from ...pictures.calibrate.photographs import Photographs
+    from ...sensors.calibration import Calibration
 
 BRIEF = "fit camera, lights and colours of a gel to photographs of a ball"
 TEXT = """\
@@ -29,8 +31,9 @@ untouched gel. Balls of several sizes: a folder or video for each, and their dia
 The fit ends on Mitsuba's own pictures, with the light of one bounce, where LLVM works; --quick leaves that out.
 
 With --test, a calibration is tested on photographs instead: only place and depth of each press are fitted, and the
-picture is compared with the photograph. The baseline is the background alone. Rows named `through` also fit the light
-that comes through the coating where the ball touches it; the others leave it out."""
+picture is compared with the photograph. The baseline is the background alone. What touches the gel shows through its
+coating by its reflectance: that of --object-reflectance or the file, but in rows named `through` that of the other
+photographs."""
 EPILOG = """\
 examples:
   tactile calibrate presses/ --ball-diameter 6 --out unit.toml
@@ -54,6 +57,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the unit (default: that of --start, else digit)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
+    object_argument(verb, "the ball (default: fitted, or with --test the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
     verb.add_argument("--quick", action="store_true", help="fit the fast picture alone, in half the time")
     verb.add_argument("--test", metavar="FILE", help="test this calibration instead of fitting one")
@@ -82,7 +86,8 @@ def run(options: argparse.Namespace) -> int:
     with bar(work, unit_of_work, options.progress) as progress:
         for diameter in diameters:
             check_diameter(diameter)
-        unit = load_calibration(options.test or options.start, options.gel)
+        reflectance = options.object_reflectance
+        unit = load_calibration(options.test or options.start, options.gel, reflectance)
         for path in filter(None, written):
             atomic.claim(path)
         photographs = read_photographs(options.presses, options.background, radii, only)
@@ -92,8 +97,11 @@ def run(options: argparse.Namespace) -> int:
             tried = evaluate_unit(unit, photographs, radius, pictures=pictures, progress=progress)
         else:
             name = options.unit or Path(options.out).stem
-            done, apart = fit_unit(photographs, diameters[0], unit, unit=name, quick=options.quick, progress=progress)
-    return _tell_test(options, tried, photographs) if options.test else _write_fit(options.out, done, apart)
+            quick = options.quick
+            done, apart = fit_unit(
+                photographs, diameters[0], unit, unit=name, quick=quick, reflectance=reflectance, progress=progress
+            )
+    return _tell_test(options, tried, photographs, unit) if options.test else _write_fit(options.out, done, apart)
 
 
 def _check_options(options: argparse.Namespace) -> None:
@@ -112,6 +120,8 @@ def _check_options(options: argparse.Namespace) -> None:
     if options.out is None or options.ball_diameter is None:
         missing = "--out" if options.out is None else "--ball-diameter"
         raise TactileError(missing, "missing", "a file to write and the ball's diameter in mm", "Or try one: --test")
+    if options.object_reflectance == 0:
+        raise TactileError("--object-reflectance", "0: black", "more: light that comes back tells of the coating")
     if _sheet_beside(options.out) == Path(options.out):
         raise TactileError("--out", options.out, "a file to write that ends in .toml: the sheet is the .png beside it")
 
@@ -141,6 +151,7 @@ def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
     check_worth(apart or done.tried)
     unknown = ", ".join(done.calibration.fit.not_identified)
     say(f"these photographs tell too little of: {unknown}; they stay near the values of --start")
+    say(_object(done.calibration, done.calibration.through))
     drawn = sheet(done.tried)
     rows = rows_of(done.tried, "presses it was fitted on")[0] + rows_of(apart, "held-out presses, by thirds")[0]
     write_calibration(out, done.calibration)
@@ -153,7 +164,18 @@ def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
     return 0
 
 
-def _tell_test(options: argparse.Namespace, tried: list[Evaluation], photographs: Photographs) -> int:
+def _object(unit: Calibration, through: float) -> str:
+    """Say how bright what touched the gel is, whose light through the coating is a share of the coating's own."""
+    seen = unit.with_through(through)
+    return (
+        f"the object's reflectance: {seen.object_reflectance:.2f} (0 black, 1 white; light through the coating,"
+        f" {100 * through:.0f} % of its own, by a transmission of {seen.coating.transmission:.2f})"
+    )
+
+
+def _tell_test(
+    options: argparse.Namespace, tried: list[Evaluation], photographs: Photographs, unit: Calibration
+) -> int:
     """Say what a trial found, and write what is asked for."""
     from ...accuracy import HEADER, line
     from ...files import atomic
@@ -170,6 +192,7 @@ def _tell_test(options: argparse.Namespace, tried: list[Evaluation], photographs
         atomic.write_bytes(options.sheet, drawn)
     tell("\n".join([HEADER, *map(line, rows)]))
     say(f"{photographs.folder}: {_error(tried)}")
+    say(_object(unit, statistics.median(each.through for each in tried)))
     for file, held in ((options.json, "the errors of each press"), (options.sheet, "photograph, picture, difference")):
         if file is not None:
             next_step(f"{file} holds {held}")

@@ -149,6 +149,12 @@ def unit_arguments(verb: argparse.ArgumentParser) -> None:
     )
 
 
+def object_argument(verb: argparse.ArgumentParser, whose: str) -> None:
+    """Add ``--object-reflectance``; whose : the object that it is of and what it defaults to, in words."""
+    about = f"reflectance, 0 black to 1 white, of {whose}; it shows through the gel's coating"
+    verb.add_argument("--object-reflectance", type=float, metavar="R", help=about)
+
+
 def weights_argument(verb: argparse.ArgumentParser) -> None:
     """Add ``--weights``."""
     verb.add_argument("--weights", metavar="DIR", help="networks from `tactile train` (default: those that ship)")

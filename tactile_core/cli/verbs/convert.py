@@ -13,6 +13,7 @@ from .common import (
     NOTHING,
     answer_arguments,
     error_argument,
+    object_argument,
     prepare_arguments,
     prepare_words,
     progress_argument,
@@ -94,6 +95,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     prepare_arguments(verb)
     unit_arguments(verb)
+    object_argument(verb, "what touches the gel (default: the calibration's)")
     answer_arguments(verb)
     error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
     verb.add_argument(
@@ -163,7 +165,9 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]
     preset = presets.FAST if budget is None or budget.levels is None else variant.fitting(budget.levels)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
     pictures = options.calibration, preset, None
-    asked = convert.ToolOptions(options.weights, *pictures, answer, options.gel, options.target, source)
+    asked = convert.ToolOptions(
+        options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance
+    )
     return job, asked, paths
 
 

@@ -10,7 +10,7 @@ from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import NOTHING, PRESETS, error_argument, progress_argument
+from .common import NOTHING, PRESETS, error_argument, object_argument, progress_argument
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -63,6 +63,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--calibration", metavar="UNIT.toml", help="unit, by `tactile calibrate` (default: the one that ships)"
     )
+    object_argument(verb, "what touches the gel (default: the calibration's)")
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the gel (default: the calibration's, else digit)")
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="frames to draw, as a Python slice")
     verb.add_argument("--size", metavar="WxH", help="size in pixels, such as 480x640 (default: the calibration's)")
@@ -91,6 +92,7 @@ def run(options: argparse.Namespace) -> int:
         preset=options.preset,
         error=None if options.error is None else parse_budget(options.error),
         calibration=_calibration(options.calibration, options.gel),
+        object_reflectance=options.object_reflectance,
         size=size,
         frames=results.parse_frames(options.frames),
         exr=options.exr,

@@ -120,6 +120,7 @@ class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fiel
     exr: bool
     noise: bool
     calibration: str = ""
+    object_reflectance: float | None = None
     shard_frames: Annotated[int, Meta(ge=1, le=MAX_SHARD_FRAMES)] = PICTURE_FRAMES
     version: str = __version__
 

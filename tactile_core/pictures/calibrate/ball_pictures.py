@@ -20,6 +20,7 @@ from ..height_map import check_covered
 from ..light import Lamps
 from ..mitsuba.gel_light import GelLight
 from ..mitsuba.variant import llvm_trouble
+from ..object_light import contact_share
 from ..perspective import Perspective
 from ..presets import FAST, Preset, preset_named
 from .ball_print import deepest, print_on
@@ -47,12 +48,19 @@ class BallPictures(abc.ABC):
         self.gain = np.moveaxis(calibration.gain.matrices(self.camera), (2, 3), (0, 1))
         self._view = Perspective(self.camera, self.rest)
 
-    @abc.abstractmethod
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the change (3, H, W) of each LED's light by a press, relative to its light on a coating that faces it.
 
         ball : right, down, depth, radius, m
         """
+        heights = self.heights(ball)
+        seen = self._view(heights)
+        light = self.spread(self._changed(heights, seen))
+        return light + self.calibration.through * contact_share(seen - self._view.start)
+
+    @abc.abstractmethod
+    def _changed(self, heights: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """The change (3, H, W) of each LED's light on gel of heights (H, W) m, seen at other ones, not spread."""
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
@@ -70,6 +78,11 @@ class BallPictures(abc.ABC):
         """Return the change (H, W, 3) of the picture by a press, grey levels."""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
+    def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
+        """Return the light (H, W, 3), grey levels, of a ball that shows as much of it as a coating that faces LEDs."""
+        share = contact_share(self._view(self.heights(ball)) - self._view.start)
+        return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
+
 
 class FastPictures(BallPictures):
     """Draw the pictures of balls by the fast preset."""
@@ -77,14 +90,12 @@ class FastPictures(BallPictures):
     def __init__(self, calibration: Calibration) -> None:
         super().__init__(calibration)
         self._lamps = Lamps(self.camera, calibration.leds)
-        self._resting = self._radiance(self.rest)
+        self._resting = self._radiance(self._view.start)
 
-    def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (3, H, W) by a press of each LED's light."""
-        return self.spread(self._radiance(self.heights(ball)) - self._resting)
+    def _changed(self, heights: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        return self._radiance(seen) - self._resting
 
-    def _radiance(self, heights: np.ndarray) -> np.ndarray:
-        seen = self._view(heights)
+    def _radiance(self, seen: np.ndarray) -> np.ndarray:
         return self._lamps.light(self._view, seen) + self.raised(seen)
 
 
@@ -153,11 +164,9 @@ class _OfUnit(BallPictures):
         self._maker, self._facing = maker, calibration.facing.astype(np.float32)
         self._resting = self._maker.radiance(calibration, self.rest)
 
-    def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Change (3, H, W) by a press of each LED's light."""
-        heights = self.heights(ball)
+    def _changed(self, heights: np.ndarray, seen: np.ndarray) -> np.ndarray:
         change = (self._maker.radiance(self.calibration, heights) - self._resting) / self._facing
-        return self.spread(np.moveaxis(change, -1, 0) + self.raised(self._view(heights) - self._view(self.rest)))
+        return np.moveaxis(change, -1, 0) + self.raised(seen - self._view.start)
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:

@@ -148,11 +148,12 @@ def fit_unit(
     *,
     unit: str,
     quick: bool = False,
+    reflectance: float | None = None,
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
     """Fit a unit, as ``fit.calibrate``, and evaluate what fits of the other thirds make of each press.
 
-    progress : called with (done, in all), in per cent
+    reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
     Raises TactileError for photographs that lie another way, and what ``fit.calibrate`` raises.
     """
 
@@ -161,7 +162,10 @@ def fit_unit(
 
     check_orientation(photographs, ball_diameter, start, part(0, CHECKED))
     apart = cross_validated(photographs, ball_diameter, start, quick=quick, progress=part(CHECKED, TRIED))
-    return calibrate(photographs, ball_diameter, start, unit=unit, quick=quick, progress=part(TRIED, 100)), apart
+    fitted = calibrate(
+        photographs, ball_diameter, start, unit=unit, quick=quick, reflectance=reflectance, progress=part(TRIED, 100)
+    )
+    return fitted, apart
 
 
 def cross_validated(

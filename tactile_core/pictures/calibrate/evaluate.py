@@ -18,10 +18,10 @@ from ...sensors.calibration import LARGEST_LEVEL, Calibration
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .photo_metrics import metrics
 from .photographs import Photographs, Press
-from .press_fit import MODEL_ERROR, Ball, Sight, contact_disc, contact_radius, fit_ball, fitted_light
+from .press_fit import Ball, Sight, contact_radius, fit_ball, missing_light
 
 RADIUS_STARTS = (2 / 3, 1.5)  # of the ball's radius, from which it is searched
-BRIGHT = 15.0  # grey levels of light through the coating, in some channel, from which on a press is flagged
+BRIGHT = 0.07  # more light of the object than the unit's, as a share of the coating's own, that is flagged (assumed)
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
     "roi_l1": ("levels", 8.0, -1), "roi_psnr": ("dB", 26.0, 1),
@@ -36,15 +36,15 @@ class Evaluation:
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
-    through : (3,) levels of light that comes through the coating where the ball touches it. Metrics of that name are of
-        another picture, in which it is fitted as well; all others know nothing of it.
+    through : light of this photograph's ball through the coating, a share of the coating's own. Metrics of that name
+        are of a picture with the light that the set's other photographs show; all others have the calibration's.
     """
 
     press: Press
     ball: Ball
     free_radius: float
     picture: np.ndarray
-    through: np.ndarray
+    through: float
     metrics: dict[str, float]
     baseline: dict[str, float]
     flags: tuple[str, ...]
@@ -68,10 +68,19 @@ def evaluate_unit(
     factor = working_factor(unit.camera.width, unit.camera.height)
     working = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
     whole = pictures(unit)
-    tried = []
+    tried, count = [], len(photographs.presses)
     for press in photographs.presses:
         tried.append(_try_press(whole, working, press, photographs.background, radius, search_radius))
-        progress(len(tried), len(photographs.presses))
+        progress(len(tried) // 2, count)
+    for k, (press, each) in enumerate(zip(photographs.presses, tried, strict=True)):
+        others = [other.through for other in tried if other is not each] or [each.through]
+        lit = unit.with_through(float(np.median(others)))
+        bright = FastPictures(lit.at_size(working.camera.width, working.camera.height))
+        ball, _ = fit_ball(bright, Sight(press), each.ball.radius)
+        found, baseline = _compared(press, photographs.background, pictures(lit).change(ball))[1], each.baseline
+        for name in ("l1", "psnr"):
+            each.metrics[f"through_{name}"], baseline[f"through_{name}"] = found[f"roi_{name}"], baseline[f"roi_{name}"]
+        progress((count + k + 1) // 2, count)
     return tried
 
 
@@ -90,19 +99,12 @@ def _try_press(
 ) -> Evaluation:
     sight = Sight(press)
     radius = sight.radius(radius)
-    untouched = background + press.drift  # the baseline knows how the light drifted as well
-
-    def compared(change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
-        picture = np.rint(untouched + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
-        return picture, metrics(picture, press.picture, background, press.region)
-
     ball, _ = fit_ball(working, sight, radius)
-    picture, ours = compared(whole.change(ball))
-    through, lit = _with_light(whole, fit_ball(working, sight, radius, opaque=False)[0], press)
-    _, with_light = compared(lit)
-    _, baseline = compared(0.0)
-    ours |= {"through_l1": with_light["roi_l1"], "through_psnr": with_light["roi_psnr"]}
-    baseline |= {"through_l1": baseline["roi_l1"], "through_psnr": baseline["roi_psnr"]}
+    picture, ours = _compared(press, background, whole.change(ball))
+    _, baseline = _compared(press, background, 0.0)
+    more = missing_light(working, sight, fit_ball(working, sight, radius, lit=True)[0])[1]
+    known = whole.calibration.through
+    through = min(max(known + more, 0.0), 1.0)
     free = float("nan")
     if search_radius:
         ends = [fit_ball(working, sight, start * radius, free_radius=True) for start in RADIUS_STARTS]
@@ -110,17 +112,16 @@ def _try_press(
         ours["ball_radius_error"] = abs(free - radius) / radius
         baseline["ball_radius_error"] = float(np.mean([abs(start - 1) for start in RADIUS_STARTS]))
     flags = _flags(press, ball, whole)
-    if through.max() > BRIGHT:
-        flags += (f"{through.max():.0f} levels of light through the coating, where the ball touches it",)
+    if through > known + BRIGHT:
+        light = f"{100 * through:.0f} % of the coating's own light comes through it from the ball"
+        flags += (f"{light}, {100 * known:.0f} % by the calibration",)
     return Evaluation(press, ball, free, picture, through, ours, baseline, flags)
 
 
-def _with_light(bench: BallPictures, ball: Ball, press: Press) -> tuple[np.ndarray, np.ndarray]:
-    """Light (3,) through the coating in a photograph of a ball, levels, and the change (H, W, 3) with it."""
-    change, disc = bench.change(ball), contact_disc(bench, ball)
-    counts = press.touched & (press.picture.max(-1) < LARGEST_LEVEL)
-    through = fitted_light((press.change - change)[counts], disc[counts], MODEL_ERROR)
-    return through, change + disc[..., None] * through
+def _compared(press: Press, background: np.ndarray, change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
+    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; the baseline knows how light drifted as well."""
+    picture = np.rint(background + press.drift + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
+    return picture, metrics(picture, press.picture, background, press.region)
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:

@@ -20,9 +20,11 @@ from .ball_pictures import BallPictures, FastPictures, MitsubaPictures, missing_
 from .evaluate import Evaluation, evaluate_unit, fitted_size, mean_metrics
 from .photographs import Photographs, Press
 from .press_fit import MODEL_ERROR, Sight, fit_ball, minimise
-from .residuals import FIRST_LED, GAIN_SPREAD, NAMES, SPREAD, UnitResiduals, parameters_of
+from .residuals import GAIN_SPREAD, NAMES, OBJECT_LIGHT, SPREAD, UnitResiduals, parameters_of
 
 PLACING_STEPS, STEPS, FINISHING_STEPS = 6, 14, 8  # of the search
+# Light of the object from which the search starts, the better: a ridge lies between none and much.
+OBJECT_STARTS = (0.0, 0.15)
 TOLERANCE = 1e-3  # a step that gains less than 0.1 % of the cost is noise
 UNEXPLAINED = 0.5  # share of a photograph's squares that is left: more, and it does not show this ball
 IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard error is larger stays called unknown
@@ -58,10 +60,13 @@ def calibrate(
     *,
     unit: str,
     quick: bool = False,
+    reflectance: float | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Calibrated:
     """Fit camera, dome, coating, lights and gain of a unit from a start's; ball_diameter : m; unit : its name.
 
+    reflectance : of the ball, above 0 to 1; the coating's transmission then is fitted. None: it is the start's, and the
+        ball's reflectance is fitted: photographs of one object tell their product alone
     quick : stop after the fast picture, as where Mitsuba by LLVM does not work
     Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball.
     """
@@ -75,7 +80,9 @@ def calibrate(
     total = PLACING_STEPS + 3 * STEPS + finish * FINISHING_STEPS + 1
     search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
     every = np.ones(len(NAMES), bool)
-    lights, seen = np.arange(len(NAMES)) >= FIRST_LED, np.array(NAMES) != "albedo"  # the fast picture has no bounce
+    # Light of the object from the first, lest ambient light that grows with height stand for it.
+    lights = np.arange(len(NAMES)) >= OBJECT_LIGHT
+    seen = np.array(NAMES) != "albedo"  # the fast picture has no bounce
     search.place()
     search.put_aside()
     search.fit(lights)
@@ -85,6 +92,9 @@ def calibrate(
     if finish:
         search.fit(every, MitsubaPictures(working_preset(QUALITY, factor)), FINISHING_STEPS)
     fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
+    if reflectance is not None:
+        coating = dataclasses.replace(fitted.coating, transmission=min(fitted.through / reflectance, 1.0))
+        fitted = dataclasses.replace(fitted, coating=coating, object_reflectance=reflectance)
     used = dataclasses.replace(photographs, presses=tuple(search.presses))
     tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
     progress(total, total)
@@ -122,14 +132,16 @@ class _Search:
         self._sights = [Sight(press) for press in self.presses]
         self.aside: dict[str, float] = {}
         self._progress, self._done = progress, 0
-        self._none = np.zeros(len(NAMES), bool)
+        self._object = np.array(NAMES) == "object_light"
 
     def place(self) -> None:
-        """Fit presses and gain alone, with the unit's numbers as in the start."""
+        """Fit presses, gain and the object's light alone, with the unit's other numbers as in the start."""
         bench = FastPictures(self.start)
-        balls = [1e3 * np.array(fit_ball(bench, sight, sight.radius(self.radius))[0][:3]) for sight in self._sights]
-        self._problem = UnitResiduals(self.start, self._sights, self.radius, self._none)
-        self._minimise(np.concatenate(balls), PLACING_STEPS)
+        balls = [fit_ball(bench, sight, sight.radius(self.radius), lit=True)[0] for sight in self._sights]
+        self._problem = UnitResiduals(self.start, self._sights, self.radius, self._object)
+        places = 1e3 * np.array([ball[:3] for ball in balls]).ravel()
+        starts = [np.array([light, *places]) for light in OBJECT_STARTS]
+        self._minimise(min(starts, key=self._problem.cost), PLACING_STEPS)
 
     def put_aside(self) -> None:
         """Leave out photographs that show no such ball. Raises TactileError where none does."""
@@ -168,8 +180,8 @@ class _Search:
     def _take(self, presses: list[Press], unit: Calibration, balls: np.ndarray) -> None:
         """Go on with these presses; balls : (n, 3) mm, where they stand; unit : with whose numbers."""
         self.presses, self._sights = presses, [Sight(press) for press in presses]
-        self._problem = UnitResiduals(unit, self._sights, self.radius, self._none)
-        self._x = balls.ravel()
+        self._problem = UnitResiduals(unit, self._sights, self.radius, self._object)
+        self._x = np.array([unit.through, *balls.ravel()])
         self._problem.cost(self._x)
 
     def fit(

@@ -20,8 +20,9 @@ def minimise(
 ) -> tuple[np.ndarray, float]:
     """Find a minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``.
 
-    problem : a sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless;
-        ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last accepted x
+    problem : a sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless; ``inside(x)``
+        the nearest x that can be; ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at
+        the last accepted x
     """
     cost, damping = problem.cost(x), START_DAMPING
     for step in range(most):
@@ -29,7 +30,7 @@ def minimise(
         before = cost
         while True:
             damped = matrix + np.diag(damping * np.diag(matrix) + 1e-12 * np.trace(matrix))
-            trial = x - np.linalg.solve(damped, gradient)
+            trial = problem.inside(x - np.linalg.solve(damped, gradient))
             trial_cost = problem.cost(trial)
             if trial_cost < cost:
                 x, cost, damping = trial, trial_cost, max(damping * EASIER, LEAST_DAMPING)
@@ -93,14 +94,14 @@ class Sight:
 
 
 def fit_ball(
-    bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, opaque: bool = True
+    bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
     """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, levels squared.
 
     bench : in working pixels; radius : m, the ball's, or where its search starts
-    opaque : whether no light comes through the coating; else it is fitted as well (``contact_light``)
+    lit : whether light of the object through the coating is fitted as well (``missing_light``); else the unit's
     """
-    problem = _PressProblem(bench, sight, radius, opaque)
+    problem = _PressProblem(bench, sight, radius, lit)
     starts = [
         np.array([*place, share * bench.deepest(radius), radius][: 4 if free_radius else 3])
         for place in sight.guesses(bench, radius)
@@ -115,16 +116,14 @@ def fit_ball(
 class _PressProblem:
     """Squares of what a ball's picture misses; x = right, down, depth and, where it is free, radius."""
 
-    def __init__(self, bench: BallPictures, sight: Sight, radius: float, opaque: bool) -> None:
-        self._bench, self._sight, self._radius, self._opaque = bench, sight, radius, opaque
+    def __init__(self, bench: BallPictures, sight: Sight, radius: float, lit: bool) -> None:
+        self._bench, self._sight, self._radius, self._lit = bench, sight, radius, lit
 
     def _missed(self, x: np.ndarray) -> np.ndarray:
         ball = (*x[:3], x[3] if len(x) > 3 else self._radius)
-        missed = (self._bench.change(ball) - self._sight.change)[self._sight.counts]
-        if not self._opaque:
-            disc = contact_disc(self._bench, ball)[self._sight.counts]
-            missed += disc[:, None] * fitted_light(-missed, disc, MODEL_ERROR)
-        return missed.ravel()
+        if self._lit:
+            return missing_light(self._bench, self._sight, ball)[0].ravel()
+        return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
 
     def cost(self, x: np.ndarray) -> float:
         """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture and table."""
@@ -137,6 +136,10 @@ class _PressProblem:
         self._last = self._missed(x)
         return float(np.square(self._last).sum() / 2)
 
+    def inside(self, x: np.ndarray) -> np.ndarray:
+        """Return x: ``cost`` tells what is off the picture and the table."""
+        return x
+
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n numbers, at the last cost's x."""
         last = self._last
@@ -145,8 +148,7 @@ class _PressProblem:
 
 
 CONTACT_SHARE = 0.8  # radius of the contact over sqrt(2 R depth), by the table of prints
-SOFT = 0.25e-3  # m, over which the light falls off at the contact's edge (assumed)
-LIKELY = 20.0  # grey levels, how large it is (assumed): holds it near none where few pixels tell
+LIKELY = 0.1  # share of a coating's own light, how much comes through (assumed): holds it where few pixels tell
 
 
 def contact_radius(depth: float, radius: float) -> float:
@@ -154,13 +156,14 @@ def contact_radius(depth: float, radius: float) -> float:
     return float(min(CONTACT_SHARE * np.sqrt(2 * radius * depth), radius))
 
 
-def contact_disc(bench: BallPictures, ball: tuple[float, float, float, float]) -> np.ndarray:
-    """Return the share (H, W), 0..1, of each pixel that shows the contact of a ball (right, down, depth, radius), m."""
-    right, down, depth, radius = ball
-    distance = np.hypot(bench.right - right, bench.down - down)
-    return 1 / (1 + np.exp((distance - contact_radius(depth, radius)) / SOFT))
+def missing_light(
+    bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
+) -> tuple[np.ndarray, float]:
+    """Fit how much more light comes through the coating of a photograph than of a ball's picture.
 
-
-def fitted_light(left: np.ndarray, disc: np.ndarray, model_error: float) -> np.ndarray:
-    """Fit a disc's (n,) light (3,), grey levels, to the residual ``left`` (n, 3) of a picture, by least squares."""
-    return disc @ left / (disc @ disc + (model_error / LIKELY) ** 2)
+    Returns what the picture with it misses (n, 3), grey levels, of the pixels that count; and that light, by least
+    squares, as a share of a coating's own that faces the LEDs
+    """
+    missed, white = (each[sight.counts] for each in (bench.change(ball) - sight.change, bench.white(ball)))
+    more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)
+    return missed + more * white, more

@@ -24,13 +24,14 @@ from .press_fit import MODEL_ERROR, SHALLOWEST, Sight
 # 21 px/mm, docs/sources.md, DIGIT camera), step of the differences that make the Jacobian
 CAMERA = (("px_per_mm_x", 0.7, 0.02), ("px_per_mm_y", 0.7, 0.02), ("apparent_height_mm", 4.0, 0.2))
 GEL = (("dome_scale", 0.1, 0.02),)
-COATING = (("albedo", 0.15, 0.05), ("spread_mm", 0.15, 0.02))
+COATING = (("albedo", 0.15, 0.05), ("spread_mm", 0.15, 0.02), ("object_light", 0.1, 0.02))
 LED = (("right_mm", 2.0, 0.05), ("down_mm", 2.0, 0.05), ("up_mm", 1.0, 0.05), ("radius_mm", 1.0, 0.05),
        ("rise_per_mm", 0.2, 0.02))  # fmt: skip
 LEDS = tuple((f"{colour}_{name}", spread, step) for colour in COLOURS for name, spread, step in LED)
 
 PARAMETERS = (*CAMERA, *GEL, *COATING, *LEDS)
 NAMES = tuple(name for name, _, _ in PARAMETERS)
+OBJECT_LIGHT = NAMES.index("object_light")
 SPREAD = np.array([spread for _, spread, _ in PARAMETERS])
 STEP = np.array([step for _, _, step in PARAMETERS])
 FIRST_LED, PER_LED = len(CAMERA) + len(GEL) + len(COATING), len(LED)
@@ -43,18 +44,18 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 0.1, 8.0  # mm; the gel's window is 18 mm wide
 
 
 def parameters_of(calibration: Calibration) -> np.ndarray:
-    """Return the vector (21,) of a calibration, in the order of NAMES."""
+    """Return the vector (22,) of a calibration, in the order of NAMES."""
     camera = calibration.camera
     lights = zip(calibration.leds, calibration.ambient_rise, strict=True)
     leds = [value for led, rise in lights for value in (*(1e3 * mm for mm in (*led.position, led.radius)), 1e-3 * rise)]
     head = [camera.px_per_mm_x, camera.px_per_mm_y, 1e3 * camera.apparent_height, calibration.dome_scale]
-    head += [float(np.mean(calibration.coating.albedo)), 1e3 * calibration.coating.spread]
+    head += [float(np.mean(calibration.coating.albedo)), 1e3 * calibration.coating.spread, calibration.through]
     return np.array([*head, *leds])
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
     """Return a calibration with other numbers and the same gain; raises TactileError for some that mean nothing."""
-    scale_x, scale_y, height, dome, albedo, spread = (float(value) for value in numbers[:FIRST_LED])
+    scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
     coating = dataclasses.replace(calibration.coating, albedo=(of_red, of_green, of_blue), spread=1e-3 * spread)
@@ -71,7 +72,7 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
         calibration, camera=camera, leds=(red, green, blue), dome_scale=dome, coating=coating,
         ambient_rise=(rise_red, rise_green, rise_blue),
     )  # fmt: skip
-    return changed.with_gain(calibration.gain)
+    return changed.with_gain(calibration.gain).with_through(through)
 
 
 GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
@@ -91,7 +92,7 @@ class UnitResiduals:
 
     start : the calibration that the spread of units is centred on, in working pixels
     radius : m, of the balls that name none
-    free : (21,) bool, which of the unit's numbers may change; pictures : what makes a unit's
+    free : (22,) bool, which of the unit's numbers may change; pictures : what makes a unit's
     """
 
     def __init__(
@@ -147,6 +148,12 @@ class UnitResiduals:
         cost += (self._weight * (numbers - self._numbers) ** 2).sum()
         cost += (self._gain_weight * (self.gain - self._start_gain) ** 2).sum()
         return float(cost / 2)
+
+    def inside(self, x: np.ndarray) -> np.ndarray:
+        """Return x with no less than no light through the coating."""
+        least = np.full(len(x), -np.inf)
+        least[: self._free.sum()][np.flatnonzero(self._free) == OBJECT_LIGHT] = 0
+        return np.maximum(x, least)
 
     def unexplained(self) -> np.ndarray:
         """Return the share (n,) of each photograph's squares that the pictures of the last cost leave."""
