@@ -4,7 +4,7 @@ import bpy
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
-from ...tactile_core.jobs.sampling_error import Budget, parse_budget
+from ...tactile_core.jobs.error_budget import Budget, parse_budget
 from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.calibration import Calibration
 from . import preferences, properties

@@ -27,7 +27,7 @@ SCENES = ROOT / "scenes"
 KEPT = "latent,displacement,height,image,traction"
 # Run in this order; {out} is the folder that all of them write to.
 COMMANDS = (
-    f"convert {{recording}} --out {{out}}/demo --keep {KEPT} --error 100um,5levels --samples 3",
+    f"convert {{recording}} --out {{out}}/demo --keep {KEPT} --error 5levels --samples 3",
     "convert {recording} --out {out}/solved --gel solved --frames 300:500:20",
     "pairs {scenes}/press_sphere/scene.toml --count 6 --seed 1 --out {out}/ball_pairs.h5",
     "pairs {scenes}/training/scene.toml --count 8 --seed 3 --out {out}/pairs.h5",

@@ -23,7 +23,6 @@ from ..translation.simulated_likeness import contradicted
 from ..translation.trust_words import DENIED, LOW_CONFIDENCE, SENTENCES
 from .frame_pass import FramePass, Tools
 from .frames_file import described
-from .sampling_error import depth_share
 from .sheet_figure import FRAMES, SheetFigure, scale
 
 if TYPE_CHECKING:
@@ -34,21 +33,18 @@ SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "flags", "expected_error_digit",
     "contact_center",
 )  # fmt: skip
-LEFT = ("expected_error_digit", "error_bound_digit")
 
 
 class ConversionReport:
     """Keeps of the frames that it is given only what is told of all of them, and what the contact sheet shows.
 
-    flagged : frames of each flag; share : the deepest move of a node, over the gel's thickness
+    flagged : frames of each flag
     """
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
         """Take the prepared rows, and rising frames (T,) of them that `made` takes through."""
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
-        self.share = 0.0
-        self._errors: list[np.ndarray] = []
         self._pressure: list[np.ndarray] = []
         self._denied = 0  # frames that are unexplained because PDC shows another pressure
         self._explained: list[np.ndarray] = []
@@ -62,14 +58,11 @@ class ConversionReport:
         """Take the arrays of some frames."""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
-        touching = np.isfinite(arrays["contact_center"][:, 0])
-        self._errors.append(np.stack([arrays[name][touching] for name in LEFT]))
         self._pressure.append(arrays["pressure"])
         measured = self._rows.read(frames)[1].pressure_measured
         denied = contradicted(arrays["pressure"], measured) & (arrays["flags"] & flags.Flag.UNEXPLAINED > 0)
         self._denied += int(np.count_nonzero(denied))
         self._explained.append(arrays["explained"])
-        self.share = max(self.share, depth_share(arrays["displacement_digit"], self._tools.drawer.target))
         if "traction_force" in arrays:
             self._forces.append(np.stack([arrays["traction_force"], arrays["force"]]))
         rows = np.flatnonzero(np.isin(frames, list(self._shown)))
@@ -104,19 +97,6 @@ class ConversionReport:
         share = np.concatenate(self._explained)
         touching = np.isfinite(share)
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None
-
-    def describe_expected_error(self) -> str:
-        """Describe the translation's own error on the gel: the median of the frames in contact."""
-        errors = np.concatenate(self._errors, axis=1)
-        if not errors.shape[1]:
-            return "no frame is in contact, so the translation expects no error"
-        expected, bound = 1e3 * np.median(errors, axis=1)
-        if np.isnan(expected):
-            return "the translation's own error is not known on this gel, which no networks lead to"
-        return (
-            f"the translation itself, beside this: the worst node of its gel is off by {expected:.2f} mm in half of "
-            f"such contacts, by less than {bound:.2f} mm in 95 of 100"
-        )
 
     def describe_traction(self) -> str:
         """Describe by how much the kept traction misses the force; empty where it is not kept."""

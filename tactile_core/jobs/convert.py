@@ -18,7 +18,7 @@ from ..pictures.presets import FAST
 from ..sensors import SOURCE, TARGET
 from ..translation.answer import Answer
 from ..translation.translate import PreparedRows, load_translator
-from . import results, sampling_error
+from . import results
 from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from ..recordings.electrode_gains import SensorFile
     from ..recordings.tables.column_map import ColumnMap
     from ..translation.translator import Translator
-    from .sampling_error import Budget
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +38,6 @@ class Options:
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
     sensor : the unit's rest, and gains and offsets to take off, as `tactile adapt` finds them
-    error : what the toolkit may add
     calibration : file of the DIGIT that is drawn, for the note; None for the one that ships
     """
 
@@ -48,7 +46,6 @@ class Options:
     prepare: PrepareOptions | None = None
     overwrite: bool = False
     sensor: SensorFile | None = None
-    error: Budget | None = None
     calibration: str | os.PathLike | None = None
 
     @property
@@ -102,13 +99,12 @@ def load_tools(options: ToolOptions) -> Tools:
 class Converted:
     """A finished conversion. folder : the result; warnings : what the user should know of it
 
-    remarks : sentences on errors: by how much a kept traction misses the force; where a bound was given, what the
-        toolkit added to displacements or heights, and what the translation itself leaves
+    remark : by how much a kept traction misses the force, in words; "" without one
     """
 
     folder: Path
     warnings: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remark: str
 
 
 def convert(
@@ -125,8 +121,6 @@ def convert(
     """
     from .. import recordings
 
-    if options.error is not None and options.error.um is not None:
-        sampling_error.check_gel(tools.drawer.target)
     clock, answer = Stopwatch(), tools.translator.answer
     with clock.stage("read"):
         recording = recordings.read(recording_path, options.columns, tools.translator.source, lean=True)
@@ -143,7 +137,6 @@ def convert(
     try:
         with atomic.new_folder(folder, overwrite=options.overwrite) as unfinished:
             _write_frames(unfinished, made, report, rows, frames, options, clock, progress)
-            added = _added(options, report)
             with clock.stage("sheet"):
                 report.draw_sheet(unfinished / results.SHEET)
             origin = note(rows, frames, report, options, tools)
@@ -154,8 +147,7 @@ def convert(
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"
         raise TactileError(folder, found, "a writable folder", "Make room, or name another --out folder") from error
-    remarks = [report.describe_traction(), added, "" if options.error is None else report.describe_expected_error()]
-    return Converted(Path(folder), report.warnings(), tuple(filter(None, remarks)))
+    return Converted(Path(folder), report.warnings(), report.describe_traction())
 
 
 def _write_frames(
@@ -207,13 +199,6 @@ def check_order(recording: Recording, answer: Answer) -> None:
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
-def _added(options: Options, report: ConversionReport) -> str:
-    """Describe the toolkit's own error in displacements or heights; raises TactileError for more than is allowed."""
-    if options.error is None or options.error.um is None:
-        return ""
-    return sampling_error.check(options.error.um, report.share if {"height", "image"} & set(options.keep) else None)
-
-
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
     """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
     from ..recordings import labels
@@ -229,8 +214,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
-                    "error": None if options.error is None else str(options.error), "preset": tools.drawer.preset,
-                    "object_reflectance": tools.drawer.object_reflectance,
+                    "preset": tools.drawer.preset, "object_reflectance": tools.drawer.object_reflectance,
                     "answer": dataclasses.asdict(tools.translator.answer),
                     "gel": TRANSLATED if tools.drawer.solve is None else SOLVED},
         "frames_converted": len(frames),

@@ -22,7 +22,6 @@ from ..sensors import TARGET
 from .frames_file import FORMAT as CONVERTED
 
 if TYPE_CHECKING:
-    from ..mechanics.solution import Tier
     from ..recordings.array_store import Store
 
 CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
@@ -62,18 +61,17 @@ def is_scene(path: Path) -> bool:
 def read_frames(
     path: str | os.PathLike,
     progress: Progress = lambda: nullcontext(lambda done, total: None),
-    tier: Tier = "fast",
     gel: str = TARGET,
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 
-    tier : of a scene's contacts; gel : whose displacement is read, or solved
+    gel : whose displacement is read, or solved
 
     Raises TactileError for anything else, or what cannot be read.
     """
     path = Path(path)
     if is_scene(path):
-        return _of_scene(path, progress, tier, gel)
+        return _of_scene(path, progress, gel)
     if not path.is_file():
         raise TactileError(path, "there is no such file", EXPECTED)
     if path.suffix == ".npz":
@@ -129,12 +127,12 @@ def _of_npz(path: Path) -> Frames:
     return Frames("height map", np.arange(len(heights)), heights=heights)
 
 
-def _of_scene(path: Path, progress: Progress, tier: Tier, gel: str) -> Frames:
+def _of_scene(path: Path, progress: Progress, gel: str) -> Frames:
     from ..simulation.scene_recording import simulate_recording
 
     with tempfile.TemporaryDirectory() as folder, progress() as shown:
         simulated = Path(folder) / "scene.h5"
-        simulate_recording(path, simulated, progress=shown, keep=(f"displacement_{gel}",), tiers={gel: tier})
+        simulate_recording(path, simulated, progress=shown, keep=(f"displacement_{gel}",))
         return dataclasses.replace(read_displacement(simulated, gel), kind="scene")
 
 

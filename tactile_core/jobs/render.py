@@ -29,10 +29,9 @@ from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import calibration_path, load_calibration
-from . import results, sampling_error
-from .gel_frames import is_scene, read_frames
+from . import results
+from .gel_frames import read_frames
 from .results import frames_text, select
-from .sampling_error import Budget
 
 EXR, EXR_NAME, REST, CAMERA = "exr", "{:05d}.exr", "rest.exr", "camera.exr"
 UNITS = (
@@ -51,7 +50,7 @@ MAKER = "tactile render"  # in the note
 class Options:
     """Options of rendering.
 
-    preset : its name, None to choose by error; error : what will do, None for the default preset and the fast tier
+    preset : its name, None to choose by levels; levels : grey levels rms that will do, None for the default preset
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
     frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
@@ -59,7 +58,7 @@ class Options:
     """
 
     preset: str | None = None
-    error: Budget | None = None
+    levels: float | None = None
     calibration: str | os.PathLike | None = None
     size: tuple[int, int] | None = None
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -86,16 +85,10 @@ def render(
     clock, out = Stopwatch(), Path(out)
     gel = load_calibration(options.calibration).camera.sensor
     preset = claimed(out, options)
-    bound = options.error or Budget()
-    if bound.levels is not None:
-        say(describe_choice(preset, bound.levels))
-    scene = is_scene(Path(path))
-    tier = _tier(Path(path), gel, bound.um, say) if scene and bound.um is not None else "fast"
+    if options.levels is not None:
+        say(describe_choice(preset, options.levels))
     with clock.stage("read"):
-        frames = read_frames(path, lambda: progress("simulate"), tier, gel)
-    if bound.um is not None and frames.displacement is not None and not scene:
-        share = sampling_error.depth_share(frames.displacement, gel) * frames.scale
-        say(sampling_error.check(bound.um, share))
+        frames = read_frames(path, lambda: progress("simulate"), gel)
     shape = None if frames.heights is None else frames.heights.shape[1:]
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
@@ -114,8 +107,6 @@ def render(
             made.write_frame(folder, int(frames.numbers[row]), values)
             shown(done, len(rows))
         note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
-        if bound.um is not None and scene:
-            note["input"]["tier"] = tier
         atomic.write_json(folder / results.NOTE, note)
         timings = {**clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
         atomic.write_json(folder / results.TIMINGS, timings)
@@ -138,27 +129,11 @@ def choose_preset(options: Options) -> str:
 
     Raises TactileError for both, or an error that no preset has.
     """
-    levels = None if options.error is None else options.error.levels
-    if options.preset is not None and levels is not None:
+    if options.levels is None:
+        return options.preset or DEFAULT
+    if options.preset is not None:
         raise TactileError("--error", "given with --preset", "one of the two")
-    return options.preset or DEFAULT if levels is None else fitting(levels, options.variant)
-
-
-def _tier(path: Path, gel: str, um: float, say: Callable[[str], None]) -> str:
-    """Choose the tier of contact for a scene: within the bound less what its height map adds.
-
-    Raises TactileError where none is.
-    """
-    from ..simulation import tier_choice
-
-    share = tier_choice.choose_for_scene(path, (gel,), None)[gel].share
-    sampled = sampling_error.height_error(share)
-    if um <= sampled:
-        expected = f"more than {sampled:.3g}, which heights between nodes add alone"
-        raise TactileError("--error", f"{um:g} um", expected, "Allow more")
-    choice = tier_choice.choose(gel, share, um - sampled)
-    say(f"{choice.describe(gel)}; heights between nodes add {sampled:.2g} um")
-    return choice.tier
+    return fitting(options.levels, options.variant)
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:

@@ -6,7 +6,6 @@ import dataclasses
 import functools
 
 import numpy as np
-from benchmarks.measure_sampling import Double
 from benchmarks.mechanics.axisymmetric import disc_mesh, pressed
 from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
 from slab import slab_compliance
@@ -250,6 +249,19 @@ def test_single_compliance() -> Found:
         for kind in (np.float32, np.float64)
     )  # fmt: skip
     return Found(float(np.abs(single - double).max()) * 1e6, "um", 0.1)
+
+
+class Double(networks.Networks):
+    """The same networks in float64."""
+
+    def __init__(self, nets: networks.Networks) -> None:
+        super().__init__(nets.tensors, nets.card)
+        self.tensors = {
+            net: {name: array.astype(float) for name, array in found.items()} for net, found in nets.tensors.items()
+        }
+
+    def _blocks(self, function, x, shape, name):
+        return function(np.asarray(x, float))
 
 
 @case("networks_in_single_precision", "single precision against double", TRANSLATION,

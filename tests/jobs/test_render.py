@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from gel_pictures import NO_MITSUBA, Press
 
-from tactile_core.accuracy import Candidate, cheapest
 from tactile_core.cli.main import main
 from tactile_core.jobs.frames_file import FramesFile
 from tactile_core.pictures.height_map import gel_mapper
@@ -263,57 +262,8 @@ def test_bad_options_end_in_one_message(more, words, render, heights, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.fixture
-def tiers(monkeypatch):
-    """The scene goes 8 % deep, where heights between nodes add 1 um; fast is within 30 um, full within 4."""
-    from tactile_core.jobs import sampling_error
-    from tactile_core.simulation import scene_recording, tier_choice
-
-    asked = []
-
-    def choose(sensor, share, bound):
-        rows = [Candidate("the fast tier", 30.0, 1.0), Candidate("the full tier", 4.0, 1e3)]
-        found = rows[0] if bound is None else cheapest(rows, bound, "um")
-        return tier_choice.TierChoice(found.name.split()[1], found.error, found.ms, share)
-
-    def simulated(scene, out, progress, keep, tiers):
-        asked.append(tiers)
-        shutil.copy(RECORDING, out)
-
-    monkeypatch.setattr(tier_choice, "choose", choose)
-    found = {"digit": choose("digit", 0.08, None)}
-    monkeypatch.setattr(tier_choice, "choose_for_scene", lambda path, used, bound: found)
-    monkeypatch.setattr(sampling_error, "height_error", lambda share: 1.0 if share < 0.1 else 9.0)
-    monkeypatch.setattr(scene_recording, "simulate_recording", simulated)
-    return asked
-
-
-@pytest.mark.parametrize(("bound", "tier"), [("31um,5levels", "fast"), ("30um,5levels", "full")])
-def test_a_scene_gets_the_tier_that_leaves_room_for_its_heights(bound, tier, render, tiers, tmp_path):
-    status, _, err = render(SCENES / "press", "--error", bound, "--frames", "100:101")
-    assert status == 0 and tiers == [{"digit": tier}]
-    assert f"{tier} tier" in err and "heights between nodes add 1 um" in err and "pictures: fast" in err
-    assert json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))["input"]["tier"] == tier
-
-
-@pytest.mark.parametrize(
-    ("bound", "words"),
-    [("4.9um", "4 or more, which the full tier has"), ("0.9um", "which heights between nodes add alone")],
-)
-def test_a_scene_whose_bound_nothing_meets_is_refused(bound, words, render, tiers):
-    status, _, err = render(SCENES / "press", "--preset", "fast", "--error", bound)
-    assert status == 2 and words in err and tiers == []
-
-
-def test_a_recording_is_as_exact_as_its_heights(render, tiers):
-    """The shipped recording's gel moves by about a tenth of its thickness."""
-    assert render(RECORDING, "--preset", "fast", "--error", "9.5um", "--frames", "300:301")[0] == 0
-    status, _, err = render(RECORDING, "--preset", "fast", "--error", "8.5um", "--frames", "300:301", out="other")
-    assert status == 2 and "9 or more, which heights between nodes" in err
-
-
-def test_a_bound_on_a_scene_s_gel_is_not_met_in_parts(render):
-    status, _, err = render(SCENES / "press", "--preset", "fast", "--error", "9um", "--workers", "2")
+def test_a_bound_on_a_scene_s_gel_is_simulate_s(render):
+    status, _, err = render(SCENES / "press", "--error", "9um")
     assert status == 2 and "Simulate the scene first" in err
 
 

@@ -137,12 +137,6 @@ def test_weights_that_lead_elsewhere_are_refused_unless_the_gel_is_solved(short,
     assert main([*words, "--gel", "solved", "--out", str(tmp_path / "b")]) == 0
 
 
-def test_a_bound_that_was_not_measured_on_a_gel_is_refused(short, tmp_path, capsys):
-    assert main(["convert", short, "--to", MINI, "--error", "50um", "--out", str(tmp_path / "a")]) == 2
-    words = "a bound in um on a GelSight Mini, where heights between nodes were not measured; expected one on a DIGIT"
-    assert words in capsys.readouterr().err
-
-
 def test_a_missing_library_is_named(monkeypatch):
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     with pytest.raises(TactileError, match="--gel solved: scipy is not installed"):

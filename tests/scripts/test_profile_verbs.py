@@ -66,17 +66,13 @@ def test_the_table_in_the_documentation_names_every_case():
     assert {name for name in CASES if not re.search(rf"^\| `{name}` ", text, re.MULTILINE)} == set()
 
 
-@pytest.mark.parametrize("script", ["measure_sampling", "measure_costs"])
-def test_what_plans_and_bounds_are_read_from_is_measured(script, tmp_path):
+def test_what_plans_are_read_from_is_measured(tmp_path):
     """A short run leaves the table that ships as it is."""
     tables = sorted((ROOT / "tactile_core" / "data").glob("*.json"))
     before = [table.read_bytes() for table in tables]
     out = tmp_path / "rows.json"
-    command = [sys.executable, str(ROOT / "scripts" / "benchmarks" / f"{script}.py"), "--quick", "--json", str(out)]
+    command = [sys.executable, str(ROOT / "scripts" / "benchmarks" / "measure_costs.py"), "--quick", "--json", str(out)]
     subprocess.run(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True, timeout=300)
     rows = {row["name"]: row["value"] for row in json.loads(out.read_text(encoding="utf-8"))}
     assert [table.read_bytes() for table in tables] == before
-    if script == "measure_costs":
-        assert rows["cost_simulate_digit"] > 0 and 50 < rows["memory_simulate_digit"] < 1000
-    else:  # nodes 0.35 mm apart show a ball to a few micrometres, and float32 rounds far below one
-        assert 0.05 < rows["sampling_height_error_10%"] < 5 and 0 < rows["float32_error"] < 0.01
+    assert rows["cost_simulate_digit"] > 0 and 50 < rows["memory_simulate_digit"] < 1000

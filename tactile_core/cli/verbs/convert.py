@@ -36,10 +36,8 @@ One frame for each data row, in file order; bad rows are repaired and flagged. A
 A file of several fingers gives one result a finger, <name>_finger0, <name>_finger1, ...; hand.bag#1 picks one. A bag
 of several topics gives one a topic and finger, <name>_<topic>_finger0; hands.bag#left/biotac/finger0 picks one.
 
---error bounds the error that drawing and rounding add to that of the networks. A bound in grey levels of the picture
-picks the cheapest preset of `tactile render` whose measured error is below it (without --error: fast). A bound in um of
-heights and displacements is checked, and refused where the fixed error there is larger. The networks' own error is
-printed beside it and is not part of the bound."""
+--error 0.6levels picks the cheapest preset of `tactile render` whose measured error, rms grey levels of a picture of
+the same gel, is at most that (without --error: fast). The networks' own error is in frames.h5 and on the sheet."""
 # 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
@@ -97,7 +95,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     unit_arguments(verb)
     object_argument(verb, "what touches the gel (default: the calibration's)")
     answer_arguments(verb)
-    error_argument(verb, "levels of a picture, um of heights, or both: 5um,0.6levels")
+    error_argument(verb, "levels of a picture, such as 0.6levels")
     verb.add_argument(
         "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
     )
@@ -121,8 +119,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(asked)
-    if job.error is not None and job.error.levels is not None:
-        say(describe_choice(asked.preset, job.error.levels))
+    if options.error is not None:
+        say(describe_choice(asked.preset, _levels(options)))
     converted = []
     for path, folder in zip(paths, folders, strict=True):
         try:
@@ -133,8 +131,8 @@ def run(options: argparse.Namespace) -> int:
             continue
         for warning in done.warnings:
             say(f"warning: {folder.name}: {warning}")
-        for remark in done.remarks:
-            say(f"{folder.name}: {remark}")
+        if done.remark:
+            say(f"{folder.name}: {done.remark}")
         tell(str(done.folder))
         converted.append(done.folder)
     failed = len(folders) - len(converted)
@@ -149,7 +147,6 @@ def run(options: argparse.Namespace) -> int:
 def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]:
     """Return what is done with each recording, what translates and draws them all, and the recordings."""
     from ...jobs import convert, results
-    from ...jobs.sampling_error import parse_budget
     from ...pictures import presets
     from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
@@ -157,18 +154,24 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
-    budget = None if options.error is None else parse_budget(options.error)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths = readers.list_fingers(options.recordings, prepare.columns)
     source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
-    preset = presets.FAST if budget is None or budget.levels is None else variant.fitting(budget.levels)
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, budget, options.calibration)
+    preset = presets.FAST if options.error is None else variant.fitting(_levels(options))
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, options.calibration)
     pictures = options.calibration, preset, None
     asked = convert.ToolOptions(
         options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance
     )
     return job, asked, paths
+
+
+def _levels(options: argparse.Namespace) -> float:
+    """Return the bound of --error, grey levels. Raises TactileError for one in um."""
+    from ...jobs.error_budget import parse_budget
+
+    return parse_budget(options.error).only("levels", "Nothing else can be chosen in a translation")
 
 
 def reverse(options: argparse.Namespace) -> int:

@@ -40,7 +40,7 @@ With LLVM, Mitsuba renders a scene: LEDs as lamps, the coating as a material, th
 matte, and standard and quality have no window; pictures differ by a tenth of a level. `tactile doctor` says which runs.
 
 --error 0.6levels picks the cheapest preset whose measured error, rms from the full model of the same gel, is at most
-that; --error 50um, for a scene, the tier of contact as `tactile simulate` does. It says what it picked, and why.
+that, and says why. How exact a scene's contacts are is chosen by `tactile simulate --error 50um`.
 
 With --workers, --cluster or --plan frames are rendered in other processes, to the same bytes. They wait in OUT.parts
 until all are there, and the same command goes on after any interruption; no timings.json is written."""
@@ -49,8 +49,9 @@ examples:
   tactile render results/touch/frames.h5 --out pictures --frames 100:200
   tactile render scenes/press_roll_slide --out pictures --preset quality --exr
   tactile render heights.npz --out pictures --error 0.5levels --calibration unit.toml
-  tactile render scenes/press --out pictures --error 50um,0.6levels
+  tactile render scenes/press --out pictures --error 0.6levels
   tactile render scenes/press --out pictures --gel gelsight_mini"""
+SIMULATE_FIRST = "Simulate the scene first, with --error, and render that"
 LEAVES = NOTHING
 
 
@@ -59,7 +60,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="INPUT", help="frames, heights or a scene, see above")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
     verb.add_argument("--preset", choices=PRESETS, help="method, see above (default: standard)")
-    error_argument(verb, "levels of the picture (picks the preset), um of the gel (picks a scene's tier), or both")
+    error_argument(verb, "levels of the picture, such as 0.6levels; picks the preset")
     verb.add_argument(
         "--calibration", metavar="UNIT.toml", help="unit, by `tactile calibrate` (default: the one that ships)"
     )
@@ -84,13 +85,13 @@ def run(options: argparse.Namespace) -> int:
     engine.check_counts(options, "workers")
     size = _size(options.size)
     from ...jobs import render, results
-    from ...jobs.sampling_error import parse_budget
+    from ...jobs.error_budget import parse_budget
     from ...pictures.mitsuba import variant
 
     wanted = {None: None, "llvm": variant.LLVM, "scalar": variant.SCALAR}[options.variant]
     asked = render.Options(
         preset=options.preset,
-        error=None if options.error is None else parse_budget(options.error),
+        levels=None if options.error is None else parse_budget(options.error).only("levels", SIMULATE_FIRST),
         calibration=_calibration(options.calibration, options.gel),
         object_reflectance=options.object_reflectance,
         size=size,
@@ -104,8 +105,6 @@ def run(options: argparse.Namespace) -> int:
     if options.plan or options.workers or options.cluster:
         if options.scene_out is not None:
             raise TactileError("--scene-out", "given with other processes", "one of the two", "Leave --workers out")
-        if asked.error is not None:
-            asked.error.only("levels", "Simulate the scene first, with --error, and render that")
         return _run_in_parts(options, asked)
     done = render.render(options.input, options.out, asked, lambda word: bar(word, "frame", options.progress), say)
     return _done(done)

@@ -114,8 +114,8 @@ def _keep(text: str | None) -> tuple[str, ...]:
 
 def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mapping[str, TierChoice], Plan]:
     """Choose the cheapest tiers within the bound of --error, or the fast one without it, and plan the simulation."""
+    from ...jobs.error_budget import parse_budget
     from ...jobs.plan import of_scene
-    from ...jobs.sampling_error import parse_budget
     from ...simulation.scene_recording import sensors_of
     from ...simulation.tier_choice import choose_for_scene
 

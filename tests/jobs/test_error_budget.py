@@ -3,7 +3,7 @@
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.jobs.sampling_error import Budget, parse_budget
+from tactile_core.jobs.error_budget import Budget, parse_budget
 
 
 @pytest.mark.parametrize(

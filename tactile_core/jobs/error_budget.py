@@ -1,0 +1,47 @@
+"""Bound on the error that the toolkit itself adds, as ``--error`` takes it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+
+from ..errors import TactileError
+
+EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6levels"
+
+
+@dataclasses.dataclass(frozen=True)
+class Budget:
+    """Largest acceptable error; None where the user gives no bound.
+
+    um : micrometres rms of a surface; levels : grey levels rms of a picture
+    """
+
+    um: float | None = None
+    levels: float | None = None
+
+    def __str__(self) -> str:
+        """Format the bounds as `parse_budget` reads them."""
+        given = {"um": self.um, "levels": self.levels}
+        return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
+
+    def only(self, unit: str, advice: str) -> float:
+        """Return the bound in ``unit``; raises TactileError where one is given in the other unit, meaningless here."""
+        other = "levels" if unit == "um" else "um"
+        if getattr(self, other) is not None:
+            raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", advice)
+        return getattr(self, unit)
+
+
+def parse_budget(text: str) -> Budget:
+    """Parse ``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for anything else."""
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        match = re.fullmatch(r"\s*(\d*\.?\d+(?:e[+-]?\d+)?)\s*(um|µm|μm|levels?)\s*", part, re.IGNORECASE)
+        unit = "" if not match else "levels" if match[2].lower().startswith("level") else "um"
+        value = float(match[1]) if match else 0.0
+        if not match or unit in found or not (value > 0 and math.isfinite(value)):
+            raise TactileError("--error", repr(text), EXPECTED, "Give a bound above 0 once for each unit")
+        found[unit] = value
+    return Budget(**found)
