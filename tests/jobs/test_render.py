@@ -90,13 +90,13 @@ def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
 
     asked = []
 
-    def simulated(scene, out, progress, keep, tiers):
-        asked.append((Path(scene), keep, tiers))
+    def simulated(scene, out, progress, keep):
+        asked.append((Path(scene), keep))
         shutil.copy(RECORDING, out)
 
     monkeypatch.setattr(scene_recording, "simulate_recording", simulated)
     assert render(SCENES / "press_roll_slide", "--frames", "300:301")[0] == 0
-    assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",), {"digit": "fast"})]
+    assert asked == [(SCENES / "press_roll_slide", ("displacement_digit",))]
     note = json.loads((tmp_path / "out" / "note.json").read_text(encoding="utf-8"))
     assert note["input"]["kind"] == "scene" and note["input"]["file"] == "scene.toml"
 
