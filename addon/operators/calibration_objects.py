@@ -28,6 +28,7 @@ class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
         """See ``TactileOperator``."""
         gel = properties.gel_of(context.scene, context.object)
         properties.check_own(gel)
+        gel.tactile.object_reflectance = 0.0
         digit_body.reset(gel, render_settings.calibration_of(context.scene, properties.sensor_name(gel)))
 
 

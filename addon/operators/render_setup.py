@@ -164,6 +164,7 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     coating = digit_body.coating_of(gel) if leds else None
     for name, socket in digit_materials.sockets_of(coating).items() if coating else ():
         layout.prop(socket, "default_value", text=name)
+    layout.prop(gel.tactile, "object_reflectance")
     if not digit_body.has_body(gel):
         layout.label(text="No LEDs of its own: Set Up Render adds them", icon="INFO")
     for words in digit_unit.left_out(context.scene)[:3]:

@@ -113,6 +113,11 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
         name="Tilt", description="Of the press against the normal of the surface", subtype="ANGLE",
         default=0.0, min=0.0, max=math.radians(45), options=set(),
     )  # fmt: skip
+    object_reflectance: bpy.props.FloatProperty(
+        name="Object Reflectance", description="Of what touches this gel, to 1, white: it shows through the coating in"
+        " pictures of this engine. 0: the calibration's", min=0.0, max=1.0, default=0.0, options={"ANIMATABLE"},
+        update=lambda about, _context: about.id_data.update_tag(),  # else Blender takes no notice
+    )  # fmt: skip
     largest: bpy.props.FloatProperty(
         name="Largest", description="Largest displacement of the animation, metres", default=0.0, min=0.0
     )

@@ -226,3 +226,23 @@ def test_mitsuba_sees_a_lamp_and_a_body(drawn, gel):
     half_way = (lamp("red").location + Vector((-7.5, 0, 8.3))) / 2
     bpy.ops.mesh.primitive_cube_add(size=5, location=gel.matrix_world @ half_way)
     assert (before - drawn("standard"))[..., 0].max() > 20
+
+
+def test_a_white_object_shows_through_where_it_touches(gel, drawn, shown, part):
+    """The gel's property; the calibration's where it is 0. A resting gel touches nothing."""
+    at_rest = drawn()
+    gel.tactile.object_reflectance = 1.0
+    assert shown().unit.object_reflectance == 1
+    np.testing.assert_array_equal(drawn(), at_rest)
+    rest = part("addon.settings.properties").surface_of(gel).rest
+    away = np.hypot(rest[:, 0] - shown().unit.camera.centre_x, rest[:, 2])
+    moved = np.zeros_like(rest)
+    moved[:, 1] = 5e-4 * np.exp(-np.square(away / 1.5e-3))
+    gel.shape_key_add(name="Basis")
+    press = gel.shape_key_add(name="Press")
+    nodes = part("addon.objects.axes").to_blender(rest + moved, gel.tactile.per_metre)
+    press.data.foreach_set("co", nodes.astype(np.float32).ravel())
+    press.value = 1.0
+    white = drawn()
+    bpy.ops.tactile.reset_to_calibration()
+    assert (white - drawn()).max() > 20
