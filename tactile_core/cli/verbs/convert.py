@@ -111,7 +111,7 @@ def run(options: argparse.Namespace) -> int:
     from ...recordings import readers
     from ...sensors import SOURCE
 
-    job, asked, paths = _read(options)
+    job, asked, paths, levels = _read(options)
     if options.plan:
         counts = [len(readers.read(path, job.columns, asked.source or SOURCE, lean=True)) for path in paths]
         chosen = sum(len(results.select(job.frames, count)) for count in counts)
@@ -119,8 +119,8 @@ def run(options: argparse.Namespace) -> int:
         return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(asked)
-    if options.error is not None:
-        say(describe_choice(asked.preset, _levels(options)))
+    if levels is not None:
+        say(describe_choice(asked.preset, levels))
     converted = []
     for path, folder in zip(paths, folders, strict=True):
         try:
@@ -144,9 +144,10 @@ def run(options: argparse.Namespace) -> int:
     return 2 if failed else 0
 
 
-def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]:
-    """Return what is done with each recording, what translates and draws them all, and the recordings."""
+def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str], float | None]:
+    """Return what is done with each recording, what translates and draws them all, the recordings, and --error's levels."""
     from ...jobs import convert, results
+    from ...jobs.error_budget import Budget, parse_budget
     from ...pictures import presets
     from ...pictures.mitsuba import variant
     from ...recordings import PrepareOptions, electrode_gains, readers
@@ -158,20 +159,15 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str]]
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths = readers.list_fingers(options.recordings, prepare.columns)
     source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
-    preset = presets.FAST if options.error is None else variant.fitting(_levels(options))
+    budget = Budget() if options.error is None else parse_budget(options.error)
+    levels = budget.only("levels", "Nothing else can be chosen in a translation")
+    preset = presets.FAST if levels is None else variant.fitting(levels)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor, options.calibration)
     pictures = options.calibration, preset, None
     asked = convert.ToolOptions(
         options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance
     )
-    return job, asked, paths
-
-
-def _levels(options: argparse.Namespace) -> float:
-    """Return the bound of --error, grey levels. Raises TactileError for one in um."""
-    from ...jobs.error_budget import parse_budget
-
-    return parse_budget(options.error).only("levels", "Nothing else can be chosen in a translation")
+    return job, asked, paths, levels
 
 
 def reverse(options: argparse.Namespace) -> int:
