@@ -145,7 +145,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str], float | None]:
-    """Return what is done with each recording, what translates and draws them all, the recordings, and --error's levels."""
+    """Return the work on each recording, what translates and draws them, the recordings, and the bound in levels."""
     from ...jobs import convert, results
     from ...jobs.error_budget import Budget, parse_budget
     from ...pictures import presets
