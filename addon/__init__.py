@@ -23,13 +23,14 @@ from .operators import (
     view,
 )
 from .process import command_line
-from .settings import preferences, properties
+from .settings import kept_files, preferences, properties
 from .ui import add_menu, asset_library, panels, workspace
 
 # In the order of registration: properties before what uses them.
 PARTS = (
     properties,
     preferences,
+    kept_files,
     asset_library,
     check_llvm,
     import_recording,

@@ -27,10 +27,14 @@ def add(
     rows, columns = values.shape
     words = name.replace("_", " ")
     label = f"Tactile {words}"
-    image = images.new_image(f"{thing.name} {words}", columns, rows, floats=values.dtype != bool)
+    name_of_image = f"{thing.name} {words}"
+    if values.dtype == bool:
+        image = images.packed_mask(name_of_image, values)
+    else:
+        image = images.new_image(name_of_image, columns, rows, floats=True)
+        images.fill(image, values.astype(np.float32))
+        image.pack()
     image.colorspace_settings.name = "Non-Color"  # numbers to look up, no picture
-    images.fill(image, values.astype(np.float32))
-    image.pack()
     modifier = modifier_of(thing, name)
     if modifier is None:
         modifier = thing.modifiers.new(label, "NODES")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
+
 import bpy
 import numpy as np
 
 from ...tactile_core import sensors
+from ...tactile_core.files.png_writer import SIGNATURE
 from ..settings import properties
 
 _PICTURE, _HEIGHTS = "{} picture", "{} height map"  # of a sensor
@@ -31,6 +35,26 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
     pixels[..., :3] = values[::-1] if values.ndim == 3 else values[::-1, :, None]
     image.pixels.foreach_set(pixels.ravel())
     image.update()
+
+
+def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
+    """Make an image of values (H, W) bool from a PNG of one bit a pixel that it holds; a former one of its name goes.
+
+    Set as pixels, those of a long recording would take gigabytes for a moment.
+    """
+    former = bpy.data.images.get(name)
+    if former is not None:
+        bpy.data.images.remove(former)
+    rows = np.pad(np.packbits(values, axis=1), ((0, 0), (1, 0)))  # each begins with its filter: none
+    head = struct.pack(">IIBBBBB", *values.shape[::-1], 1, 0, 0, 0, 0)  # one bit, grey
+    chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes())), (b"IEND", b"")]
+    packed = SIGNATURE + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+    )
+    image = bpy.data.images.new(name, 1, 1)
+    image.pack(data=packed, data_len=len(packed))
+    image.source = "FILE"
+    return image
 
 
 def picture_of(gel: bpy.types.Object) -> bpy.types.Image | None:

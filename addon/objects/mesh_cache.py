@@ -1,52 +1,124 @@
-"""A long recording as a PC2 file that Blender's Mesh Cache modifier streams."""
+"""A long recording's movement as a PC2 file that Blender's Mesh Cache modifier streams, written as it is translated."""
 
 from __future__ import annotations
 
-import os
+import contextlib
+import dataclasses
+import hashlib
 import struct
+from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import bpy
 import numpy as np
 
+from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
 from ...tactile_core.files import atomic
+from ...tactile_core.translation import gel_place
+from ..settings import kept_files
+from . import axes
 
-FOLDER = "tactile_cache"
 _BLOCK = 64  # frames at a time
 
 
-def check(thing: bpy.types.Object) -> None:
-    """Raise TactileError where the file that moves an object is not where the .blend looks for it."""
-    for modifier in thing.modifiers:
-        path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None
-        if path is not None and not path.is_file():
-            advice = f"Move the folder {FOLDER} with the .blend, or translate again"
-            raise TactileError(thing.name, f"its mesh cache {path} is gone", "the file that moves it", advice)
+@dataclasses.dataclass(frozen=True, eq=False)
+class Motion:
+    """Movement of a surface: displacements (T, n, 3) m, or the ``file`` that holds them.
 
-
-def write_cache(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> Path:
-    """Write nodes = rest + displacement beside the .blend and let the object play them.
-
-    rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,), evenly spaced
-    Raises TactileError where the .blend is not saved yet, or the folder cannot be written.
+    dent : (T,) m, largest displacement of a node; patch : (T, n) bool, what is touched, of a gel
     """
-    if not bpy.data.is_saved:
-        raise TactileError(thing.name, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
-    path = Path(bpy.path.abspath(f"//{FOLDER}")) / f"{bpy.path.clean_name(thing.name)}.pc2"
-    first, step = float(frames[0]), float(frames[1] - frames[0]) if len(frames) > 1 else 1.0
-    with atomic.writing(path, "room in a writable folder", "Save the .blend elsewhere"):
-        path.parent.mkdir(exist_ok=True)
-        with atomic.new_file(path) as partial, open(partial, "wb") as file:
-            # PC2: "POINTCACHE2", version 1, points, first frame, frames a sample, samples; then float32 x, y, z
-            file.write(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, len(rest), first, step, len(frames)))
-            for start in range(0, len(frames), _BLOCK):
-                nodes = rest.astype(np.float32) + displacement[start : start + _BLOCK]
-                file.write(nodes.astype("<f4").tobytes())
+
+    dent: np.ndarray
+    patch: np.ndarray | None
+    displacement: np.ndarray | None = None
+    file: Path | None = None
+
+
+def in_memory(displacement: np.ndarray, sensor: str) -> Motion:
+    """Return the movement of a sensor's surface by displacements (T, n, 3) m."""
+    return Motion(_dent(displacement), _patch(displacement, sensor), displacement)
+
+
+class Writer:
+    """Takes a surface's displacements, some frames at a time, into a file that is open."""
+
+    def __init__(self, file: BinaryIO, sensor: str, per_metre: float, frames: int) -> None:
+        """Begin with the header of so many frames, in Blender units of so many a metre."""
+        self._sensor, self._per_metre, self._file = sensor, per_metre, file
+        self._rest = axes.to_blender(sensors.sensor_surface(sensor).rest, per_metre)
+        # PC2: "POINTCACHE2", version 1, points, first frame, frames a sample, samples; then float32 x, y, z
+        self._file.write(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, len(self._rest), 0.0, 1.0, frames))
+        self._dent: list[np.ndarray] = []
+        self._patch: list[np.ndarray] = []
+
+    def add(self, displacement: np.ndarray) -> None:
+        """Write the next frames (T, n, 3) m."""
+        nodes = self._rest + axes.to_blender(displacement, self._per_metre)
+        self._file.write(np.ascontiguousarray(nodes, "<f4").data)
+        self._dent.append(_dent(displacement))
+        patch = _patch(displacement, self._sensor)
+        self._patch += [] if patch is None else [patch]
+
+    def motion(self, file: Path) -> Motion:
+        """Return what was written, by the name that it has now."""
+        patch = np.concatenate(self._patch) if self._patch else None
+        return Motion(np.concatenate(self._dent), patch, file=file)
+
+
+@contextlib.contextmanager
+def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[Writer]:
+    """Write a file whole or not at all. Raises TactileError where there is no room."""
+    room = atomic.writing(file, "room in a writable folder", "Save the .blend elsewhere")
+    with room, atomic.new_file(file) as partial, open(partial, "wb") as stream:
+        yield Writer(stream, sensor, per_metre, frames)
+        stream.flush()
+
+
+def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
+    """Write a movement in memory to a file of this name in its folder; one that is in a file stays there."""
+    if moved.file is not None:
+        return moved
+    token = hashlib.sha256(moved.displacement.tobytes()).hexdigest()[:8]
+    file = kept_files.folder(kept_files.CACHE) / f"{bpy.path.clean_name(f'{name} {token}')}.pc2"
+    with writing(file, sensor, per_metre, len(moved.displacement)) as writer:
+        for start in range(0, len(moved.displacement), _BLOCK):
+            writer.add(moved.displacement[start : start + _BLOCK])
+    return dataclasses.replace(moved, displacement=None, file=file)
+
+
+def play(thing: bpy.types.Object, file: Path, first: float, step: float) -> None:
+    """Let an object play a file from a frame of the scene on; step : frames of the scene a frame of the file."""
     modifier = thing.modifiers.get("Tactile") or thing.modifiers.new("Tactile", "MESH_CACHE")
+    thing.modifiers.move(list(thing.modifiers).index(modifier), 0)  # what it moves is what the others show
     modifier.cache_format = "PC2"
-    modifier.filepath = bpy.path.relpath(os.fspath(path))
+    modifier.filepath = kept_files.shown(file)
     modifier.play_mode, modifier.time_mode = "SCENE", "FRAME"
-    modifier.frame_start, modifier.frame_scale = first, 1.0
+    modifier.frame_start, modifier.frame_scale = first / step, 1.0 / step  # it scales before it subtracts
     modifier.forward_axis, modifier.up_axis = "POS_Y", "POS_Z"  # as the file holds them
-    return path
+
+
+def stop(thing: bpy.types.Object) -> None:
+    """Let an object play no file any more."""
+    modifier = thing.modifiers.get("Tactile")
+    if modifier is not None:
+        thing.modifiers.remove(modifier)
+
+
+def check(*things: bpy.types.Object | None) -> None:
+    """Raise TactileError where the file that moves an object is not where the .blend looks for it."""
+    for thing in filter(None, things):
+        for modifier in thing.modifiers:
+            path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None
+            if path is not None and not path.is_file():
+                advice = f"Move the folder {kept_files.CACHE} with the .blend, or import or translate again"
+                raise TactileError(thing.name, f"its mesh cache {path} is gone", "the file that moves it", advice)
+
+
+def _dent(displacement: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("tni,tni->tn", displacement, displacement).max(axis=1))
+
+
+def _patch(displacement: np.ndarray, sensor: str) -> np.ndarray | None:
+    return gel_place.contact_patch(displacement, sensors.sensor_surface(sensor)) if sensors.is_gel(sensor) else None

@@ -26,22 +26,21 @@ def check_rest(*things: bpy.types.Object) -> None:
             raise TactileError(thing.name, found, "a sensor moved as an object", advice)
 
 
-def animate(
-    thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray, motion: str
-) -> str:
-    """Let an object play displacements (T, n, 3) m of rest (n, 3) m at frames (T,); returns a sentence.
+def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarray, motion: str) -> str:
+    """Let an object play a movement at frames (T,); returns a sentence.
 
     motion : one of ``properties.MOTIONS``; empty where a file of before has compact keys
     Raises TactileError where a mesh cache cannot be written.
     """
-    per_metre = thing.tactile.per_metre
-    moved, nodes = axes.to_blender(displacement, per_metre), axes.to_blender(rest, per_metre)
-    thing.tactile.motion = motion = motion or "SHAPE_KEYS"
-    thing.tactile.largest = float(np.sqrt(np.square(displacement).sum(-1).max(initial=0.0)))
+    about = thing.tactile
+    about.motion = motion = motion or "SHAPE_KEYS"
+    about.largest = float(moved.dent.max(initial=0.0))
     if motion == "MESH_CACHE":
-        path = mesh_cache.write_cache(thing, nodes, moved, frames)
-        return f"{thing.name}: mesh cache {path.name}"
-    _write_keys(thing, nodes, moved, frames)
+        moved = mesh_cache.written(moved, properties.sensor_name(thing), about.per_metre, thing.name)
+        mesh_cache.play(thing, moved.file, frames[0], frames[1] - frames[0] if len(frames) > 1 else 1.0)
+        return f"{thing.name}: mesh cache {moved.file.name}"
+    nodes = axes.to_blender(properties.surface_of(thing).rest, about.per_metre)
+    _write_keys(thing, nodes, axes.to_blender(moved.displacement, about.per_metre), frames)
     return f"{thing.name}: {len(frames)} shape keys"
 
 

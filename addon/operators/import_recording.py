@@ -15,12 +15,11 @@ from ...tactile_core.sensors.electrodes import table_of
 from ..objects import axes, biotac_objects, curves, electrode_markers
 from ..settings import properties
 from ..settings.properties import MOTIONS, RecordingOptions
-from ..settings.reports import TactileOperator, in_blender, shown
+from ..settings.reports import Refused, TactileOperator, in_blender, reported, shown
 from . import recording_data, set_style, view
 
 _APART = 85e-3  # m between the recordings of a scene: a BioTac, a DIGIT's housing and a gap
 _LABEL = "BioTac Recording (.csv, .h5, .npz, .mat, .json, .bag, .mcap)"
-LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
 
 
 def _fingers(operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
@@ -46,6 +45,11 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     bl_options = {"REGISTER", "UNDO", "PRESET"}  # noqa: RUF012
 
     filepath: bpy.props.StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"})
+    directory: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
+    files: bpy.props.CollectionProperty(
+        name="Files", description="Recordings of the folder; several stand side by side",
+        type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"},
+    )  # fmt: skip
     filename_ext = ".csv"
     filter_glob: bpy.props.StringProperty(default=";".join(f"*{end}" for end in ENDINGS), options={"HIDDEN"})
     finger: bpy.props.EnumProperty(
@@ -55,7 +59,11 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     first_frame: bpy.props.IntProperty(
         name="First Frame", description="Scene frame on which the recording's frame 0 is put", default=0
     )
-    motion: bpy.props.EnumProperty(name="Animation", description="How the skin's movement is stored", items=MOTIONS)
+    motion: bpy.props.EnumProperty(
+        name="Animation", description="How the movement of skin and gel is stored", default="AUTOMATIC",
+        items=(("AUTOMATIC", "Automatic", f"Shape keys; a mesh cache beyond {recording_data.LONG} frames", "", 3),
+               *MOTIONS),
+    )  # fmt: skip
     millimetres: bpy.props.BoolProperty(
         name="Scene in Millimetres",
         description="Set the scene's unit to 1 mm, so that a fingertip is workable; else the scene's own unit is kept",
@@ -66,16 +74,39 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     )
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
-        path = recording_data.fingers(bpy.path.abspath(self.filepath))[int(self.finger or 0)]
-        if self.motion == "MESH_CACHE" and not bpy.data.is_saved:
-            raise TactileError(path, "a mesh cache of an unsaved file", "a saved .blend", "Save it first")
+        """See ``TactileOperator``: of several files the good ones are imported, and each bad one is reported."""
+        done, paths, timed = 0, self._paths(), False
+        for path in paths:
+            try:
+                with reported(self):
+                    last = self._import(context, path)
+            except Refused:
+                continue
+            done, timed = done + 1, timed or self.set_timeline
+            if timed:  # as long as the longest of them
+                context.scene.frame_end = max(context.scene.frame_end, last)
+        if not done:
+            raise Refused(self.filepath)
+
+    def _paths(self) -> list[str]:
+        """List the files that were chosen or dropped."""
+        folder, names = bpy.path.abspath(self.directory), [each.name for each in self.files if each.name]
+        return [os.path.join(folder, name) for name in names] or [bpy.path.abspath(self.filepath)]
+
+    def _import(self, context: bpy.types.Context, path: str) -> int:
+        """Import one recording; returns its last frame in the scene. Raises TactileError."""
+        held, finger = recording_data.fingers(path), int(self.finger or 0)
+        if finger >= len(held):
+            raise TactileError(path, f"{len(held)} recordings", f"a finger {finger}", "Import it by itself")
+        path = held[finger]
         guessed = recording_data.write_columns(path, self)
         if guessed:
             self.report({"WARNING"}, guessed)
+        scene, motion = context.scene, "" if self.motion == "AUTOMATIC" else self.motion
+        per_metre = 1000.0 if self._in_millimetres(scene) else axes.units_per_metre(scene)
         with shown(context) as progress:
-            found = recording_data.load(path, self, progress)
-        scene, source = context.scene, found.translator.source
+            found = recording_data.load(path, self, progress, motion, per_metre)
+        source = found.translator.source
         placed = table_of(source).is_file()
         if placed:
             sensors.electrodes(source)  # a bad table is refused before anything is made
@@ -83,7 +114,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         kept = self._keep_scene(scene)
         frames = self.first_frame + found.chosen.astype(float)
         skin = self._skin(scene, path, found)
-        skin.tactile.motion = self.motion
+        skin.tactile.motion = "SHAPE_KEYS" if found.skin.file is None else recording_data.MESH_CACHE
         summary = play(skin, found, frames)
         if self.set_timeline:
             view.set_timeline(scene, found.recording.rate, int(frames[0]), int(frames[-1]))
@@ -98,13 +129,12 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             self.report({"WARNING"}, f"No electrodes are shown: there is no {table_of(source)}. {advice}")
         for warning in found.signals.warnings:
             self.report({"WARNING"}, in_blender(warning))
-        if len(frames) > LONG and self.motion != "MESH_CACHE":
-            self.report({"WARNING"}, f"{len(frames)} frames: a mesh cache makes a smaller, faster file")
         self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
+        return int(frames[-1])
 
     def _keep_scene(self, scene: bpy.types.Scene) -> str:
         """Leave units and frame rate of a scene that holds something already, unless asked for; what was kept."""
-        if self.millimetres and (view.is_new(scene) or self.properties.is_property_set("millimetres")):
+        if self._in_millimetres(scene):
             axes.use_millimetres(scene)
         if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:
             return ""
@@ -112,11 +142,16 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
             self.set_timeline = False
         return "" if self.set_timeline else ". The scene's own frame rate and range are kept"
 
+    def _in_millimetres(self, scene: bpy.types.Scene) -> bool:
+        return self.millimetres and (view.is_new(scene) or self.properties.is_property_set("millimetres"))
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Open a small popup for a file that was dropped; the menu opens the file browser."""
-        if not self.filepath:
+        if not self.filepath and not self.files:
             return super().invoke(context, event)
-        asked = {"title": os.path.basename(self.filepath), "confirm_text": "Import", "translate": False}
+        first, *others = self._paths()
+        title = os.path.basename(first) + (f" and {len(others)} more" if others else "")
+        asked = {"title": title, "confirm_text": "Import", "translate": False}
         return context.window_manager.invoke_props_dialog(self, **asked)
 
     def _skin(self, scene: bpy.types.Scene, path: str, found: recording_data.Translated) -> bpy.types.Object:
@@ -137,11 +172,12 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
 def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> str:
     """Let a skin and its electrodes play a recording at frames (T,) of the scene; returns a sentence."""
-    skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in unit_rows(found.signals))
+    rows = unit_rows(found.signals) or [("unit", "nothing is known of it by this recording")]
+    skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in rows)
     if table_of(properties.sensor_name(skin)).is_file():
         electrode_markers.add_markers(skin, found.signals.change, frames)
         electrode_markers.add_counts(skin, found.signals.change, frames)
-    return set_style.animate(skin, found.translation.displacement_biotac, frames, skin.tactile.motion, found.columns())
+    return set_style.animate(skin, found.skin, frames, skin.tactile.motion, found.columns())
 
 
 def plays(skin: bpy.types.Object, found: recording_data.Translated) -> bool:

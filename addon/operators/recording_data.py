@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import functools
+import hashlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import bpy
 import numpy as np
 
-from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.jobs import results
 from ...tactile_core.recordings import PrepareOptions, Recording, Signals, readers
@@ -19,22 +20,39 @@ from ...tactile_core.recordings.recording import split
 from ...tactile_core.recordings.tables import column_map
 from ...tactile_core.recordings.tables.mapped_files import guess_map
 from ...tactile_core.translation.answer import Answer
-from ...tactile_core.translation.translate import PreparedRows, load_translator, translated
+from ...tactile_core.translation.translate import PreparedRows, load_translator, translated_parts
 from ...tactile_core.translation.translator import Translation, Translator
 from ...tactile_core.translation.weights import CARD_NAME
+from ..objects import mesh_cache
+from ..objects.mesh_cache import Motion
 from ..process import recording_reader
+from ..settings import kept_files
 from ..settings.properties import RecordingOptions
+
+MESH_CACHE = "MESH_CACHE"  # of ``properties.MOTIONS``
+LONG = 2000  # frames; beyond it a mesh cache loads and saves faster than shape keys
+_MOVED = "displacement_biotac", "displacement_digit"  # of skin and gel
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
-    """A recording, the numbers (T,) of its translated frames, their signals and translation, and the networks used."""
+    """A recording, the numbers (T,) of its translated frames, their signals and translation, and the networks used.
+
+    skin, gel : their movements; where files hold them, the translation has no displacements: (T, 0, 3)
+    """
 
     translator: Translator
     recording: Recording
     chosen: np.ndarray
     signals: Signals
     translation: Translation
+    skin: Motion
+    gel: Motion
+
+    def fits(self, motion: str) -> bool:
+        """Return true if its movements are held as they are to be stored."""
+        files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
+        return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the values (T,) or (T, k) of the skin's custom properties by name; the force in Blender's axes."""
@@ -45,12 +63,16 @@ class Translated:
             "confidence": translation.confidence,
             "explained": translation.explained,
             "expected_error_um": 1e6 * translation.expected_error_biotac,
-            "dent_um": 1e6 * accuracy.lengths(translation.displacement_biotac).max(axis=1),
             "flags": translation.flags,
         }
         if self.recording.pdc is not None:
             values["pdc"] = self.recording.pdc[self.chosen]
         return values
+
+
+def in_files(motion: str, frames: int) -> bool:
+    """Return true if a movement of so many frames is held in files; motion : see ``load``."""
+    return motion == MESH_CACHE or (not motion and frames > LONG)
 
 
 @functools.lru_cache(maxsize=2)
@@ -101,13 +123,31 @@ def _changed(path: str) -> int:
         return 0
 
 
-def load(path: str, asked: RecordingOptions, progress: Callable[[float], None]) -> Translated:
-    """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there."""
+def load(
+    path: str, asked: RecordingOptions, progress: Callable[[float], None], motion: str, per_metre: float
+) -> Translated:
+    """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there.
+
+    motion : one of ``properties.MOTIONS``, which by mesh caches holds movements in files, in units of so many a metre;
+        empty: those for more than ``LONG`` frames
+    """
+    path = os.path.normpath(path)  # a .blend's relative path has another form
+    per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)
     files = [(file, _changed(file)) for file in (split(path).file, _absolute(asked.columns), _absolute(asked.unit))]
-    key = (path, *files, asked.tare, asked.frames, asked.polarity, asked.apart, known.sha256)
-    if key not in _KEPT:
-        found = _translated(known, path, asked, progress)
+    key = (
+        path,
+        *files,
+        asked.tare,
+        asked.frames,
+        asked.polarity,
+        asked.apart,
+        known.sha256,
+        per_metre,
+        kept_files.folder(kept_files.CACHE),
+    )
+    if key not in _KEPT or not _KEPT[key].fits(motion):
+        found = _translated(known, path, asked, progress, motion, key)
         _KEPT.clear()
         _KEPT[key] = found
     return _KEPT[key]
@@ -117,7 +157,12 @@ _KEPT: dict[tuple, Translated] = {}  # the last one: importing and translating a
 
 
 def _translated(
-    translator: Translator, path: str, asked: RecordingOptions, progress: Callable[[float], None]
+    translator: Translator,
+    path: str,
+    asked: RecordingOptions,
+    progress: Callable[[float], None],
+    motion: str,
+    key: tuple,
 ) -> Translated:
     columns = _absolute(asked.columns)
     recording = recording_reader.read(path, translator.source, columns)
@@ -134,5 +179,48 @@ def _translated(
     tare = None if asked.tare in ("", "auto") else asked.tare
     options = PrepareOptions(tare=tare, polarity=asked.polarity)
     rows = PreparedRows(recording, chosen, translator.answer, options, unit)
-    translation = translated(translator, rows, chosen, progress)
-    return Translated(translator, recording, chosen, rows.read(chosen)[1], translation)
+    about = translator, recording, chosen, rows.read(chosen)[1]
+    parts = _with_progress(translated_parts(translator, rows, chosen), len(chosen), progress)
+    pair = translator.source, translator.target
+    if in_files(motion, len(chosen)):
+        return Translated(*about, *_in_files(pair, parts, len(chosen), recording.name, key))
+    return Translated(*about, *_in_memory(pair, parts))
+
+
+def _with_progress(
+    parts: Iterator[Translation], frames: int, progress: Callable[[float], None]
+) -> Iterator[Translation]:
+    """Yield the parts, and say what share of the frames is done."""
+    done = 0
+    for part in parts:
+        yield part
+        done += len(part.force)
+        progress(done / frames)
+
+
+def _in_memory(pair: tuple[str, str], parts: Iterator[Translation]) -> tuple[Translation, Motion, Motion]:
+    """Join a translation; returns the movements of skin and gel too."""
+    whole = Translation.joined(list(parts))
+    skin, gel = (mesh_cache.in_memory(getattr(whole, name), sensor) for name, sensor in zip(_MOVED, pair, strict=True))
+    return whole, skin, gel
+
+
+def _in_files(
+    pair: tuple[str, str], parts: Iterator[Translation], frames: int, name: str, key: tuple
+) -> tuple[Translation, Motion, Motion]:
+    """Join a translation without its displacements, which go into files as they come; ``_in_memory`` else.
+
+    name, key : of the recording and all that the files depend on, by which they are named: none replaces another
+    """
+    token, folder = hashlib.sha256(repr(key[:-1]).encode()).hexdigest()[:8], kept_files.folder(kept_files.CACHE)
+    files = [folder / f"{bpy.path.clean_name(f'{name} {sensor} {token}')}.pc2" for sensor in pair]
+    light = []
+    with contextlib.ExitStack() as both:
+        writers = [both.enter_context(mesh_cache.writing(file, sensor, key[-2], frames))
+                   for file, sensor in zip(files, pair, strict=True)]  # fmt: skip
+        for part in parts:
+            for writer, field in zip(writers, _MOVED, strict=True):
+                writer.add(getattr(part, field))
+            light.append(dataclasses.replace(part, **dict.fromkeys(_MOVED, np.empty((len(part.force), 0, 3)))))
+    skin, gel = (writer.motion(file) for writer, file in zip(writers, files, strict=True))
+    return Translation.joined(light), skin, gel

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.translation import gel_place
 from ..objects import curves, frame_attribute, motion, style_legend, style_nodes, styles
+from ..objects.mesh_cache import Motion
 from ..settings import properties
 from ..settings.reports import TactileOperator
 from . import view
@@ -91,21 +91,18 @@ def follow(thing: bpy.types.Object, before: float) -> None:
     _give(thing, style, shown if by_hand else 0.0, style_nodes.get_input(modifier, style_nodes.EXAGGERATION))
 
 
-def animate(
-    thing: bpy.types.Object, moved: np.ndarray, frames: np.ndarray, how: str, values: dict[str, np.ndarray]
-) -> str:
-    """Let a sensor play displacements (T, n, 3) m at frames (T,), its contact patch, style and properties with them.
+def animate(thing: bpy.types.Object, moved: Motion, frames: np.ndarray, how: str, values: dict[str, np.ndarray]) -> str:
+    """Let a sensor play a movement at frames (T,), its contact patch, style and properties with it.
 
     how : see ``motion.animate``; values : see ``curves.write_properties``. Returns a sentence for the user.
     """
-    surface, before = properties.surface_of(thing), thing.tactile.largest
-    summary = motion.animate(thing, surface.rest, moved, frames, how)
-    if thing.tactile.role == "DIGIT":
+    before = thing.tactile.largest
+    summary = motion.animate(thing, moved, frames, how)
+    if moved.patch is not None:
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
-        patch = gel_place.contact_patch(moved, surface)
-        frame_attribute.add(thing, frame_attribute.PATCH, patch, frames[0], step)
+        frame_attribute.add(thing, frame_attribute.PATCH, moved.patch, frames[0], step)
     follow(thing, before)
-    curves.write_properties(thing, values, frames)
+    curves.write_properties(thing, values | {"dent_um": 1e6 * moved.dent}, frames)
     return summary
 
 

@@ -1,23 +1,18 @@
 """The button "Simulate": contact mechanics over the frame range, in another process."""
 
-import os
 import shutil
-from pathlib import Path
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..objects import motion
 from ..process.jobs import Job, JobFolder
-from ..settings import properties, render_settings
+from ..settings import kept_files, properties, render_settings
 from ..settings.reports import require
 from . import pictures, scene_bridge, simulation_result
 from .job_operator import JobOperator
-
-_FOLDER = "tactile_simulations"  # beside a .blend
 
 
 def _outputs(scene: bpy.types.Scene) -> list[str]:
@@ -80,7 +75,7 @@ class TACTILE_OT_simulate(JobOperator):
     def _keep(self, context: bpy.types.Context) -> None:
         """Save the simulated recording beside the .blend, so that it can be translated like a real one.
 
-        Of a file that was never saved it is kept by Blender until the file is, see ``_move_beside``.
+        Of a file that was never saved it is kept by Blender until the file is, see ``kept_files``.
         """
         from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 
@@ -88,37 +83,12 @@ class TACTILE_OT_simulate(JobOperator):
         skin = next((thing for thing in there if properties.sensor_name(thing) == ELECTRODES_OF), None)
         if skin is None:
             return
-        name = f"{bpy.path.clean_name(self._thing)}.h5"
-        folder = f"//{_FOLDER}" if bpy.data.is_saved else os.path.join(bpy.app.tempdir, _FOLDER)
-        path = Path(bpy.path.abspath(folder)) / name
+        path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(self._thing)}.h5"
         path.parent.mkdir(exist_ok=True)
         shutil.copyfile(self._folder.path / "recording.h5", path)
-        skin.tactile.recording, skin.tactile.tare = f"{folder}/{name}", "auto"
+        skin.tactile.recording, skin.tactile.tare, skin.tactile.known = kept_files.shown(path), "auto", ""
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
         skin.tactile.samples = SAMPLE_RATE / scene_bridge.rate_of(context.scene)
 
 
-@persistent
-def _move_beside(file: str, *_: object) -> None:
-    """Copy recordings of a file that is saved for the first time beside it; called by Blender before it saves."""
-    kept = os.path.join(bpy.app.tempdir, _FOLDER)
-    for thing in bpy.data.objects:
-        recording = thing.tactile.recording
-        if file and recording.startswith(kept) and os.path.isfile(recording):
-            path = Path(file).parent / _FOLDER / os.path.basename(recording)
-            path.parent.mkdir(exist_ok=True)
-            shutil.copyfile(recording, path)
-            thing.tactile.recording = f"//{_FOLDER}/{path.name}"
-
-
-@persistent
-def _move_back(*_: object) -> None:
-    """Name Blender's own recordings again after a copy of a never saved file was saved, which stays unsaved."""
-    for thing in () if bpy.data.is_saved else bpy.data.objects:
-        kept = os.path.join(bpy.app.tempdir, _FOLDER, os.path.basename(thing.tactile.recording))
-        if thing.tactile.recording.startswith(f"//{_FOLDER}/") and os.path.isfile(kept):
-            thing.tactile.recording = kept
-
-
 CLASSES = (TACTILE_OT_simulate,)
-HANDLERS = ((bpy.app.handlers.save_pre, _move_beside), (bpy.app.handlers.save_post, _move_back))

@@ -9,7 +9,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..objects import axes, curves
+from ..objects import axes, curves, mesh_cache
 from ..settings import properties
 from . import set_style
 
@@ -69,7 +69,8 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
         if moved is None:  # it was added while the other process worked
             continue
         told = {"force": force}
-        sentences.append(set_style.animate(sensor, moved[sample], frames, sensor.tactile.motion, told))
+        movement = mesh_cache.in_memory(moved[sample], properties.sensor_name(sensor))
+        sentences.append(set_style.animate(sensor, movement, frames, sensor.tactile.motion, told))
     if thing.tactile.press_by == "HEIGHT":
         curves.write_curve(thing, "tactile.force", frames, np.linalg.norm(force, axis=1))
     _stand(context, thing, result, sample, frames)

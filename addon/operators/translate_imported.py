@@ -3,10 +3,9 @@
 import bpy
 import numpy as np
 
-from ...tactile_core import accuracy
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import gel_place
-from ..objects import curves, digit_body, digit_objects, motion
+from ..objects import curves, digit_body, digit_objects, mesh_cache, motion
 from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import require, shown
@@ -47,13 +46,16 @@ class TACTILE_OT_translate(JobOperator):
         motion.check_rest(*(thing for thing in beside if thing.tactile.role in properties.OF_ROLE))
         about = skin.tactile
         with shown(context) as progress:
-            found = recording_data.load(bpy.path.abspath(about.recording), about, progress)
-        own = found.translator.target
-        self._skin, self._target = skin.name, self.to.lower() if self.properties.is_property_set("to") else own
+            own = recording_data.translator_of(about, bpy.path.abspath(about.recording)).target
+            self._target = self.to.lower() if self.properties.is_property_set("to") else own
+            # Another gel's contacts are solved from what is in memory.
+            how = (about.motion if self._target == own else "") or "SHAPE_KEYS"
+            found = recording_data.load(bpy.path.abspath(about.recording), about, progress, how, about.per_metre)
+        self._skin = skin.name
         self._found = found
         unit = render_settings.calibration_of(context.scene, self._target)
         beside = gel_place.beyond_picture(found.translation.contact_center, unit.camera)
-        self._moved, self._flags = found.translation.displacement_digit, found.translation.flags | beside
+        self._moved, self._flags = found.gel, found.translation.flags | beside
         self._error = found.translation.expected_error_digit
         if self._target != own:
             require("scipy")
@@ -66,8 +68,9 @@ class TACTILE_OT_translate(JobOperator):
         """See ``JobOperator``."""
         if self._job is not None:
             with np.load(self._folder.path / "gel.npz") as stored:
-                self._moved, self._flags = stored["displacement"], self._flags | stored["flags"]
-            self._error = np.full(len(self._moved), curves.UNKNOWN)
+                self._moved = mesh_cache.in_memory(stored["displacement"], self._target)
+                self._flags |= stored["flags"]
+            self._error = np.full(len(self._flags), curves.UNKNOWN)
             from ...tactile_core.jobs.drawer import describe_gel
 
             for words in describe_gel(self._target, self._found.translator.target):
@@ -76,14 +79,13 @@ class TACTILE_OT_translate(JobOperator):
         if skin is None:
             raise TactileError(self._skin, "no longer in the scene", "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
-        if "confidence" in skin and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
+        if skin.tactile.known and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
             play(skin, self._found, frames)
         gel, new = _gel_beside(skin, self._target)
         digit_body.add_body(gel, render_settings.calibration_of(context.scene, self._target))
         values = self._found.columns()
         told = {name: values[name] for name in ("force", "confidence", "explained")}
         told |= {"expected_error_um": 1e6 * self._error, "flags": self._flags}
-        told |= {"dent_um": 1e6 * accuracy.lengths(self._moved).max(axis=1)}
         summary = set_style.animate(gel, self._moved, frames, skin.tactile.motion, told)
         if new:
             set_style.take_over(gel, skin)

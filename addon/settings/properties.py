@@ -36,7 +36,7 @@ PRESS_BY = (
 )
 MOTIONS = (  # numbers as in files of before: 1 was compact keys
     ("SHAPE_KEYS", "Shape Keys", "One shape key a frame along one curve: exact, and fast to play", "", 0),
-    ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the saved .blend: for recordings of thousands of frames", "", 2),
+    ("MESH_CACHE", "Mesh Cache", "A PC2 file beside the .blend: for recordings of thousands of frames", "", 2),
 )
 
 

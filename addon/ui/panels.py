@@ -6,8 +6,9 @@ import textwrap
 
 import bpy
 
+from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import trust_words
-from ..objects import style_nodes, styles
+from ..objects import mesh_cache, style_nodes, styles
 from ..operators import preview, render_setup, snap_to_gel, view
 from ..operators.import_recording import TACTILE_OT_import_recording
 from ..operators.preview import TACTILE_OT_live_picture
@@ -56,6 +57,10 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
         _exaggeration(layout, skin)
         _exaggeration(layout, properties.gel_of(context.scene, context.object))
         _numbers(layout, context, skin)
+        try:
+            mesh_cache.check(skin, properties.gel_of(context.scene, context.object))
+        except TactileError as error:
+            _text(layout, context, str(error), "ERROR")
 
 
 def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -> None:

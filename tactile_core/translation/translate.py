@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -148,16 +148,16 @@ def translate(
     return translated(translator, rows, chosen)
 
 
-def translated(
-    translator: Translator, rows: PreparedRows, frames: np.ndarray, progress: Callable[[float], None] | None = None
-) -> Translation:
-    """Translate rising frames (T,) of prepared rows; progress : called with the share that is done."""
-    whole, parts = RecordingPass(translator, rows.read, rows.count), []
+def translated(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Translation:
+    """Translate rising frames (T,) of prepared rows."""
+    return Translation.joined(list(translated_parts(translator, rows, frames)))
+
+
+def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Iterator[Translation]:
+    """Yield the translations of rising frames (T,) of prepared rows, `CHUNK` at a time."""
+    whole = RecordingPass(translator, rows.read, rows.count)
     for start in range(0, len(frames), CHUNK):
-        parts.append(whole(frames[start : start + CHUNK]).translation)
-        if progress is not None:
-            progress(min(1.0, (start + CHUNK) / len(frames)))
-    return Translation.joined(parts)
+        yield whole(frames[start : start + CHUNK]).translation
 
 
 @lru_cache(maxsize=2)

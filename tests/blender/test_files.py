@@ -118,3 +118,19 @@ def test_snapshots_are_translated_each_alone(counts, part, monkeypatch):
     bpy.ops.tactile.import_recording(filepath=str(counts[1]), apart=True)
     bpy.ops.tactile.translate()
     assert "DIGIT gel" in bpy.context.scene.objects
+
+
+def test_several_files_stand_side_by_side(counts, tmp_path, capfd):
+    electrodes = counts[0]
+    head = "timestamp,tdc,tac,pdc," + ",".join(f"pac{k}" for k in range(1, 23)) + ","
+    head += ",".join(f"ele{k}" for k in range(1, 20))
+    for name, rows in (("a", 150), ("b", 100), ("c", 150)):
+        table = np.column_stack([np.arange(rows) / 100, np.full((rows, 25), 2000), electrodes[:rows]])
+        np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=head, comments="", fmt="%g")
+    (tmp_path / "bad.csv").write_text("no,recording\n1,2\n")
+    files = [{"name": f"{name}.csv"} for name in ("b", "bad", "a", "c")]
+    with pytest.raises(RuntimeError, match=r"bad\.csv: no known recording"):
+        bpy.ops.tactile.import_recording(directory=str(tmp_path), files=files)
+    skins = [thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC"]
+    assert [round(skin.location.y) for skin in skins] == [0, -85, -170]
+    assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 149)

@@ -15,7 +15,7 @@ TOLERANCE = 1e-3  # mm: ten times what float32 rounds coordinates of 30 mm to, t
 
 def _translated(part, frames="40:140"):
     asked = SimpleNamespace(tare="auto", polarity="auto", frames=frames, weights="", columns="", unit="", apart=False)
-    return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None)
+    return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None, "SHAPE_KEYS", 1000.0)
 
 
 def _wanted(part, frame):
@@ -40,10 +40,45 @@ def test_a_mesh_cache_plays_the_same(imported, nodes_of, part, scene, tmp_path):
     assert skin.modifiers["Tactile"].filepath.startswith("//tactile_cache")
 
 
-def test_a_mesh_cache_needs_a_saved_file(imported, scene):
-    with pytest.raises(RuntimeError, match="Save it first"):
-        imported(motion="MESH_CACHE")
-    assert not scene.objects
+def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(imported, nodes_of, part, monkeypatch, tmp_path):
+    monkeypatch.setattr(part("addon.operators.recording_data"), "LONG", 50)
+
+    def right(gel=False):
+        for frame in (40, 78, 138):
+            bpy.context.scene.frame_set(frame)
+            roles = ("BIOTAC", "DIGIT")[: 1 + gel]
+            for thing in [each for each in bpy.context.scene.objects if each.tactile.role in roles]:
+                field = {"BIOTAC": "displacement_biotac", "DIGIT": "displacement_digit"}[thing.tactile.role]
+                rest = part("addon.settings.properties").surface_of(thing).rest
+                wanted = rest + getattr(whole, field)[frame - 40]
+                wanted = part("addon.objects.axes").to_blender(wanted, 1000)
+                np.testing.assert_allclose(nodes_of(thing), wanted, atol=TOLERANCE)
+
+    whole = _translated(part).translation
+    skin = imported()  # never saved: in the extension's own folder
+    own = Path(skin.modifiers["Tactile"].filepath)
+    assert own.is_file() and own.name.startswith("press_roll_slide_biotac_")
+    bpy.ops.tactile.translate()
+    right(gel=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copy.blend"), copy=True)
+    right(gel=True)  # the file itself still has none
+    (tmp_path / "here").mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here" / "a.blend"))
+    assert skin.modifiers["Tactile"].filepath == f"//tactile_cache/{own.name}"
+    own.unlink()
+    right(gel=True)
+    (tmp_path / "here").rename(tmp_path / "there")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "there" / "a.blend"))
+    right(gel=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "copy.blend"))
+    right(gel=True)
+
+
+def test_a_mesh_cache_of_every_second_frame_plays_in_time(imported, nodes_of, part, scene):
+    skin = imported(motion="MESH_CACHE", frames="40:140:2")
+    for frame in (40, 78, 90, 138):
+        scene.frame_set(frame)
+        np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=TOLERANCE)
 
 
 def test_the_scene_plays_in_the_recording_s_time(imported, scene):

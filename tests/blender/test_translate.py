@@ -25,7 +25,9 @@ def gel(imported):
 
 def _translation(part):
     asked = SimpleNamespace(tare="auto", polarity="auto", frames="40:140", weights="", columns="", unit="", apart=False)
-    return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None).translation
+    return (
+        part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None, "", 1000.0).translation
+    )
 
 
 def test_the_gel_moves_as_translated(gel, nodes_of, part):
