@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.measured_rows import png_of
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.accuracy import Row, row
@@ -61,11 +60,11 @@ class Promise:
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
 
 
-def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]], bytes]:
-    """Rows, the page's table and a PNG."""
+def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
+    """Rows, and the page's table."""
     promises = [*of_mechanics(quick), *of_translation(quick)]
     lines = [line for promise in promises for line in promise.lines()]
-    return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}, plot(promises)
+    return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
@@ -111,28 +110,3 @@ def of_translation(quick: bool) -> Iterator[Promise]:
         found, groups = columns[f"{surface}_max_m"], [names[number] for number in order]
         of = f"{len(rows)} test contacts, largest node error"
         yield Promise(f"translation_{surface}", "um", 1e6 * bound[order], 1e6 * found[order], groups, of)
-
-
-def plot(promises: Sequence[Promise]) -> bytes:
-    """Draw a PNG: measured errors over stated bounds, both logarithmic, a panel each; on the line they are equal."""
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import LogLocator
-
-    figure = Figure(figsize=(13, 8), layout="constrained")
-    for number, promise in enumerate(promises, 1):
-        axes = figure.add_subplot(2, 3, number)
-        low, high = np.percentile(promise.found, 2), 1.2 * max(promise.bound.max(), promise.found.max())
-        axes.fill_between([low, high], [low, high], low, color="tab:green", alpha=0.08, label="below the bound")
-        axes.plot([low, high], [low, high], color="grey", linewidth=1)
-        held = promise.found <= promise.bound
-        for mask, colour in ((held, "tab:blue"), (~held, "tab:red")):
-            axes.plot(promise.bound[mask], promise.found[mask], ".", color=colour, markersize=4, alpha=0.7)
-        axes.set(xscale="log", yscale="log", xlabel=f"bound of 95 %, {promise.unit}", ylim=(low, high),
-                 xlim=(0.8 * promise.bound.min(), high), ylabel=f"found, {promise.unit}")  # fmt: skip
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            axis.set_major_formatter("{x:g}")
-            axis.set_minor_formatter("")
-        axes.set_title(f"{promise.name.replace('_', ' ')}: {promise.covered():.1%} below")
-        axes.legend(fontsize=8)
-    return png_of(figure)

@@ -1,6 +1,6 @@
 """Speed against error of every stage, in one run on one machine: a table, a plot, rows.
 
-    python scripts/benchmark.py                      everything; writes docs/benchmark.*, docs/promised.png
+    python scripts/benchmark.py                      everything; writes docs/benchmark.*
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
     python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
@@ -27,7 +27,7 @@ from pathlib import Path
 from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.table.method import ROOT, Method
 from tactile_core.errors import TactileError
-from tactile_core.files import atomic, threads
+from tactile_core.files import threads
 
 STAGES = ("mechanics", "translation", "pictures", "chain", "photographs")
 WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
         if not options.only:
             from benchmarks.table.promised import promised
 
-            found, tables, picture = promised(options.quick)
+            found, tables = promised(options.quick)
             rows += found
     except TactileError as error:
         print(error, file=sys.stderr)
@@ -64,7 +64,6 @@ def main(arguments: list[str] | None = None) -> int:
         from benchmarks.table.benchmark_page import write_report
 
         write_report(ROOT / "docs", methods, rows, missing, tables)
-        atomic.write_bytes(ROOT / "docs" / "promised.png", picture)
     return finished(rows, options.json)
 
 
