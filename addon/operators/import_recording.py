@@ -149,8 +149,8 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         """Open a small popup for a file that was dropped; the menu opens the file browser."""
         if not self.filepath and not self.files:
             return super().invoke(context, event)
-        first, *others = self._paths()
-        title = os.path.basename(first) + (f" and {len(others)} more" if others else "")
+        several = len(self.files) > 1
+        title = f"{len(self.files)} recordings" if several else os.path.basename(self.filepath or self.files[0].name)
         asked = {"title": title, "confirm_text": "Import", "translate": False}
         return context.window_manager.invoke_props_dialog(self, **asked)
 

@@ -34,6 +34,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     global _failed, _drawing
     gel = pictures.shown_gel(scene)
     if gel is None or _drawing or not (_live or images.picture_of(gel)):
+        _failed = _failed if _drawing else ""
         return
     _drawing = True
     try:

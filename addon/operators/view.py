@@ -33,12 +33,16 @@ def hide_untouched(scene: bpy.types.Scene) -> None:
 
     A sun takes the light's place, so that a rendered view is not dark: no sun reaches the DIGIT's picture.
     """
-    for name, kind, place in _UNTOUCHED:
-        thing = scene.objects.get(name)
-        if thing is not None and thing.type == kind and np.allclose(thing.location, place, atol=1e-3):
-            if kind == "LIGHT" and not thing.hide_render:
-                _add_sun(thing)
-            thing.hide_render, thing.hide_viewport = True, True
+    for thing in _untouched(scene):
+        if thing.type == "LIGHT" and not thing.hide_render:
+            _add_sun(thing)
+        thing.hide_render, thing.hide_viewport = True, True
+
+
+def _untouched(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    named = [(scene.objects.get(name), kind, place) for name, kind, place in _UNTOUCHED]
+    return [thing for thing, kind, place in named
+            if thing is not None and thing.type == kind and np.allclose(thing.location, place, atol=1e-3)]  # fmt: skip
 
 
 def _add_sun(light: bpy.types.Object) -> None:
@@ -50,7 +54,8 @@ def _add_sun(light: bpy.types.Object) -> None:
 
 def is_new(scene: bpy.types.Scene) -> bool:
     """Return true for a scene that holds nothing of the user's own: its units and frame rate may be set."""
-    return all(thing.hide_viewport or thing.tactile.role != "NONE" for thing in scene.objects)
+    known = _untouched(scene)
+    return all(thing.hide_viewport or thing.tactile.role != "NONE" or thing in known for thing in scene.objects)
 
 
 def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:

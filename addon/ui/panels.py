@@ -131,7 +131,7 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
         if preview.failure():
-            layout.label(text=preview.failure(), icon="ERROR")
+            _text(layout, context, preview.failure(), "ERROR")
         draw_settings(layout, context)
 
 

@@ -74,6 +74,12 @@ def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(imported, nod
     right(gel=True)
 
 
+def test_a_mesh_cache_of_a_new_file_of_blender_s_is_in_its_units(imported, nodes_of):
+    bpy.ops.wm.read_homefile(use_factory_startup=True)  # with cube, light and camera
+    skin = imported(motion="MESH_CACHE")
+    assert np.ptp(nodes_of(skin), axis=0).max() == pytest.approx(28, abs=3)  # mm
+
+
 def test_a_mesh_cache_of_every_second_frame_plays_in_time(imported, nodes_of, part, scene):
     skin = imported(motion="MESH_CACHE", frames="40:140:2")
     for frame in (40, 78, 90, 138):
@@ -201,4 +207,6 @@ def test_a_dropped_file_opens_a_popup(extension, part):
     """Blender has no windows here: the operator's own function is called."""
     operator = part("addon.operators.import_recording").TACTILE_OT_import_recording
     context = SimpleNamespace(window_manager=SimpleNamespace(invoke_props_dialog=lambda _, **words: words["title"]))
-    assert operator.invoke(SimpleNamespace(filepath="/day/touch.h5"), context, None) == "touch.h5"
+    for path, files, title in (("/day/touch.h5", [], "touch.h5"), ("", ["a.csv", "b.csv"], "2 recordings")):
+        dropped = SimpleNamespace(filepath=path, files=[SimpleNamespace(name=name) for name in files])
+        assert operator.invoke(dropped, context, None) == title
