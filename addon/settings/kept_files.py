@@ -69,6 +69,7 @@ def _find_again(*_: object) -> None:
     for holder, name, kind in _held():
         path = Path(bpy.path.abspath(getattr(holder, name)))
         if path.is_file() and (bpy.data.is_saved or path.is_absolute()):
+            setattr(holder, name, getattr(holder, name))  # drawn anew: before the save its folder was not known
             continue
         for place in (Path(bpy.path.abspath(f"//{kind}")) if bpy.data.is_saved else None, _own(kind)):
             if place is not None and (place / path.name).is_file():
