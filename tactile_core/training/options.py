@@ -31,7 +31,7 @@ class Options:
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
     unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
         recordings that are in contact throughout: unit_gain, standard deviation of the logarithm of a channel's gain,
-        unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/convert.md)
+        unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
     misfit : of samples read as a real unit is known and of rectified ones, share of the whole signal's size that each
         channel is off by besides. The simulated contacts nearest to real slides leave .3 of it, .07 a channel
         (commit d537259); 0.1 was chosen against 0.05 (docs/train.md)

@@ -103,7 +103,7 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
     Counts fall under load: rest is first each electrode's median over the tenth of all frames in which it reads
     highest. There it bulges, so that this is too high, by up to 250 counts: rest is moved to where simulated contacts
     leave least of the changes, with the film that leaves least. Halves of 35 recordings and of six sets of grasps: of
-    the other half the translation then explains a third to two thirds, and a tenth at most without (docs/convert.md).
+    the other half the translation then explains a third to two thirds, and a tenth at most without (docs/units.md).
     ``spread`` is half of what the tenth spans, its ends left out. Raises TactileError for fewer than three recordings
     or snapshots, and for recordings that are not raw.
     """
