@@ -77,6 +77,7 @@ CASES = (
     Case("watch", "watch {}/touch.csv --out {}/now.png --idle 0.1", WATCHING),
     Case("batch", "batch {}/touch.csv --out {}/job", "numpy h5py msgspec"),
     Case("export", "export {}/job --to npz --out {}/exported", "numpy h5py msgspec"),
+    Case("dataset", "dataset", "numpy msgspec"),
     Case("adapt", f"adapt {RECORDING} --out {{}}/sensor.toml", "numpy h5py msgspec"),
     Case("render_fast", "render {}/converted/touch/frames.h5 --out {}/fast --preset fast", "numpy h5py PIL"),
     Case(

@@ -73,7 +73,7 @@ SIGTERM or SIGHUP."""
 EXTRAS = {
     "torch": "train", "scipy": "fem", "trimesh": "fem", "rtree": "fem",
     "mitsuba": "render", "drjit": "render", "OpenEXR": "render", "rosbags": "ros", "lz4": "ros",
-    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch", "cv2": "camera",
+    "distributed": "batch", "dask_jobqueue": "batch", "pyarrow": "batch", "cv2": "camera", "sklearn": "dataset",
 }  # fmt: skip
 # Options that name something; that of --keep may be empty.
 PATHS = (

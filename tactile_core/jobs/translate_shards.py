@@ -34,9 +34,14 @@ ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
 
 
+def translated(frames: int, job: Job[Translate]) -> int:
+    """Return how many frames are translated of a recording of so many."""
+    return -(-frames // job.recipe.every)
+
+
 def count(frames: int, job: Job[Translate]) -> int:
     """Return the number of shards of a recording of so many frames."""
-    return -(-frames // job.recipe.shard_frames)
+    return -(-translated(frames, job) // job.recipe.shard_frames)
 
 
 def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
@@ -59,7 +64,7 @@ def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
     if checksummed.verified_checksum(file) is not None and is_of(file, job, index, number, total):
         return False
     start = number * recipe.shard_frames
-    frames = np.arange(start, min(start + recipe.shard_frames, total))
+    frames = recipe.every * np.arange(start, min(start + recipe.shard_frames, translated(total, job)))
     attributes = {
         "recording": about["recording"].encode(errors="replace").decode(),
         "simulated": about["simulated"], **_identity(job, index, number, total),
@@ -93,10 +98,9 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
     frames = checksummed.stated_rows(file)
     if frames is None:  # none yet, or a damaged one, which the next run makes again
         return None
+    done = translated(frames, job)
     kb = sum((KEEP_KB[word] for word in job.recipe.keep), ALWAYS_KB)
-    return InputFacts(
-        count(frames, job), frames, lambda: tuple(Prepared(file).about()["warnings"]), int(1e3 * kb * frames)
-    )
+    return InputFacts(count(frames, job), done, lambda: tuple(Prepared(file).about()["warnings"]), int(1e3 * kb * done))
 
 
 @functools.lru_cache(maxsize=2)

@@ -49,6 +49,15 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
     return recording.time, size
 
 
+def read_columns(path: str, names: list[str]) -> np.ndarray:
+    """Read further columns of a recording's own file, (n, c) as it has them. Raises TactileError for one it has not."""
+    table = _table(path, [name.lower() for name in names])
+    missing = [name for name in names if name.lower() not in table.header]
+    if missing:
+        raise TactileError(path, f"no column {missing[0]!r}", ", ".join(table.header[:30]))
+    return table.columns([name.lower() for name in names])
+
+
 def _table(path: str, names: list[str] | None) -> Table:
     """Read a table of numbers: a text whole, of other files the arrays of these names."""
     with opened(path) as (container, where, _, file):

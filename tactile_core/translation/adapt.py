@@ -178,6 +178,12 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
     return film.find(change, rest, time, pressure, recordings[0].sensor, own_rest=False).thickness
 
 
+def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
+    """Return a unit of which the rest alone is known, from a recording of the untouched finger. Raises TactileError."""
+    name = os.path.basename(path)
+    return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
+
+
 def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
     """Return a unit with a known rest alone."""
     if rest is None:

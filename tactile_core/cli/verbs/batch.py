@@ -171,44 +171,19 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     """Return the recipe that the options describe, of these recordings."""
-    from ...jobs import convert, results
-    from ...jobs.drawer import describe_gel
-    from ...jobs.engine.inputs import unit_hash
-    from ...jobs.engine.recipes import MAX_SHARD_FRAMES, SHARD_FRAMES, Prepare, Translate
-    from ...pictures.mitsuba.variant import variant_for
-    from ...recordings import electrode_gains, readers
-    from ...sensors.calibration_file import load_calibration
+    from ...jobs import results, translate_recipe
+    from ...jobs.engine.recipes import SHARD_FRAMES, Prepare
+    from ...recordings import electrode_gains
     from ...translation.answer import parse_answer
 
     keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
-    prepare = Prepare(**prepare_words(options))
-    prepare.options().check()
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)
-    asked = convert.ToolOptions(options.weights, gel=options.gel, target=options.target, source=source)
-    network, solves = asked.load_networks()
-    frames = SHARD_FRAMES if options.shard_frames is None else options.shard_frames
-    if frames > MAX_SHARD_FRAMES:
-        raise TactileError("--shard-frames", str(frames), f"1 to {MAX_SHARD_FRAMES}")
-    if solves:
-        from ...jobs import solved_gel
-
-        solved_gel.check_installed()
-    gel = load_calibration(options.calibration, options.target)
-    for sentence in describe_gel(options.target, network.target):
-        say(sentence)
-    unit = "" if options.calibration is None else unit_hash(Path(options.calibration))
-    preset = options.preset or "fast"
-    if options.preset is not None and "image" not in keep:
-        raise TactileError("--preset", preset, "--keep image", "Keep the pictures that it makes")
-    if "marker_motion" in keep:
-        from ...pictures.marker_field import MarkerField
-
-        MarkerField(gel)  # refused here where the unit has no dots
-    pictures = unit, preset, variant_for(preset)
-    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
-    pair = network.source, options.target
-    return Translate(list(keep), network.sha256, frames, prepare, sensor, *pictures, answer, options.gel, *pair)
+    asked = translate_recipe.Asked(
+        keep, Prepare(**prepare_words(options)), sensor, options.weights, options.calibration, options.target,
+        options.preset, parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples),
+        options.gel, SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
+    )  # fmt: skip
+    return translate_recipe.make(asked, paths, say)
 
 
 def _status(folder: Path, job: Job) -> int:

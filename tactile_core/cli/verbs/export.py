@@ -12,6 +12,9 @@ TEXT = """\
 Write the shards of a finished job (see `tactile batch`) as
   npz      one NPZ file a recording, all arrays
   png      a folder of pictures a recording (the job must have kept image)
+  imagefolder
+           PNG pictures in folders train and test, with their labels and numbers in metadata.csv, as Hugging Face's
+           library `datasets` loads them (the job must have kept image)
   exr      a folder of OpenEXR files a recording: heights in metres and pictures, as far as they were kept
            (needs OpenEXR: see `tactile doctor`)
   lerobot  a LeRobot v3.0 data set: one recording is one episode (needs pyarrow: see `tactile doctor`)
@@ -23,7 +26,7 @@ EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""
 LEAVES = NOTHING
-LAYOUTS = ("npz", "png", "exr", "lerobot", "lerobot21")
+LAYOUTS = ("npz", "png", "imagefolder", "exr", "lerobot", "lerobot21")
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

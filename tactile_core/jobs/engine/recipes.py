@@ -60,7 +60,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
     answer : which contact a frame is answered by; gel : the networks', or the contact solved on the target
-    source, target : the sensors
+    source, target : the sensors; every : frames of the recording of which one is translated
     """
 
     keep: list[str]
@@ -75,6 +75,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     gel: GelKind = TRANSLATED
     source: str = SOURCE
     target: str = TARGET
+    every: Annotated[int, Meta(ge=1)] = 1
     version: str = __version__
 
 

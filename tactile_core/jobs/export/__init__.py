@@ -31,9 +31,17 @@ def export(
     if layout not in layouts():
         raise TactileError("--to", repr(layout), " or ".join(layouts()))
     source = finished_job.load(Path(job))
-    with atomic.writing(out), atomic.new_folder(out) as partial:
+    write(source, layout, out, progress)
+    return source
+
+
+def write(
+    source: finished_job.Finished, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None],
+    overwrite: bool | None = None,
+) -> None:  # fmt: skip
+    """Write recordings of finished jobs as `layout` into the new folder `out`; see `export`."""
+    with atomic.writing(out), atomic.new_folder(out, overwrite=overwrite) as partial:
         layouts()[layout].write(source, partial, progress)
         note = {"layout": layout, "job": source.id, "left_out": source.aside, "warnings": source.warnings}
         note["versions"] = provenance.versions()
         atomic.write_json(partial / NOTE, note)
-    return source

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +14,12 @@ from ...files import checksummed
 from ...files.hdf5_checked import declared, open_checked
 from ...recordings.array_store import damage_reported
 from ...recordings.labels import unfold
+from ...sensors import PAIR
 from .. import translate_shards
 from ..engine import job as jobs
 from ..engine import manifest
 from ..engine.recipes import Translate
-from ..frames_file import arrays_of, kept
+from ..frames_file import arrays_of, kept, named
 from ..prepared_signals import Prepared
 
 if TYPE_CHECKING:
@@ -40,26 +41,55 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 class Recorded:
     """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order
 
-    labels : name -> (T,) object array of str
+    labels : name -> (T,) object array of str; split : part of the data set that it is in
+    every : frames of the recording of which one is among these; pair : the sensor and the gel, which name some arrays
     """
 
     name: str
     frames: int
     shards: tuple[Path, ...]
     labels: dict[str, np.ndarray]
+    split: str = "train"
+    every: int = 1
+    pair: tuple[str, str] = PAIR
 
-    def blocks(self) -> Iterator[dict[str, np.ndarray]]:
-        """Yield all arrays of blocks of frames in order, by the names of ``frames_file``."""
+    def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
+        """Yield all arrays, or all but some, of blocks of frames in order, by the names of ``frames_file``.
+
+        These are a BioTac's and a DIGIT's, of whatever pair the arrays are.
+        """
         import h5py
 
         for path in self.shards:
             with h5py.File(path, "r") as file:
                 for start in range(0, len(file["frame"]), BLOCK):
-                    yield {name: data[start : start + BLOCK] for name, data in file.items()}
+                    held = {self._plain(name): data for name, data in file.items()}
+                    yield {name: data[start : start + BLOCK] for name, data in held.items() if name not in without}
+
+    def picture(self, frame: int) -> np.ndarray:
+        """Return the picture of a frame; the job must have kept ``image``."""
+        import h5py
+
+        for path in self.shards:
+            with h5py.File(path, "r") as file:
+                if frame < len(file["image"]):
+                    return file["image"][frame]
+                frame -= len(file["image"])
+        raise IndexError(frame)
 
     def arrays(self) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
         """Name -> shape of one frame, and type."""
-        return _kinds(self.shards[0])
+        return {self._plain(name): kind for name, kind in _kinds(self.shards[0]).items()}
+
+    def stored(self, name: str) -> str:
+        """Return the name under which the shards hold an array."""
+        return named(name, self.pair)
+
+    def _plain(self, name: str) -> str:
+        for role, sensor in zip(PAIR, self.pair, strict=True):
+            if name.endswith(f"_{sensor}"):
+                return name.removesuffix(sensor) + role
+        return name
 
 
 @dataclasses.dataclass(frozen=True)
@@ -108,7 +138,11 @@ def load(folder: Path) -> Finished:
         paths = tuple(jobs.shard_file(folder, one.name, number) for number in range(count))
         for number, path in enumerate(paths):
             _check(path, job, index, number, frames)
-        recordings.append(Recorded(one.name, frames, paths, unfold(about.get("labels", {}))))
+        every, labels = job.recipe.every, unfold(about.get("labels", {}))
+        labels = {name: texts[::every] for name, texts in labels.items()}
+        done = translate_shards.translated(frames, job)
+        pair = job.recipe.source, job.recipe.target
+        recordings.append(Recorded(one.name, done, paths, labels, every=every, pair=pair))
     _check_alike([path for one in recordings for path in one.shards])
     return Finished(folder, job.id, tuple(recordings), status.aside, manifest.warnings(folder))
 
@@ -117,8 +151,9 @@ def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int
     """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
-    rows = min(job.recipe.shard_frames, frames - number * job.recipe.shard_frames)
-    expected = set(arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True))
+    rows = min(job.recipe.shard_frames, translate_shards.translated(frames, job) - number * job.recipe.shard_frames)
+    pair = job.recipe.source, job.recipe.target
+    expected = {named(name, pair) for name in arrays_of(kept(job.recipe.keep, job.recipe.answer), shard=True)}
     with damage_reported(str(path), "shard"), open_checked(path) as file:
         if not translate_shards.is_of(path, job, index, number, frames):
             expected_shard = f"shard {number} of {job.inputs[index].name}"

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -87,9 +88,20 @@ def write_set(source: Finished, folder: Path, progress: Callable[[int, int], Non
     info = {
         "codebase_version": layout.version, "robot_type": "biotac_to_digit", "total_episodes": len(episodes),
         "total_frames": done, "total_tasks": 1, "chunks_size": CHUNK, "fps": rate,
-        "splits": {"train": f"0:{len(episodes)}"}, **layout.finish(episodes, stats), "features": features,
+        "splits": _splits(source), **layout.finish(episodes, stats), "features": features,
     }  # fmt: skip
     atomic.write_json(folder / "meta" / "info.json", info)
+
+
+def _splits(source: Finished) -> dict[str, str]:
+    """Return the episodes of each part of the data set, whose recordings lie together, as info.json has them."""
+    first = 0
+    found: dict[str, str] = {}
+    for name, same in groupby(source.recordings, lambda one: one.split):
+        count = len(list(same))
+        found[name] = f"{first}:{first + count}"
+        first += count
+    return found
 
 
 def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
@@ -121,7 +133,7 @@ def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
     """Yield columns of some rows of an episode; `start` is its first row in the whole data set."""
     for block, following in _followed(one):
-        frame = block["frame"].astype(np.int64)
+        frame = block["frame"].astype(np.int64) // one.every
         own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {
             "timestamp": frame / rate, "frame_index": frame, "index": frame + start, "time": block["time"],
             "episode_index": np.full(len(frame), episode), "task_index": np.zeros(len(frame)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shutil
@@ -28,7 +29,7 @@ def silent(done, total):
 
 
 def test_every_layout_has_a_test_here():
-    assert set(export.layouts()) == {"npz", "png", "exr", "lerobot", "lerobot21"} == set(verb.LAYOUTS)
+    assert set(export.layouts()) == {"npz", "png", "imagefolder", "exr", "lerobot", "lerobot21"} == set(verb.LAYOUTS)
 
 
 def test_npz_holds_every_array_whole_and_the_same_bytes_each_time(job, tmp_path):
@@ -51,6 +52,30 @@ def test_png_pictures_are_those_of_the_shards(job, tmp_path):
         assert [file.name for file in files] == [f"{frame:06d}.png" for frame in range(one.frames)]
         pictures = np.concatenate([block["image"] for block in one.blocks()])
         np.testing.assert_array_equal(np.asarray(Image.open(files[-1])), pictures[-1])
+
+
+def test_imagefolder_has_a_row_and_a_picture_a_frame(job, tmp_path):
+    source = export.export(job, "imagefolder", tmp_path / "out", silent)
+    with open(tmp_path / "out" / "train" / "metadata.csv", encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == sum(FRAMES.values())
+    for one in source.recordings:
+        held = {name: np.concatenate([block[name] for block in one.blocks()]) for name in ("image", "force", "flags")}
+        for row in (row for row in rows if row["recording"] == one.name):
+            frame = int(row["frame"])
+            picture = np.asarray(Image.open(tmp_path / "out" / "train" / row["file_name"]))
+            np.testing.assert_array_equal(picture, held["image"][frame])
+            assert float(row["force_y_n"]) == pytest.approx(held["force"][frame, 1], rel=1e-5)
+            assert bool(row["flags"]) == bool(held["flags"][frame])
+
+
+def test_arrays_of_another_pair_are_read_as_ours_and_stored_as_theirs(tmp_path):
+    with h5py.File(tmp_path / "shard.h5", "w") as file:
+        for name in ("frame", "latent_biotac_sp", "latent_gelsight_mini", "force"):
+            file[name] = np.zeros(3, np.int32)
+    one = finished_job.Recorded("a", 3, (tmp_path / "shard.h5",), {}, pair=("biotac_sp", "gelsight_mini"))
+    assert set(next(one.blocks())) == set(one.arrays()) == {"frame", "latent_biotac", "latent_digit", "force"}
+    assert [one.stored(name) for name in ("latent_digit", "force")] == ["latent_gelsight_mini", "force"]
 
 
 def test_exr_holds_heights_and_pictures(job, tmp_path):

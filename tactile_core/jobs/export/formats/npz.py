@@ -23,7 +23,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
     for one in source.recordings:
         with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:
             for name, (shape, kind) in one.arrays().items():
-                _write(archive, one, name, (one.frames, *shape), kind)
+                _write(archive, one, one.stored(name), (one.frames, *shape), kind)
             for label, column in one.labels.items():
                 with archive.open(zipfile.ZipInfo(f"labels/{label}.npy", TIME), "w") as out:
                     np.lib.format.write_array(out, column.astype(str), allow_pickle=False)

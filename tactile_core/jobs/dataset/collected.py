@@ -1,0 +1,111 @@
+"""Recordings of a data set's folder, with the labels that their names hold and the part they are in."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...errors import TactileError
+from .recipe import FIELD, Recipe, filled
+
+TRAIN, TEST = "train", "test"
+HELD_OUT = 5  # one value in so many is for testing where the recipe names none (assumed)
+
+
+@dataclass(frozen=True)
+class File:
+    """File of a data set. unit : name of the unit that made it; labels : from its name; split : train or test."""
+
+    path: Path
+    unit: str
+    labels: dict[str, str]
+    split: str
+
+
+@dataclass(frozen=True)
+class Collected:
+    """Files of a data set, sorted by path; others : how many files of the folder fit no pattern."""
+
+    files: tuple[File, ...]
+    others: int
+
+    def units(self) -> dict[str, list[File]]:
+        """Return the files of each unit."""
+        found: dict[str, list[File]] = {}
+        for file in self.files:
+            found.setdefault(file.unit, []).append(file)
+        return found
+
+
+def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
+    """Find a data set's files in a folder; links to folders are not followed, `out` is left alone.
+
+    Raises TactileError where nothing fits: another set's folder.
+    """
+    if not folder.is_dir():
+        raise TactileError(folder, "no folder", "the folder of the data set")
+    patterns = [_compiled(pattern) for pattern in recipe.files]
+    aside = [_compiled(name) for name in (recipe.unit.rest, recipe.force) if name]
+    names = [name for name in _names(folder) if not (folder / name).resolve().is_relative_to(out.resolve())]
+    found, others = [], 0
+    for name in names:
+        fits = next((fit for pattern in patterns if (fit := pattern.fullmatch(name))), None)
+        if fits is None or any(pattern.fullmatch(name) for pattern in aside):
+            others += not any(pattern.fullmatch(name) for pattern in aside)
+            continue
+        labels = fits.groupdict()
+        unit = labels.get(recipe.unit.by, "")
+        found.append(File(folder / name, unit, labels, _split(recipe, labels)))
+    if not found:
+        held = f"{len(names)} files, such as {names[0]}" if names else "no file"
+        expected = " or ".join(recipe.files)
+        raise TactileError(folder, held, expected, "Is it the folder of another data set? `tactile dataset` lists them")
+    return Collected(tuple(found), others)
+
+
+def _names(folder: Path) -> list[str]:
+    """Names of all files below a folder, relative to it."""
+
+    def walked() -> Iterator[str]:
+        for place, folders, names in os.walk(folder):
+            folders[:] = sorted(name for name in folders if not name.startswith("."))
+            for name in sorted(names):
+                if not name.startswith("."):
+                    yield Path(place, name).relative_to(folder).as_posix()
+
+    return sorted(walked())
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    """Compile a pattern of paths; it may lie at any depth, and a label holds no folder's border."""
+    parts = FIELD.split(pattern)
+    fixed, fields = parts[::2], parts[1::2]
+    text = re.escape(fixed[0]) + "".join(
+        f"(?P<{field}>[^/]+){re.escape(after)}" for field, after in zip(fields, fixed[1:], strict=True)
+    )
+    return re.compile(f"(?:.*/)?{text}")
+
+
+def _split(recipe: Recipe, labels: dict[str, str]) -> str:
+    """Part that a recording is in; by a hash of the label's value where the recipe names none for testing."""
+    if recipe.split.by not in labels:
+        return TRAIN
+    value = labels[recipe.split.by]
+    if recipe.split.test:
+        return TEST if value in recipe.split.test else TRAIN
+    return TEST if int(hashlib.sha256(value.encode()).hexdigest(), 16) % HELD_OUT == 0 else TRAIN
+
+
+def beside(folder: Path, name: str, file: File) -> Path:
+    """Return the path of a file that the recipe names beside a recording, there or not.
+
+    Raises TactileError for one outside the data set's folder.
+    """
+    path = file.path.parent / filled(name, file.labels)
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise TactileError(path, "outside the data set's folder", "a file inside it")
+    return path

@@ -1,0 +1,160 @@
+"""The card of a data set: what it was made from, what is a guess, what survives, whose it is."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from ...files.version import __version__
+from ..export.finished_job import Finished
+from . import survival
+from .collected import Collected
+from .recipe import Recipe
+from .summary import RAW, Summary
+from .survival import Row
+
+MOST_WARNINGS, MOST_VALUES = 8, 12
+NUMBER = re.compile(r"[\d.,]+|\bE\d+")  # by which warnings of one kind differ
+GUESSED = 0.5  # of touched frames, from which on a set says in its first lines that it is a guess (assumed)
+MEASURED = """\
+On simulated touches deeper than 0.3 mm half of the answers are within 0.8 mm of the place, a twelfth of the force and
+an eighth of the dent's depth; its outline and the true one share 0.44 of what they cover. On a real finger beside a
+force sensor the force is .93 times the true one, .48 N off. Never measured on real fingers: place, shear, and the
+picture beside a real DIGIT's of the same touch. `confidence`, `explained`, `expected_error_m` and `flags` say how far
+to trust each frame."""
+
+
+def written(
+    recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
+    layouts: Sequence[str],
+) -> str:  # fmt: skip
+    """Write the card as Markdown. rows : what survives, None where scikit-learn is missing."""
+    of = recipe.source
+    sections = {
+        f"# {of.title}: as a DIGIT would have seen it": _first(recipe, summaries, rows or []),
+        "## What is here": _contents(source, found, summaries, layouts),
+        "## Labels": _labels(summaries),
+        "## How far to trust it": [*_trust(summaries), "", *_warnings(source)],
+        "## What survives of the labels": _survives(recipe, rows),
+        "## Errors": [MEASURED],
+        "## Source": [
+            f"- Data: {of.url or 'not stated'}", f"- Cite: {of.citation or 'not stated'}",
+            f"- Licence of the recordings: {of.licence}. What is made from them is bound by it as well.",
+            "- Method: Zai El Amri et al., Transferring Tactile Data Across Sensors.",
+            f"- Made by tactile {__version__}: `tactile dataset {named} FOLDER --out DIR`",
+        ],
+    }  # fmt: skip
+    return "\n".join(line for title, lines in sections.items() for line in (title, "", *lines, ""))
+
+
+def _first(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
+    """Say first what a user must know before all else."""
+    notes = list(recipe.notes)
+    guesses = _mean(summaries, lambda one: one.guesses, touched=True)
+    if guesses > GUESSED:
+        notes.append(f"{guesses:.0%} of the frames in contact are guesses by their own confidence.")
+    for task in dict.fromkeys(row.task for row in rows):
+        notes.append(_verdict(task, {row.by: row for row in rows if row.task == task}))
+    return [f"> {note}" for note in notes]
+
+
+def _verdict(task: str, by: dict[str, Row]) -> str:
+    """Say how much of a label survives: less than chance allows, less than in the electrodes, or all of it."""
+    nulls = (RAW, survival.RANDOM, survival.ALWAYS)
+    best = max((row for name, row in by.items() if name not in nulls), key=lambda row: row.right)
+    source = max(by[RAW], by[survival.RANDOM], key=lambda row: row.right)
+    always = by[survival.ALWAYS].right
+    told = (
+        f"told right in {best.right:.2f} from the {best.by}, in {source.right:.2f} from the electrodes,"
+        f" in {always:.2f} by its commonest value alone"
+    )
+    if best.right < always + 2 * best.error:
+        return f"Nothing of `{task}` can be shown to survive: {told}."
+    return f"{'Part' if best.right < source.right - 2 * source.error else 'All'} of `{task}` survives: {told}."
+
+
+def _contents(source: Finished, found: Collected, summaries: list[Summary], layouts: Sequence[str]) -> Iterable[str]:
+    for split in dict.fromkeys(one.recording.split for one in summaries):
+        frames = [one.recording.frames for one in summaries if one.recording.split == split]
+        yield f"- {split}: {len(frames)} recordings, {sum(frames)} frames"
+    every = source.recordings[0].every
+    yield f"- one in {every} frames of the recordings" if every > 1 else "- all frames of the recordings"
+    yield f"- layouts: {', '.join(layouts)}; `index.html` to look at all recordings; `units/`: how each finger was read"
+    if found.others:
+        yield f"- {found.others} other files of the folder were left alone"
+    yield from (f"- set aside: {name}: {why}" for name, why in source.aside.items())
+
+
+def _labels(summaries: list[Summary]) -> Iterable[str]:
+    yield from ("| label | values (frames) |", "|---|---|")
+    for name in sorted({name for one in summaries for name in one.recording.labels}):
+        counts: Counter[str] = Counter()
+        for one in summaries:
+            texts = one.recording.labels.get(name, np.full(one.recording.frames, ""))
+            counts.update(text or "(none)" for text in texts)
+        if len(counts) > MOST_VALUES and (span := _span(counts)):
+            yield f"| {name} | {span} |"
+            continue
+        shown = ", ".join(f"{text} ({count})" for text, count in counts.most_common(MOST_VALUES))
+        more = f" and {len(counts) - MOST_VALUES} more" if len(counts) > MOST_VALUES else ""
+        yield f"| {name} | {shown.replace('|', '/')}{more} |"
+
+
+def _span(counts: Counter[str]) -> str:
+    """Say where the values of a label lie, of which all are numbers; "" for others."""
+    try:
+        numbers = [float(text) for text in counts if text != "(none)"]
+    except ValueError:
+        return ""
+    return f"{min(numbers):g} to {max(numbers):g} ({counts.total() - counts['(none)']}), none ({counts['(none)']})"
+
+
+def _trust(summaries: list[Summary]) -> Iterable[str]:
+    yield from ("| of all frames | share |", "|---|---|")
+    yield f"| in contact | {_mean(summaries, lambda one: one.touched):.2f} |"
+    guesses = _mean(summaries, lambda one: one.guesses, touched=True)
+    yield f"| guesses (confidence below .5), of those in contact | {guesses:.2f} |"
+    for name in sorted({name for one in summaries for name in one.flagged}):
+        yield f"| flag `{name}` | {_mean(summaries, lambda one: one.flagged.get(name, 0.0)):.2f} |"  # noqa: B023
+    known = [one.explained for one in summaries if np.isfinite(one.explained)]
+    if known:
+        low, middle, high = np.percentile(known, [10, 50, 90])
+        words = "of the electrodes' change, explained by the translation, median recording (tenths)"
+        yield f"| {words} | {middle:.2f} ({low:.2f} to {high:.2f}) |"
+
+
+def _warnings(source: Finished) -> Iterable[str]:
+    """One warning of each kind, the commonest first; a kind is a sentence without its numbers and file."""
+    kinds: dict[str, list[str]] = {}
+    for texts in source.warnings.values():
+        for text in texts:
+            kinds.setdefault(NUMBER.sub("", text.partition(": ")[2] or text), []).append(text)
+    said = sorted(kinds.values(), key=len, reverse=True)
+    for texts in said[:MOST_WARNINGS]:
+        yield f"- {len(texts)} times, such as: {texts[0]}"
+    if len(said) > MOST_WARNINGS:
+        yield f"- {len(said) - MOST_WARNINGS} other kinds of warnings: `note.json` of each layout"
+
+
+def _survives(recipe: Recipe, rows: list[Row] | None) -> Iterable[str]:
+    if rows is None:
+        yield "Not measured: scikit-learn is not installed (`pip install scikit-learn`, then the same command)."
+        return
+    if not rows:
+        yield "Nothing to measure: no label of the recipe's `tasks` has several values in enough recordings."
+        return
+    apart = f"recordings of one `{recipe.split.by}`" if recipe.split.by else "single recordings"
+    yield f"Share told right by a support vector machine (RBF, chosen within training), {apart} left out together, from"
+    yield "changes since the first 0.1 s alone. Random maps are of the electrodes, 24 numbers each."
+    yield from ("", "| label (values) | told by | right | standard error | examples |", "|---|---|---|---|---|")
+    for row in rows:
+        yield f"| {row.task} ({row.classes}) | {row.by} | {row.right:.2f} | {row.error:.2f} | {row.examples} |"
+
+
+def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touched: bool = False) -> float:
+    """Mean of a share over all frames, or over those touched."""
+    weights = [one.recording.frames * (one.touched if touched else 1.0) for one in summaries]
+    return float(np.average([value(one) for one in summaries], weights=weights)) if sum(weights) else 0.0

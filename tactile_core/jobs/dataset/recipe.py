@@ -1,0 +1,135 @@
+"""Recipe of a data set, one TOML file: which files of a folder are its recordings, of which units, and their labels."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta
+
+from ...errors import TactileError
+from ...files.outside import read_toml_text
+from ...files.shipped import shipped
+from ...recordings.tables.column_map import ColumnMap
+from ..engine.recipes import Prepare
+
+FORMAT = "tactile-dataset-1"
+SHIPPED = "datasets"
+FIELD = re.compile(r"\{(\w+)\}")
+MOST_FIELDS = 8  # of a pattern: each may stretch over a name, and their work multiplies (assumed enough)
+OWN = ("finger", "recording", "frame", "time", "file_name", "split")  # columns of the result that are no labels
+ADVICE = "See `tactile dataset --help`"
+
+Pattern = Annotated[str, Meta(min_length=1, max_length=300)]
+
+
+class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Calibration of the units.
+
+    by : label whose values are units; "" where all recordings are of one unit, or of one hand
+    found : adapt, rest, gains and film from all recordings of the unit; rest, its rest alone from the file `rest`;
+        none, each recording by itself
+    rest : file of the untouched finger, in which {label} stands for the label's value
+    """
+
+    by: str = ""
+    found: Literal["adapt", "rest", "none"] = "none"
+    rest: str = ""
+
+
+class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Division into train and test, by a label whose values stay together. test : its values that are held out."""
+
+    by: str = ""
+    test: list[str] = []
+
+
+class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Origin of the data. licence : what is stated of it, and where."""
+
+    title: str
+    url: str = ""
+    citation: str = ""
+    licence: str = "not stated: ask the authors before you pass anything on"
+
+
+class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
+    """Recipe of a data set.
+
+    files : paths of recordings below the folder, at any depth; {label} stands for any text, which becomes the label.
+        The first pattern that fits a file counts
+    tasks : labels that a user of the set would learn to tell; force : file of newtons beside a recording, where it is
+        there; values : columns of numbers of the recordings' files, which become labels too
+    every : frames of which one is translated; snapshots : whether frames do not follow each other
+    notes : first lines of the card
+    """
+
+    format: str
+    source: Source
+    files: Annotated[list[Pattern], Meta(min_length=1)]
+    tasks: list[str] = []
+    force: str = ""
+    values: list[str] = []
+    every: Annotated[int, Meta(ge=1)] = 1
+    snapshots: bool = False
+    notes: list[str] = []
+    prepare: Prepare = Prepare()
+    unit: Unit = Unit()
+    split: Split = Split()
+
+    @property
+    def columns(self) -> ColumnMap | None:
+        """Map of the files' columns, if they need one."""
+        return self.prepare.columns
+
+
+def known() -> dict[str, Path]:
+    """Return the recipes that ship, by name."""
+    return {file.stem: file for file in sorted(shipped(SHIPPED).glob("*.toml"))}
+
+
+def read(named: str) -> Recipe:
+    """Read a recipe: one that ships, by its name, or a TOML file. Raises TactileError naming file and field."""
+    file = known().get(named, Path(named))
+    try:
+        found = msgspec.toml.decode(read_toml_text(file), type=Recipe)
+    except OSError as error:
+        expected = f"{', '.join(known())}, or a recipe's file"
+        advice = "`tactile dataset` lists them"
+        raise TactileError(named, f"no data set ({error.strerror})", expected, advice) from error
+    except (ValueError, RecursionError) as error:
+        raise TactileError(file, str(error), "a recipe of a data set", ADVICE) from error
+    _check(found, file)
+    return found
+
+
+def _check(recipe: Recipe, file: Path) -> None:
+    if recipe.format != FORMAT:
+        raise TactileError(f"{file}, format", repr(recipe.format), repr(FORMAT), ADVICE)
+    for field, names in (("files", recipe.files), ("unit.rest", [recipe.unit.rest]), ("force", [recipe.force])):
+        for name in names:
+            if Path(name).is_absolute() or ".." in Path(name).parts:
+                raise TactileError(f"{file}, {field}", repr(name), "a path inside the data set's folder")
+    labels = {label for pattern in recipe.files for label in FIELD.findall(pattern)}
+    for pattern in recipe.files:
+        held = FIELD.findall(pattern)
+        if len(held) > MOST_FIELDS or len(set(held)) < len(held) or set(held) & set(OWN):
+            expected = f"at most {MOST_FIELDS} different labels, none called {', '.join(OWN)}"
+            raise TactileError(f"{file}, files", repr(pattern), expected)
+    for field, name in (("unit.by", recipe.unit.by), ("split.by", recipe.split.by)):
+        if name and name not in labels:
+            expected = f"a label of files: {', '.join(sorted(labels)) or 'none'}"
+            raise TactileError(f"{file}, {field}", repr(name), expected)
+    if (recipe.unit.found == "rest") != bool(recipe.unit.rest) and recipe.unit.found != "adapt":
+        raise TactileError(f"{file}, unit", f"found {recipe.unit.found!r}, rest {recipe.unit.rest!r}", "both or none")
+    recipe.prepare.options().check()
+
+
+def filled(name: str, labels: dict[str, str]) -> str:
+    """Put labels into a file's name. Raises TactileError for a label that the recording has not."""
+    for label in FIELD.findall(name):
+        if label not in labels:
+            raise TactileError(name, f"{{{label}}}, which is no label", ", ".join(labels) or "no label", ADVICE)
+    return FIELD.sub(lambda found: labels[found[1]], name)

@@ -1,0 +1,212 @@
+"""`tactile dataset`: a folder of recordings to labelled pictures, a card and a page."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tactile_core.cli.main import main
+from tactile_core.errors import TactileError
+from tactile_core.jobs.dataset import collected, guess
+from tactile_core.jobs.dataset import recipe as recipes
+from tactile_core.jobs.dataset.summary import ARRAYS, PICTURE, RAW, Summary
+from tactile_core.jobs.dataset.survival import ALWAYS, rows
+from tactile_core.jobs.export.finished_job import Recorded
+
+DATA = Path(os.environ.get("TACTILE_TEST_DATA", Path(__file__).parents[4] / "shared" / "data"))
+OBJECTS, SESSIONS = ("ball", "rolled"), 6
+FRAMES = 30  # of a recording: every second of 60
+
+
+@pytest.fixture(scope="module")
+def made(recipe, folder, tmp_path_factory) -> Path:
+    """The data set of the small folder, one recording of which cannot be read."""
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    place = tmp_path_factory.mktemp("made")
+    shutil.copytree(folder, place / "in")
+    (place / "in" / "ball_broken.npz").write_bytes(b"no recording")
+    assert main(command(recipe, place / "in", place / "out")) == 2
+    return place / "out"
+
+
+def command(recipe: Path, folder: Path, out: Path) -> list[str]:
+    return ["dataset", str(recipe), str(folder), "--out", str(out), "--to", "imagefolder,lerobot"]
+
+
+def metadata(folder: Path) -> list[dict[str, str]]:
+    with open(folder / "metadata.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_pictures_carry_labels_splits_and_numbers(made):
+    held = {split: metadata(made / "imagefolder" / split) for split in ("train", "test")}
+    assert {split: len(found) for split, found in held.items()} == {"train": 8 * FRAMES, "test": 4 * FRAMES}
+    assert {row["session"] for row in held["test"]} == {"4", "5"}
+    assert {row["object"] for row in held["train"]} == {"ball", "rolled"}
+    for split, found in held.items():
+        assert all((made / "imagefolder" / split / row["file_name"]).is_file() for row in found)
+    pressed = [row for row in held["train"] if row["object"] == "ball" and int(row["frame"]) > 44]
+    assert all(float(row["force_y_n"]) > 0.1 and 0 <= float(row["confidence"]) <= 1 for row in pressed)
+
+
+def test_lerobot_keeps_splits_and_even_steps(made):
+    import pyarrow.parquet as pq
+
+    info = json.loads((made / "lerobot" / "meta" / "info.json").read_text())
+    assert info["splits"] == {"train": "0:8", "test": "8:12"}
+    assert info["fps"] == 50  # every second frame of 100 Hz
+    table = pq.read_table(made / "lerobot" / "data" / "chunk-000" / "file-000.parquet")
+    assert table["frame_index"].to_pylist()[:FRAMES] == list(range(FRAMES))
+
+
+def test_the_card_says_what_was_made_what_failed_and_whose_it_is(made):
+    text = (made / "README.md").read_text()
+    assert text.index("> Simulated.") < text.index("## What is here")
+    assert "train: 8 recordings, 240 frames" in text and "1 other files of the folder were left alone" in text
+    assert "ball_broken" in text and "Two <objects>" in text and "not stated" in text
+    assert re.search(r"\| object \(2\) \| electrodes \| 1\.00 \|", text)  # a press and a roll are easily told
+
+
+def test_the_same_command_goes_on_with_the_same_bytes(made, recipe):
+    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in made.rglob("*.png")}
+    card = (made / "README.md").read_bytes()
+    assert main(command(recipe, made.parent / "in", made)) == 2
+    assert (made / "README.md").read_bytes() == card
+    assert {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in made.rglob("*.png")} == before
+
+
+def test_a_changed_recipe_does_not_overwrite(made, recipe, tmp_path, capsys):
+    other = tmp_path / "other.toml"
+    other.write_text(recipe.read_text().replace("every = 2", "every = 3"))
+    assert main(["dataset", str(other), str(made.parent / "in"), "--out", str(made)]) == 2
+    assert "holds another job" in capsys.readouterr().err
+
+
+def test_the_page_shows_every_recording_in_a_browser(made):
+    page = (made / "index.html").read_text("utf-8")
+    assert "http" not in page and "Two &lt;objects&gt;" in page
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium here")
+    shown = subprocess.run(
+        [browser, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", (made / "index.html").as_uri()],
+        capture_output=True, text=True, timeout=120, check=True,
+    ).stdout  # fmt: skip
+    assert "12 of 12 recordings" in shown
+
+
+def test_the_example_learns_from_the_pictures(made):
+    script = Path(__file__).parents[3] / "docs" / "learn_from_pictures.py"
+    done = subprocess.run(
+        [sys.executable, str(script), str(made / "imagefolder"), "object"], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(re.search(r"right: ([\d.]+)", done.stdout)[1]) > 0.9
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (('"{object}_{session}.npz"', '"../{object}.npz"'), "a path inside the data set's folder"),
+        (('"{object}_{session}.npz"', '"/tmp/{object}.npz"'), "a path inside the data set's folder"),
+        (('"{object}_{session}.npz"', '"{object}_{object}.npz"'), "different labels"),
+        (('"{object}_{session}.npz"', '"{frame}_{session}.npz"'), "different labels"),
+        (('by = "session"', 'by = "sesion"'), "a label of files: object, session"),
+        (("every = 2", "every = 0"), "every"),
+        (("every = 2", "evry = 2"), "evry"),
+        (('"tactile-dataset-1"', '"tactile-dataset-9"'), "tactile-dataset-1"),
+        (('"{object}_{session}.npz"', '"{object}_{session}.mat"'), "expected {object}_{session}.mat"),
+        (('"rest.npz"', '"{object}_rest.npz"'), "ball_rest.npz: missing"),
+        (('rest = "rest.npz"\n', ""), "both or none"),
+    ],
+)
+def test_bad_recipes_and_other_folders_are_named(recipe, folder, tmp_path, capsys, change, words):
+    file = tmp_path / "bad.toml"
+    file.write_text(recipe.read_text().replace(*change))
+    assert main(["dataset", str(file), str(folder), "--out", str(tmp_path / "out")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "out" / "README.md").exists()
+
+
+def test_an_unknown_name_lists_the_known_ones(tmp_path, capsys):
+    assert main(["dataset", "phac3", str(tmp_path), "--out", str(tmp_path / "out")]) == 2
+    assert "phac2" in capsys.readouterr().err
+
+
+def test_links_out_of_the_folder_are_no_rest(recipe, tmp_path):
+    outside = tmp_path / "rest.npz"
+    outside.write_bytes(b"")
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "rest.npz").symlink_to(outside)
+    file = collected.File(tmp_path / "in" / "ball_0.npz", "", {}, "train")
+    with pytest.raises(TactileError, match="outside"):
+        collected.beside(tmp_path / "in", "rest.npz", file)
+
+
+def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_path):
+    guess.write(tmp_path / "new.toml", folder)
+    recipe = recipes.read(str(tmp_path / "new.toml"))
+    assert recipe.files[0] == "{label1}_{label2}.npz"
+    found = collected.collect(recipe, folder, tmp_path / "out")
+    expected = {(name, str(session)) for name in OBJECTS for session in range(SESSIONS)}
+    assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "files", "test"),
+    [
+        ("phac2", "biotac_phac", 30, {"trial"}), ("biotac_slides", "biotac_recordings/slide", 41, {"sample"}),
+        ("sp_direction_of_slip", "biotac_sp/direction_of_slip", 35, {"object"}),
+        ("sp_stability", "biotac_sp/stability", 2, {"part"}), ("syntouch_contact", "biotac_force", 2, set()),
+        ("plate_normal", "biotac_plate", 1, set()),
+    ],
+)  # fmt: skip
+def test_shipped_recipes_find_the_files_of_their_sets(name, place, files, test, tmp_path):
+    found = recipes.read(name)
+    assert found.source.url.startswith("https://")
+    if not (DATA / place).is_dir():
+        pytest.skip(f"no {DATA / place}")
+    held = collected.collect(found, DATA / place, tmp_path)
+    assert len(held.files) == files
+    splits = {file.split for file in held.files}
+    assert splits == ({"train", "test"} if test else {"train"})
+    for label in test:  # no value is on both sides
+        sides = [{file.labels.get(label) for file in held.files if file.split == split} for split in ("train", "test")]
+        assert not sides[0] & sides[1]
+
+
+def test_a_set_of_guesses_says_so_first():
+    for name in ("sp_stability", "sp_direction_of_slip"):
+        assert recipes.read(name).notes[0].startswith("A GUESS")
+
+
+def examples(told: str, count: int = 40) -> list[Summary]:
+    """Recordings of two classes, which the numbers `told` tell and no others."""
+    rng = np.random.default_rng(0)
+    found = []
+    for number in range(count):
+        features = {name: rng.normal(size=(1, 6)) for name in (*ARRAYS, PICTURE)}
+        features[told] += 4 * (number % 2)
+        recording = Recorded(f"r{number}", 1, (), {})
+        labels = {"session": str(number // 4)}
+        told_as = {"side": np.array(["ab"[number % 2]], object)}
+        found.append(Summary(recording, 1.0, 0.0, {}, 1.0, 1.0, 1.0, labels, features, told_as))
+    return found
+
+
+@pytest.mark.parametrize("told", [RAW, PICTURE])
+def test_survival_tells_labels_by_what_holds_them_and_by_nothing_else(told):
+    pytest.importorskip("sklearn", reason="scikit-learn is not installed")
+    by = {row.by: row for row in rows("side", examples(told), "session", lambda done, total: None)}
+    assert by[told].right > 0.9 and by[ALWAYS].right == 0.5
+    others = [row for name, row in by.items() if name in (*ARRAYS, PICTURE) and name != told]
+    assert all(row.right < 0.5 + 4 * row.error for row in others)
