@@ -84,7 +84,7 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
     for layout in asked.layouts:
         _export(source, layout, out / layout, asked)
     with asked.bar("summary", "recording") as shown:
-        summaries = summary.summarise(source, recipe.tasks, shown)
+        summaries = summary.summarise(source, [*recipe.tasks, recipe.split.kept], shown)
     _write_words(recipe, named, found, source, summaries, out, asked)
     return source.aside
 
@@ -208,7 +208,7 @@ def _write_words(
     rows: list[survival.Row] | None = None
     if util.find_spec("sklearn"):
         with asked.bar("what survives", "step") as shown:
-            rows = [row for task in recipe.tasks for row in survival.rows(task, summaries, recipe.split.by, shown)]
+            rows = [row for task in recipe.tasks for row in survival.rows(task, summaries, recipe.split.kept, shown)]
     text = dataset_card.written(recipe, named, found, source, summaries, rows, asked.layouts)
     with atomic.writing(out):
         atomic.write_bytes(out / CARD, text.encode())

@@ -34,7 +34,7 @@ def written(
     """Write the card as Markdown. rows : what survives, None where scikit-learn is missing."""
     of = recipe.source
     sections = {
-        f"# {of.title}: as a DIGIT would have seen it": _first(recipe, summaries, rows or []),
+        f"# {of.title}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
         "## What is here": _contents(source, found, summaries, layouts),
         "## Labels": _labels(summaries),
         "## How far to trust it": [*_trust(summaries), "", *_warnings(source)],
@@ -50,7 +50,7 @@ def written(
     return "\n".join(line for title, lines in sections.items() for line in (title, "", *lines, ""))
 
 
-def _first(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
+def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
     """Say first what a user must know before all else."""
     notes = list(recipe.notes)
     guesses = _mean(summaries, lambda one: one.guesses, touched=True)
@@ -73,7 +73,9 @@ def _verdict(task: str, by: dict[str, Row]) -> str:
     )
     if best.right < always + 2 * best.error:
         return f"Nothing of `{task}` can be shown to survive: {told}."
-    return f"{'Part' if best.right < source.right - 2 * source.error else 'All'} of `{task}` survives: {told}."
+    if best.right < source.right - 2 * source.error:
+        return f"Part of `{task}` survives: {told}."
+    return f"`{task}` is told as well as from the electrodes, within two standard errors: {told}."
 
 
 def _contents(source: Finished, found: Collected, summaries: list[Summary], layouts: Sequence[str]) -> Iterable[str]:
@@ -146,7 +148,7 @@ def _survives(recipe: Recipe, rows: list[Row] | None) -> Iterable[str]:
     if not rows:
         yield "Nothing to measure: no label of the recipe's `tasks` has several values in enough recordings."
         return
-    apart = f"recordings of one `{recipe.split.by}`" if recipe.split.by else "single recordings"
+    apart = f"all of one `{recipe.split.kept}`" if recipe.split.kept else "single recordings"
     yield f"Share told right by a support vector machine (RBF, chosen within training), {apart} left out together, from"
     yield "changes since the first 0.1 s alone. Random maps are of the electrodes, 24 numbers each."
     yield from ("", "| label (values) | told by | right | standard error | examples |", "|---|---|---|---|---|")

@@ -40,10 +40,19 @@ class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Division into train and test, by a label whose values stay together. test : its values that are held out."""
+    """Division into train and test, by a label whose values stay together.
+
+    test : values that are held out; apart : label of frames by which the card's classifiers hold out, `by` if empty
+    """
 
     by: str = ""
     test: list[str] = []
+    apart: str = ""
+
+    @property
+    def kept(self) -> str:
+        """Return the label whose values stay together where what survives is measured; "" for none."""
+        return self.apart or self.by
 
 
 class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):

@@ -14,7 +14,7 @@ RANDOM = "best of ten random maps of the electrodes"
 ALWAYS = "always the commonest"
 MAPS, WIDTH = 10, 24  # random maps, and the numbers of each
 FOLDS, INNER = 5, 3  # outer: what is scored; inner: what chooses the classifier
-MOST, FEWEST = 2500, 12  # examples of a task; with fewer nothing is shown (assumed)
+MOST, FEWEST = 1000, 12  # examples of a task; with fewer nothing is shown (assumed)
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Row:
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
     """Tell a label by each kind of numbers, with whole groups of recordings left out.
 
-    apart : label whose values are left out together, "" for single recordings (of snapshots: tenths of each)
+    apart : label whose values are left out together; without it single recordings (of snapshots, tenths of each)
     Needs scikit-learn. Returns no row where the label has one value or too few examples.
     """
     told = [(one, one.told[task]) for one in summaries if task in one.told]
@@ -63,8 +63,8 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
 
 def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
     """Name (count,) the group of each example, which is left out with the others of it."""
-    if apart and one.labels.get(apart):
-        return np.full(count, one.labels[apart], object)
+    if apart in one.told:
+        return one.told[apart]
     name = one.recording.name
     tenths = np.arange(count) * 10 // count
     return np.array([f"{name} {tenth}" for tenth in tenths], object) if count > 1 else np.array([name], object)

@@ -197,9 +197,8 @@ def examples(told: str, count: int = 40) -> list[Summary]:
         features = {name: rng.normal(size=(1, 6)) for name in (*ARRAYS, PICTURE)}
         features[told] += 4 * (number % 2)
         recording = Recorded(f"r{number}", 1, (), {})
-        labels = {"session": str(number // 4)}
-        told_as = {"side": np.array(["ab"[number % 2]], object)}
-        found.append(Summary(recording, 1.0, 0.0, {}, 1.0, 1.0, 1.0, labels, features, told_as))
+        told_as = {"side": np.array(["ab"[number % 2]], object), "session": np.array([str(number // 4)], object)}
+        found.append(Summary(recording, 1.0, 0.0, {}, 1.0, 1.0, 1.0, {}, features, told_as))
     return found
 
 
