@@ -12,6 +12,7 @@ from bpy.app.handlers import persistent
 from . import preferences
 
 CACHE, SIMULATIONS = "tactile_cache", "tactile_simulations"
+_copied: list[Path] = []  # by the save that is going on
 _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
@@ -61,6 +62,16 @@ def _move_beside(file: str, *_: object) -> None:
             except OSError:  # on another disk
                 shutil.copyfile(path, beside)
             setattr(holder, name, f"//{kind}/{path.name}")
+            _copied.append(path)
+
+
+@persistent
+def _let_go(*_: object) -> None:
+    """Remove what lies beside the .blend now; but of a copy, whose own file stays unsaved, it is named again."""
+    _find_again()
+    for path in _copied if bpy.data.is_saved else ():
+        path.unlink(missing_ok=True)
+    _copied.clear()
 
 
 @persistent
@@ -78,7 +89,7 @@ def _find_again(*_: object) -> None:
 
 
 HANDLERS = (
-    (bpy.app.handlers.save_pre, _move_beside), (bpy.app.handlers.save_post, _find_again),
+    (bpy.app.handlers.save_pre, _move_beside), (bpy.app.handlers.save_post, _let_go),
     (bpy.app.handlers.load_post, _find_again), (bpy.app.handlers.undo_post, _find_again),
     (bpy.app.handlers.redo_post, _find_again),
 )  # fmt: skip

@@ -65,7 +65,7 @@ def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(imported, nod
     (tmp_path / "here").mkdir()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "here" / "a.blend"))
     assert skin.modifiers["Tactile"].filepath == f"//tactile_cache/{own.name}"
-    own.unlink()
+    assert not own.exists()
     right(gel=True)
     (tmp_path / "here").rename(tmp_path / "there")
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "there" / "a.blend"))
