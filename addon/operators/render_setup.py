@@ -96,7 +96,7 @@ class TACTILE_OT_set_up_render(TactileOperator):
             image.media_type, image.use_exr_interleave = "IMAGE", True
         image.file_format, image.color_mode = "PNG", "RGB"
         scene.camera = digit_body.camera_of(gel)
-        self.report({"INFO"}, "View transform Raw: this engine, Cycles and EEVEE give the camera's own levels")
+        self.report({"INFO"}, "View transform Raw: this engine and Cycles give the camera's own levels, EEVEE roughly")
         pictures.prepare(scene, context.evaluated_depsgraph_get())
 
 
