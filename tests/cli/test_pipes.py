@@ -45,6 +45,11 @@ CASES = {
     ("info", "--sensor"): ["info {csv} --sensor {x.toml}"],
     ("info", "--columns"): ["info {csv} --columns {x.toml}"],
     ("adapt", "--columns"): ["adapt {csv} --out {out} --columns {x.toml}"],
+    ("dataset", "name"): ["dataset {x.toml} {slides} --out {out}"],
+    ("dataset", "folder"): ["dataset plate_normal {plates} --out {out}"],
+    ("dataset", "--calibration"): ["dataset biotac_slides {slides} --out {out} --calibration {x.toml}"],
+    ("dataset", "--weights"): ["dataset biotac_slides {slides} --out {out} --weights {weights}"],
+    ("dataset", "--cluster"): ["dataset biotac_slides {slides} --out {out} --cluster {x.toml}"],
     ("export", "job"): ["export {job} --to npz --out {out}", "export {x} --to npz --out {out}"],
     ("info", "recordings"): ["info {x.csv}", "info {x.mcap}"],
     ("adapt", "recordings"): ["adapt {x.csv} --out {out}"],
@@ -74,8 +79,8 @@ CASES = {
 }  # fmt: skip
 # Metavars of what is written, and of words that are no files.
 NO_FILES = {"WORDS", "A:B:STEP", "auto|none|A:B", "X,Z", "BOUND", "I/N", "WxH", "TEXT", "NAMES", "NAME", "NAME=A:B:N",
-            "N", "S", "X", "HZ", "MM", "FILE.xml", "SENSOR"}  # fmt: skip
-WRITTEN = {"--out", "--json", "--sheet", "--scene-out"}
+            "N", "S", "X", "HZ", "LAYOUTS", "MM", "FILE.xml", "SENSOR"}  # fmt: skip
+WRITTEN = {"--out", "--json", "--sheet", "--scene-out", "--new"}
 
 
 def reading_options() -> set[tuple[str, str]]:
@@ -158,7 +163,8 @@ def folders(name, tmp_path, pipes, root):
         for number in range(3):
             Image.new("RGB", (24, 32), (40, 40, 40)).save(folder / f"{number}.png")
     else:
-        pipes.make(folder / {"scenefolder": "scene.toml", "job": "job.json", "presses": "a.png"}.get(name, "a.csv"))
+        held = {"scenefolder": "scene.toml", "job": "job.json", "presses": "a.png", "plates": "plate_1.csv"}
+        pipes.make(folder / held.get(name, "a.csv"))
     return folder
 
 
@@ -168,6 +174,7 @@ def test_a_pipe_is_refused(line, tmp_path, pipes, slide_csv, capsys, request):
     good = {
         "csv": slide_csv, "scene": lambda: root / "scenes/press", "out": lambda: tmp_path / "out",
         "recording": lambda: root / "scenes/press_roll_slide/press_roll_slide.h5",
+        "slides": lambda: slide_csv("mat1_1_bio").parent,
         "scenes/training": lambda: root / "scenes/training",
     }  # fmt: skip
     words = []
@@ -184,7 +191,7 @@ def test_a_pipe_is_refused(line, tmp_path, pipes, slide_csv, capsys, request):
         words.append(word)
     if words[0] == "train":
         pytest.importorskip("torch", reason="torch is absent: pip install tactile-core[train]")
-    if words[0] == "batch" and "--cluster" in words:
+    if words[0] in ("batch", "dataset") and "--cluster" in words:
         pytest.importorskip("distributed", reason="dask is absent: pip install tactile-core[batch]")
     status = command.main(words)
     err = capsys.readouterr().err

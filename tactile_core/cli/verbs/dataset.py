@@ -52,18 +52,20 @@ def run(options: argparse.Namespace) -> int:
     """List, write a recipe, or convert; returns the exit status."""
     from ...jobs.dataset import recipe
 
+    if options.new is not None:
+        return _new(options)
     if options.name is None:
         for name, file in recipe.known().items():
             tell(f"{name:<22}{recipe.read(str(file)).source.title}")
         next_step("tactile dataset NAME FOLDER --out DIR")
         return 0
-    if options.new is not None:
-        return _new(options)
-    if options.folder is None or options.out is None:
+    if not options.folder or options.out is None:
         raise TactileError("dataset", f"{options.name} alone", "NAME FOLDER --out DIR", "See `tactile dataset --help`")
     from ...jobs.dataset import build_set
 
     layouts = list(dict.fromkeys(word for word in options.layouts.split(",") if word))
+    if not layouts:
+        raise TactileError("--to", "no layout", ", ".join(LAYOUTS))
     for word in layouts:
         if word not in LAYOUTS:
             raise TactileError("--to", repr(word), ", ".join(LAYOUTS))
@@ -83,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _new(options: argparse.Namespace) -> int:
     """Write a recipe guessed from a folder."""
+    if not options.name:
+        raise TactileError("--new", "given alone", "--new FILE FOLDER", "Name the folder of your recordings")
     from ...jobs.dataset import guess
 
     guess.write(Path(options.new), Path(options.name))

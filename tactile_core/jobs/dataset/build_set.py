@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from importlib import util
 from pathlib import Path
 
 import numpy as np
@@ -16,12 +16,11 @@ import numpy as np
 from ...errors import TactileError
 from ...files import atomic
 from ...files.outside import read_small
-from ...recordings import electrode_gains, read
+from ...recordings import read
 from ...recordings.electrode_gains import SensorFile
 from ...recordings.force_file import read_columns, read_force
 from ...recordings.recording import split as chosen
 from ...sensors import TARGET
-from ...translation import adapt, networks, reference_signals
 from ...translation.answer import Answer
 from .. import export, translate_recipe
 from ..engine import inputs
@@ -30,11 +29,12 @@ from ..engine import run as runs
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
 from . import dataset_card, dataset_page, summary, survival
-from .collected import TEST, Collected, File, beside, collect
-from .recipe import Recipe
+from .collected import TEST, TRAIN, Collected, File, beside, collect
+from .recipe import FORCE, Recipe
+from .set_units import calibrated, file_name, readable
 
 CARD, PAGE, UNITS, JOBS, REPORT = "README.md", "index.html", "units", "jobs", "dataset.json"
-FORCE = "measured_force_n"
+ALL = "all"  # name of the unit where a set has one
 KEEP = ("latent", "image")
 
 Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
@@ -60,24 +60,29 @@ class Asked:
 def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> dict[str, str]:
     """Make the data set `out` of the recordings in a folder; what is there already is kept.
 
-    Returns what was set aside, and why. Raises TactileError for another set's folder, a unit whose rest is missing,
-    and a disk that cannot be written.
+    Returns what was set aside, and why. Raises TactileError for another set's folder, for files of others in `out`,
+    where no recording can be translated, and for a disk that cannot be written.
     """
     found = collect(recipe, folder, out)
-    held = {"train": 0, TEST: 0}
-    for file in found.files:
-        held[file.split] += 1
-    units = len(found.units())
-    asked.say(f"{len(found.files)} files of {units} units or hands: {held['train']} train, {held[TEST]} test")
-    parts, aside = [], {}
-    for unit, files in found.units().items():
+    _check_out(out)
+    for line in _counted(recipe, found):
+        asked.say(line)
+    parts, aside = [], dict(found.unfit)
+    for unit, every in found.units().items():
+        files, unread = readable(recipe, every)
+        aside |= unread
         try:
-            parts.append(_translated(recipe, unit, files, folder, out, asked))
+            kept = out / UNITS / f"{file_name(unit) or ALL}.toml"
+            sensor = calibrated(recipe, files, folder, kept, asked.weights, asked.say) if files else None
         except TactileError as error:
-            if error.where and str(error.where).startswith(str(out)):
-                raise
-            aside[unit or folder.name] = str(error)
-            asked.say(f"set aside: {error}")
+            if isinstance(error.__cause__, OSError) and not isinstance(error.__cause__, FileNotFoundError):
+                raise  # the disk, and no file of the set
+            files, aside[unit or folder.name] = [], str(error)
+        if files:
+            parts.append((unit, files, _translated(recipe, unit, files, sensor, out, asked)))
+    for why in aside.values():
+        asked.say(f"set aside: {why}")
+    parts = [part for part in parts if part[2].recordings]
     if not parts:
         raise TactileError(folder, "no recording that could be translated", "recordings", "See what was said above")
     source = _joined(recipe, parts, aside, out)
@@ -85,22 +90,43 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
         _export(source, layout, out / layout, asked)
     with asked.bar("summary", "recording") as shown:
         summaries = summary.summarise(source, [*recipe.tasks, recipe.split.kept], shown)
+    for task in recipe.tasks:
+        if not any(task in one.told for one in summaries):
+            asked.say(f"warning: no recording has the label {task!r}, which the recipe's tasks name")
     _write_words(recipe, named, found, source, summaries, out, asked)
     return source.aside
 
 
+def _check_out(out: Path) -> None:
+    """Raise TactileError where the result cannot be written, or would replace what no data set of ours is."""
+    with atomic.writing(out):
+        atomic.probe(out)
+    if not (out / REPORT).exists() and not (out / JOBS).is_dir():
+        for name in (CARD, PAGE, JOBS, UNITS):
+            if (out / name).exists():
+                raise TactileError(out / name, "there, and of no data set", "a new folder", "Name another --out")
+
+
+def _counted(recipe: Recipe, found: Collected) -> list[str]:
+    """Say what is in the parts, and what of the recipe fits none of the files."""
+    splits = Counter(file.split for file in found.files)
+    units = len(found.units())
+    lines = [f"{len(found.files)} files of {units} units or hands: {splits[TRAIN]} train, {splits[TEST]} test"]
+    if recipe.split.by and not splits[TEST]:
+        wanted = f"values {', '.join(recipe.split.test)}" if recipe.split.test else "values one in five"
+        lines.append(f"warning: nothing is held out for testing: no {recipe.split.by} among the {wanted}")
+    return lines
+
+
 def _translated(
-    recipe: Recipe, unit: str, files: list[File], folder: Path, out: Path, asked: Asked
-) -> tuple[str, list[File], Finished]:
-    """Find the unit and translate its recordings as a job, or go on with it."""
-    name = unit or "all"
+    recipe: Recipe, unit: str, files: list[File], sensor: SensorFile | None, out: Path, asked: Asked
+) -> Finished:
+    """Translate a unit's recordings as a job, or go on with it."""
     paths = [file.path for file in files]
-    sensor = _unit(recipe, files, folder, out / UNITS / f"{name}.toml", asked)
-    place = out / JOBS / name
+    place = out / JOBS / (file_name(unit) or ALL)
     want = translate_recipe.Asked(
         KEEP, recipe.prepare, sensor, asked.weights, asked.calibration, asked.target, asked.preset,
-        Answer(frames_apart=recipe.snapshots),
-        every=recipe.every,
+        Answer(frames_apart=recipe.snapshots), every=recipe.every,
     )  # fmt: skip
     with runs.opened(place, None):
         with asked.bar("reading", "file") as shown:
@@ -111,36 +137,11 @@ def _translated(
         elif jobs.read(place).id != job.id:
             found = "holds another job (other recordings, contents or options)"
             raise TactileError(place, found, "the same command that began it", "Name another --out folder")
-        with asked.bar(f"translate {name}", "task") as shown:
+        with asked.bar(f"translate {place.name}", "task") as shown:
             done = runs.run(place, job, asked.place(place), None, shown)
     if len(done.aside) == len(job.inputs):
-        raise TactileError(name, str(next(iter(done.aside.values()))), "recordings that can be translated")
-    return unit, files, finished_job.load(place)
-
-
-def _unit(recipe: Recipe, files: list[File], folder: Path, out: Path, asked: Asked) -> SensorFile | None:
-    """Return the unit's calibration, found as the recipe says, and keep it as a file; None for each by itself."""
-    how = recipe.unit
-    if how.found == "none":
-        return None
-    if out.exists():
-        return electrode_gains.read(out)
-    rest = beside(folder, how.rest, files[0]) if how.rest else None
-    if rest is not None and not rest.is_file():
-        raise TactileError(rest, "missing", f"the untouched finger, which the recipe names for {files[0].path.name}")
-    asked.say(f"finding the unit of {len(files)} files")
-    if how.found == "rest":
-        sensor = adapt.rest_unit(str(rest), recipe.columns)
-    else:
-        typical = reference_signals.read(asked.weights or networks.WEIGHTS_FOLDER)
-        given = None if rest is None else str(rest)
-        paths = [str(file.path) for file in files]
-        sensor, warnings = adapt.adapt_hand(paths, typical, recipe.prepare.options(), given)
-        for warning in warnings:
-            asked.say(f"warning: {warning}")
-    electrode_gains.check(sensor, out)
-    electrode_gains.write(out, sensor)
-    return electrode_gains.read(out)  # as the next run reads it, rounded
+        return Finished(place, job.id, (), {name: str(why) for name, why in done.aside.items()}, {})
+    return finished_job.load(place)
 
 
 def _joined(
@@ -149,22 +150,31 @@ def _joined(
     """Put the jobs of all units together as one, labelled; train comes before test."""
     recordings: list[Recorded] = []
     warnings: dict[str, list[str]] = {}
+    content = hashlib.sha256()
     for unit, files, done in parts:
         paths = {one.name: one.path for one in jobs.read(done.folder).inputs}
-        known = {str(file.path.resolve()): file for file in files}
-        mark = f"{unit}_" if len(parts) > 1 else ""
+        known = {str(file.path): file for file in files}
+        mark = f"{file_name(unit)}_" if len(parts) > 1 else ""
         for one in done.recordings:
             path = paths[one.name]
-            file = known[str(Path(chosen(path).file).resolve())]
+            file = known[chosen(path).file]
             labels = {name: np.full(one.frames, text, object) for name, text in _labels(path, file).items()}
-            labels |= one.labels | _measured(recipe, path, file)
+            try:
+                labels |= one.labels | _measured(recipe, path, file)
+            except TactileError as error:
+                labels |= one.labels
+                warnings.setdefault(mark + one.name, []).append(str(error))
             recordings.append(dataclasses.replace(one, name=mark + one.name, labels=labels, split=file.split))
         aside |= {mark + name: why for name, why in done.aside.items()}
-        warnings |= {mark + name: texts for name, texts in done.warnings.items()}
+        for name, texts in done.warnings.items():
+            warnings.setdefault(mark + name, []).extend(texts)
+        content.update(done.id.encode())
     recordings.sort(key=lambda one: one.split == TEST)
-    content = json.dumps([[done.id for _, _, done in parts], [[one.name, one.split] for one in recordings]])
-    ident = hashlib.sha256(content.encode()).hexdigest()
-    return Finished(out, ident, tuple(recordings), aside, warnings)
+    for one in recordings:
+        told = {name: list(map(str, texts)) for name, texts in one.labels.items()}
+        content.update(json.dumps([one.name, one.split, told], sort_keys=True).encode())
+    content.update(json.dumps(aside, sort_keys=True).encode())
+    return Finished(out, content.hexdigest(), tuple(recordings), aside, warnings)
 
 
 def _labels(path: str, file: File) -> dict[str, str]:
@@ -190,14 +200,16 @@ def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
 
 
 def _export(source: Finished, layout: str, out: Path, asked: Asked) -> None:
-    """Write a layout, unless it is there of these recordings."""
+    """Write a layout, unless it is there of these recordings and labels; never over a folder of others."""
     try:
-        if json.loads(read_small(out / export.NOTE))["job"] == source.id:
+        held = json.loads(read_small(out / export.NOTE))
+        if held["job"] == source.id:
             return
+        ours = held["layout"] == layout
     except (OSError, ValueError, KeyError, TypeError):
-        pass  # not there, or not whole: made
+        ours = False
     with asked.bar(f"write {layout}", "frame") as shown:
-        export.write(source, layout, out, shown, overwrite=True)
+        export.write(source, layout, out, shown, overwrite=ours)
 
 
 def _write_words(
@@ -206,7 +218,7 @@ def _write_words(
 ) -> None:  # fmt: skip
     """Write the card, the page and their numbers."""
     rows: list[survival.Row] | None = None
-    if util.find_spec("sklearn"):
+    if survival.installed():
         with asked.bar("what survives", "step") as shown:
             rows = [row for task in recipe.tasks for row in survival.rows(task, summaries, recipe.split.kept, shown)]
     text = dataset_card.written(recipe, named, found, source, summaries, rows, asked.layouts)

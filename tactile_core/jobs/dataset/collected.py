@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import re
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from ...errors import TactileError
 from .recipe import FIELD, Recipe, filled
 
 TRAIN, TEST = "train", "test"
+log = logging.getLogger(__name__)
 HELD_OUT = 5  # one value in so many is for testing where the recipe names none (assumed)
 
 
@@ -28,10 +30,14 @@ class File:
 
 @dataclass(frozen=True)
 class Collected:
-    """Files of a data set, sorted by path; others : how many files of the folder fit no pattern."""
+    """Files of a data set, sorted by path.
+
+    others : how many files of the folder fit no pattern; unfit : path -> why it is left out although it fits
+    """
 
     files: tuple[File, ...]
     others: int
+    unfit: dict[str, str]
 
     def units(self) -> dict[str, list[File]]:
         """Return the files of each unit."""
@@ -50,12 +56,19 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]
     aside = [_compiled(name) for name in (recipe.unit.rest, recipe.force) if name]
+    folder = Path(os.path.abspath(folder))  # as jobs name their inputs
+    if folder.resolve().is_relative_to(out.resolve()):
+        raise TactileError(folder, f"inside --out {out}", "a folder outside of it", "Name another --out")
     names = [name for name in _names(folder) if not (folder / name).resolve().is_relative_to(out.resolve())]
-    found, others = [], 0
+    found, others, unfit = [], 0, {}
     for name in names:
         fits = next((fit for pattern in patterns if (fit := pattern.fullmatch(name))), None)
         if fits is None or any(pattern.fullmatch(name) for pattern in aside):
             others += not any(pattern.fullmatch(name) for pattern in aside)
+            continue
+        if not _encodes(name):
+            shown = name.encode(errors="backslashreplace").decode()
+            unfit[shown] = f"{folder / shown}: a name that is no UTF-8; expected one that a table can hold. Rename it"
             continue
         labels = fits.groupdict()
         unit = labels.get(recipe.unit.by, "")
@@ -64,14 +77,18 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
         held = f"{len(names)} files, such as {names[0]}" if names else "no file"
         expected = " or ".join(recipe.files)
         raise TactileError(folder, held, expected, "Is it the folder of another data set? `tactile dataset` lists them")
-    return Collected(tuple(found), others)
+    return Collected(tuple(found), others, unfit)
 
 
 def _names(folder: Path) -> list[str]:
     """Names of all files below a folder, relative to it."""
 
+    def refused(error: OSError) -> None:
+        """Log a warning for a folder that `os.walk` would skip silently."""
+        log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
+
     def walked() -> Iterator[str]:
-        for place, folders, names in os.walk(folder):
+        for place, folders, names in os.walk(folder, onerror=refused):
             folders[:] = sorted(name for name in folders if not name.startswith("."))
             for name in sorted(names):
                 if not name.startswith("."):
@@ -83,11 +100,19 @@ def _names(folder: Path) -> list[str]:
 def _compiled(pattern: str) -> re.Pattern[str]:
     """Compile a pattern of paths; it may lie at any depth, and a label holds no folder's border."""
     parts = FIELD.split(pattern)
-    fixed, fields = parts[::2], parts[1::2]
-    text = re.escape(fixed[0]) + "".join(
-        f"(?P<{field}>[^/]+){re.escape(after)}" for field, after in zip(fields, fixed[1:], strict=True)
-    )
-    return re.compile(f"(?:.*/)?{text}")
+    text, held = re.escape(parts[0]), set()
+    for field, after in zip(parts[1::2], parts[2::2], strict=True):
+        text += (f"(?P={field})" if field in held else f"(?P<{field}>[^/]+)") + re.escape(after)
+        held.add(field)
+    return re.compile(f"(?:.*/)?{text}", re.DOTALL)
+
+
+def _encodes(name: str) -> bool:
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _split(recipe: Recipe, labels: dict[str, str]) -> str:

@@ -34,7 +34,7 @@ def written(
     """Write the card as Markdown. rows : what survives, None where scikit-learn is missing."""
     of = recipe.source
     sections = {
-        f"# {of.title}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
+        f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
         "## What is here": _contents(source, found, summaries, layouts),
         "## Labels": _labels(summaries),
         "## How far to trust it": [*_trust(summaries), "", *_warnings(source)],
@@ -52,13 +52,18 @@ def written(
 
 def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
     """Say first what a user must know before all else."""
-    notes = list(recipe.notes)
+    notes = [_plain(note) for note in recipe.notes]
     guesses = _mean(summaries, lambda one: one.guesses, touched=True)
     if guesses > GUESSED:
         notes.append(f"{guesses:.0%} of the frames in contact are guesses by their own confidence.")
     for task in dict.fromkeys(row.task for row in rows):
         notes.append(_verdict(task, {row.by: row for row in rows if row.task == task}))
     return [f"> {note}" for note in notes]
+
+
+def _plain(text: str) -> str:
+    """Return a text of others as one line that Markdown does not read as its own."""
+    return " ".join(text.split()).replace("<", "&lt;").replace("|", "/").replace("`", "'")
 
 
 def _verdict(task: str, by: dict[str, Row]) -> str:
@@ -87,7 +92,7 @@ def _contents(source: Finished, found: Collected, summaries: list[Summary], layo
     yield f"- layouts: {', '.join(layouts)}; `index.html` to look at all recordings; `units/`: how each finger was read"
     if found.others:
         yield f"- {found.others} other files of the folder were left alone"
-    yield from (f"- set aside: {name}: {why}" for name, why in source.aside.items())
+    yield from (f"- set aside: {_plain(name)}: {_plain(why)}" for name, why in source.aside.items())
 
 
 def _labels(summaries: list[Summary]) -> Iterable[str]:
@@ -100,9 +105,9 @@ def _labels(summaries: list[Summary]) -> Iterable[str]:
         if len(counts) > MOST_VALUES and (span := _span(counts)):
             yield f"| {name} | {span} |"
             continue
-        shown = ", ".join(f"{text} ({count})" for text, count in counts.most_common(MOST_VALUES))
+        shown = ", ".join(f"{_plain(text)} ({count})" for text, count in counts.most_common(MOST_VALUES))
         more = f" and {len(counts) - MOST_VALUES} more" if len(counts) > MOST_VALUES else ""
-        yield f"| {name} | {shown.replace('|', '/')}{more} |"
+        yield f"| {name} | {shown}{more} |"
 
 
 def _span(counts: Counter[str]) -> str:
@@ -136,7 +141,7 @@ def _warnings(source: Finished) -> Iterable[str]:
             kinds.setdefault(NUMBER.sub("", text.partition(": ")[2] or text), []).append(text)
     said = sorted(kinds.values(), key=len, reverse=True)
     for texts in said[:MOST_WARNINGS]:
-        yield f"- {len(texts)} times, such as: {texts[0]}"
+        yield f"- {len(texts)} times, such as: {_plain(texts[0])}"
     if len(said) > MOST_WARNINGS:
         yield f"- {len(said) - MOST_WARNINGS} other kinds of warnings: `note.json` of each layout"
 

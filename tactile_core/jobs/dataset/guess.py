@@ -28,7 +28,7 @@ every = 1  # translate one in so many frames
 notes = []  # what a reader of the card must know first
 
 [source]
-title = "{title}"
+title = {title}
 url = ""
 citation = ""
 licence = "not stated"
@@ -61,7 +61,7 @@ def write(out: Path, folder: Path) -> None:
     text = TEMPLATE.format(
         count=len(paths), format=FORMAT, examples=" ".join(toml_quoted(path) for path in paths[:3]),
         files=", ".join(toml_quoted(pattern) for pattern in patterns), labels=", ".join(labels) or "none found",
-        title=folder.resolve().name.replace('"', ""), found="adapt" if len(paths) > 2 else "none",
+        title=toml_quoted(folder.resolve().name), found="adapt" if len(paths) > 2 else "none",
     )  # fmt: skip
     atomic.write_bytes(out, text.encode())
 

@@ -13,13 +13,17 @@ from ...errors import TactileError
 from ...files.outside import read_toml_text
 from ...files.shipped import shipped
 from ...recordings.tables.column_map import ColumnMap
+from ...sensors import SOURCE
 from ..engine.recipes import Prepare
+from ..export.formats.imagefolder import NUMBERS
 
 FORMAT = "tactile-dataset-1"
 SHIPPED = "datasets"
 FIELD = re.compile(r"\{(\w+)\}")
 MOST_FIELDS = 8  # of a pattern: each may stretch over a name, and their work multiplies (assumed enough)
-OWN = ("finger", "recording", "frame", "time", "file_name", "split")  # columns of the result that are no labels
+FORCE = "measured_force_n"  # label of the force beside a recording
+# What is no label's name: columns of the results and choices of the page.
+OWN = {"finger", "recording", "frame", "time", "file_name", "split", "flag", "flags", FORCE, *NUMBERS}
 ADVICE = "See `tactile dataset --help`"
 
 Pattern = Annotated[str, Meta(min_length=1, max_length=300)]
@@ -69,6 +73,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     files : paths of recordings below the folder, at any depth; {label} stands for any text, which becomes the label.
         The first pattern that fits a file counts
+    sensor : that made the recordings, biotac or biotac_sp
     tasks : labels that a user of the set would learn to tell; force : file of newtons beside a recording, where it is
         there; values : columns of numbers of the recordings' files, which become labels too
     every : frames of which one is translated; snapshots : whether frames do not follow each other
@@ -78,6 +83,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     format: str
     source: Source
     files: Annotated[list[Pattern], Meta(min_length=1)]
+    sensor: str = SOURCE
     tasks: list[str] = []
     force: str = ""
     values: list[str] = []
@@ -124,9 +130,17 @@ def _check(recipe: Recipe, file: Path) -> None:
     labels = {label for pattern in recipe.files for label in FIELD.findall(pattern)}
     for pattern in recipe.files:
         held = FIELD.findall(pattern)
-        if len(held) > MOST_FIELDS or len(set(held)) < len(held) or set(held) & set(OWN):
-            expected = f"at most {MOST_FIELDS} different labels, none called {', '.join(OWN)}"
+        bad = set(held) & OWN or {name for name in held if not name.isidentifier()}
+        if len(held) > MOST_FIELDS or len(set(held)) < len(held) or bad:
+            expected = f"at most {MOST_FIELDS} different labels, named as in Python, none of {', '.join(sorted(OWN))}"
             raise TactileError(f"{file}, files", repr(pattern), expected)
+    if set(recipe.values) & OWN:
+        expected = f"columns of the recordings, none of {', '.join(sorted(OWN))}"
+        raise TactileError(f"{file}, values", ", ".join(recipe.values), expected)
+    strange = set(FIELD.findall(recipe.unit.rest)) - {recipe.unit.by}
+    if strange:
+        advice = "Let unit.by name the label that tells units apart"
+        raise TactileError(f"{file}, unit.rest", repr(recipe.unit.rest), "no label but unit.by's", advice)
     for field, name in (("unit.by", recipe.unit.by), ("split.by", recipe.split.by)):
         if name and name not in labels:
             expected = f"a label of files: {', '.join(sorted(labels)) or 'none'}"

@@ -77,6 +77,8 @@ def _summary(one: Recorded, tasks: Sequence[str]) -> Summary:
     picked = np.linspace(0, one.frames - 1, min(one.frames, MOST_SNAPSHOTS)).astype(int) if snapshots else None
     features = {}
     for name, arrays in ARRAYS.items():
+        if not set(arrays) <= set(held):
+            continue  # a gel that was solved has no code
         values = np.concatenate([np.nan_to_num(held[array]).reshape(one.frames, -1) for array in arrays], axis=1)
         features[name] = values[picked] if picked is not None else _changes(values, max(1, FIRST // one.every))[None]
     at = picked if picked is not None else np.linspace(0, one.frames - 1, PARTS + 1).astype(int)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .summary import ARRAYS, PICTURE, RAW, Summary
+from .summary import RAW, Summary
 
 RANDOM = "best of ten random maps of the electrodes"
 ALWAYS = "always the commonest"
@@ -33,6 +33,15 @@ class Row:
         return vars(self) | {"right": round(self.right, 4), "error": round(self.error, 4)}
 
 
+def installed() -> bool:
+    """Return whether scikit-learn is there and works."""
+    try:
+        import sklearn.svm  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
     """Tell a label by each kind of numbers, with whole groups of recordings left out.
 
@@ -47,7 +56,7 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
     labels, groups = labels[use], groups[use]
     if len(use) < FEWEST or len(set(labels)) < 2 or len(set(groups)) < 2:
         return []
-    by = {name: np.concatenate([one.features[name] for one, _ in told])[use] for name in (*ARRAYS, PICTURE)}
+    by = {name: np.concatenate([one.features[name] for one, _ in told])[use] for name in told[0][0].features}
     rng = np.random.default_rng(0)
     maps = [by[RAW] @ rng.standard_normal((by[RAW].shape[1], WIDTH)) for _ in range(MAPS)]
     found: dict[str, float] = {}

@@ -72,7 +72,7 @@ def test_the_card_says_what_was_made_what_failed_and_whose_it_is(made):
     text = (made / "README.md").read_text()
     assert text.index("> Simulated.") < text.index("## What is here")
     assert "train: 8 recordings, 240 frames" in text and "1 other files of the folder were left alone" in text
-    assert "ball_broken" in text and "Two <objects>" in text and "not stated" in text
+    assert "ball_broken" in text and "Two &lt;objects>" in text and "not stated" in text
     assert re.search(r"\| object \(2\) \| electrodes \| 1\.00 \|", text)  # a press and a roll are easily told
 
 
@@ -125,7 +125,11 @@ def test_the_example_learns_from_the_pictures(made):
         (("every = 2", "evry = 2"), "evry"),
         (('"tactile-dataset-1"', '"tactile-dataset-9"'), "tactile-dataset-1"),
         (('"{object}_{session}.npz"', '"{object}_{session}.mat"'), "expected {object}_{session}.mat"),
-        (('"rest.npz"', '"{object}_rest.npz"'), "ball_rest.npz: missing"),
+        (('"rest.npz"', '"away.npz"'), "away.npz: missing"),
+        (('"rest.npz"', '"{session}_rest.npz"'), "unit.by"),
+        (('"{object}_{session}.npz"', '"{confidence}_{session}.npz"'), "none of"),
+        (('"{object}_{session}.npz"', '"{1}_{session}.npz"'), "named as in Python"),
+        (("every = 2", 'every = 2\nsensor = "biotac_sp"'), "a recording of a BioTac; expected one of a BioTac SP"),
         (('rest = "rest.npz"\n', ""), "both or none"),
     ],
 )
@@ -159,6 +163,115 @@ def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_p
     found = collected.collect(recipe, folder, tmp_path / "out")
     expected = {(name, str(session)) for name in OBJECTS for session in range(SESSIONS)}
     assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
+
+
+def small(folder: Path, recipe: Path, tmp_path: Path, *changes: tuple[str, str]) -> tuple[Path, Path, Path]:
+    """Two recordings and the rest, a recipe changed so, and where the result goes."""
+    (tmp_path / "in").mkdir()
+    for name in ("ball_0", "rolled_4", "rest"):
+        shutil.copy(folder / f"{name}.npz", tmp_path / "in")
+    text = recipe.read_text().replace("every = 2", "every = 20")
+    for change in changes:
+        text = text.replace(*change)
+    (tmp_path / "own.toml").write_text(text)
+    return tmp_path / "own.toml", tmp_path / "in", tmp_path / "out"
+
+
+def run(recipe: Path, folder: Path, out: Path, *more: str) -> int:
+    return main(["dataset", str(recipe), str(folder), "--out", str(out), *more])
+
+
+def test_files_of_others_are_never_replaced(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path)
+    for name in ("README.md", "imagefolder/mine.txt"):
+        shutil.rmtree(own[2], ignore_errors=True)
+        (own[2] / name).parent.mkdir(parents=True)
+        (own[2] / name).write_text("mine")
+        assert run(*own) == 2
+        assert (own[2] / name).read_text() == "mine"
+        assert "expected" in capsys.readouterr().err
+
+
+def test_other_labels_force_and_rest_are_never_old_ones(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path, ("tasks =", 'force = "{object}.txt"\ntasks ='))
+    np.savetxt(own[1] / "ball.txt", np.linspace(0, 2, 60))
+    assert run(*own) == 0
+    assert metadata(own[2] / "imagefolder" / "train")[1]["measured_force_n"] == "0.678"
+    np.savetxt(own[1] / "ball.txt", np.linspace(0, 4, 60))
+    assert run(*own) == 0
+    assert metadata(own[2] / "imagefolder" / "train")[1]["measured_force_n"] == "1.356"
+    own[0].write_text(own[0].read_text().replace("object", "thing"))
+    assert run(*own) == 0
+    assert metadata(own[2] / "imagefolder" / "train")[0]["thing"] == "ball"
+    (own[1] / "ball.txt").write_text("no force")  # told, and the rest is done
+    assert run(*own) == 0
+    assert "measured_force_n" not in metadata(own[2] / "imagefolder" / "train")[0]
+    assert "ball.txt" in (own[2] / "README.md").read_text()
+    still = np.random.default_rng(1).integers(2990, 3010, (60, 19))
+    np.savez(own[1] / "rest.npz", electrodes=still, time=np.arange(60) / 100)
+    capsys.readouterr()
+    assert run(*own) == 2
+    assert "holds another job" in capsys.readouterr().err
+
+
+def test_a_rest_beside_each_session_is_no_rest_of_all(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path)
+    for number, name in enumerate(("ball_0", "rolled_4")):
+        (own[1] / str(number)).mkdir()
+        shutil.move(own[1] / f"{name}.npz", own[1] / str(number))
+        shutil.copy(own[1] / "rest.npz", own[1] / str(number))
+    assert run(*own) == 2
+    assert "one rest for all recordings of a unit" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_links_to_one_file_keep_labels_of_their_own(folder, recipe, tmp_path):
+    own = small(folder, recipe, tmp_path)
+    (own[1] / "rolled_4.npz").unlink()
+    (own[1] / "rolled_4.npz").symlink_to(own[1] / "ball_0.npz")
+    (own[1] / "gone_1.npz").symlink_to(own[1] / "nowhere")
+    assert run(*own) == 2  # one file is not there
+    held = {row["object"]: split for split in ("train", "test") for row in metadata(own[2] / "imagefolder" / split)}
+    assert held == {"ball": "train", "rolled": "test"}
+
+
+def test_a_broken_file_takes_no_unit_with_it(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path, ('found = "rest"', 'found = "adapt"'))
+    (own[1] / "ball_3.npz").write_bytes(b"x")
+    assert run(*own) == 2
+    assert "ball_3.npz" in capsys.readouterr().err
+    assert len(metadata(own[2] / "imagefolder" / "train")) == 3
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_a_name_that_no_table_can_hold_is_left_out(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path)
+    shutil.copy(own[1] / "ball_0.npz", own[1] / os.fsdecode(b"ball_\xff.npz"))
+    assert run(*own) == 2
+    assert "no UTF-8" in capsys.readouterr().err
+    assert len(metadata(own[2] / "imagefolder" / "train")) == 3
+
+
+def test_another_gel_is_a_target(folder, recipe, tmp_path):
+    pytest.importorskip("scipy", reason="scipy is not installed")
+    own = small(folder, recipe, tmp_path)
+    assert run(*own, "--target", "gelsight_mini", "--to", "imagefolder,npz") == 0
+    with np.load(own[2] / "npz" / "00000_ball_0.npz") as arrays:
+        assert "expected_error_gelsight_mini" in arrays and "latent_gelsight_mini" not in arrays
+
+
+def test_odd_units_stay_inside_the_result(folder, recipe, tmp_path):
+    own = small(folder, recipe, tmp_path, ("[unit]", '[unit]\nby = "object"'))
+    shutil.move(own[1] / "rolled_4.npz", own[1] / "a .._4.npz")
+    assert run(*own) == 0
+    names = {"README.md", "index.html", "dataset.json", "imagefolder", "jobs", "units"}
+    assert {path.name for path in own[2].iterdir()} == names
+
+
+def test_a_folder_inside_the_result_is_refused(folder, recipe, tmp_path, capsys):
+    own = small(folder, recipe, tmp_path)
+    assert run(own[0], own[1], tmp_path) == 2
+    assert "inside --out" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
