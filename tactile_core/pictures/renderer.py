@@ -13,7 +13,6 @@ from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS
 from .background import correction, raised_light, resting_picture
-from .camera_curve import ENDS, SHOULDER, TOE, curved
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
 from .light import Lamps
@@ -159,8 +158,6 @@ class Renderer:
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
 
-        Between toe and shoulder, see ``camera_curve``.
-
         noise : makes the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
         """
@@ -177,7 +174,6 @@ class Renderer:
             return picture
         levels = self.in_levels(radiance - self.rest_radiance)
         levels += self.background
-        levels = curved(levels, self.background)
         if marks is not None:
             levels *= marks[..., None]
         if noise is not None:
@@ -242,7 +238,7 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 def _fill_levels(radiance, rest, response, background, largest, picture):  # noqa: ANN001, ANN202
     """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W)."""
     leds, height, width = radiance.shape
-    lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
+    lowest, line = np.float32(0), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)
     for row in range(height):  # a row stays in the processor's cache
         for led in range(leds):
@@ -254,15 +250,7 @@ def _fill_levels(radiance, rest, response, background, largest, picture):  # noq
                 for column in range(width):
                     level[column] += response[channel, led, row, column] * change[led, column]
             for column in range(width):
-                line[3 * column + channel] = level[column] + background[row, 3 * column + channel]
-        for k in range(3 * width):  # as ``curved``
-            if line[k] < np.float32(TOE) * background[row, k]:
-                toe = max(np.float32(TOE) * background[row, k], np.float32(ENDS))
-                line[k] = toe * np.exp(line[k] / toe - one)
-            elif line[k] > np.float32(SHOULDER):
-                room = max(largest - max(background[row, k], np.float32(SHOULDER)), np.float32(ENDS))
-                if line[k] > largest - room:
-                    line[k] = largest - room * np.exp((largest - line[k]) / room - one)
+                line[3 * column + channel] = level[column]
         for k in range(3 * width):
-            value = np.rint(line[k])
+            value = np.rint(line[k] + background[row, k])
             picture[row, k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised

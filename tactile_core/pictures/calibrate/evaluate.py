@@ -15,7 +15,6 @@ import numpy as np
 from ...accuracy import Row, row
 from ...errors import TactileError
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
-from ..camera_curve import curved
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .photo_metrics import metrics
 from .photographs import Photographs, Press
@@ -121,8 +120,7 @@ def _try_press(
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
     """Picture (H, W, 3) uint8 of a change in levels, and its metrics; the baseline knows how light drifted as well."""
-    untouched = background + press.drift
-    picture = np.rint(curved(untouched + change, untouched)).clip(0, LARGEST_LEVEL).astype(np.uint8)
+    picture = np.rint(background + press.drift + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 
