@@ -165,11 +165,6 @@ def astoml_value(unit: Calibration) -> str:
     """Format a calibration, numbers with six digits; a photograph is named as it lies beside the file."""
     camera, coating, response = unit.camera, unit.coating, unit.response
     sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"
-    leds = "\n".join(
-        f"{led.colour} = {{ position_mm = {toml_value(led.position, MM)}, radius_mm = {toml_value(led.radius, MM)},"
-        f" radiance = {toml_value(led.radiance)} }}"
-        for led in unit.leds
-    )
     ambient = "\n".join(f"{colour} = {toml_value(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))
     return f"""\
 # A {describe(camera.sensor).title} unit: picture = response(right, down) x radiance of the coating + ambient light, 8-bit values.
@@ -189,7 +184,7 @@ right_z = {camera.right_z}  # the way z goes to the right
 down_x = {camera.down_x}  # the way x goes down
 
 [leds]  # spheres: right, down, toward the camera; radiance of their surface in levels of their own channel
-{leds}
+{_leds(unit)}
 
 [response]  # of the camera, levels a level: a row a channel of the picture, a column an LED
 centre = {toml_value(response.centre)}
@@ -224,6 +219,14 @@ photograph = {toml_value(Path(unit.photograph).name)}
 levels = {toml_value(unit.noise)}
 
 {_fit(unit.fit)}"""  # noqa: E501
+
+
+def _leds(unit: Calibration) -> str:
+    return "\n".join(
+        f"{led.colour} = {{ position_mm = {toml_value(led.position, MM)}, radius_mm = {toml_value(led.radius, MM)},"
+        f" radiance = {toml_value(led.radiance)} }}"
+        for led in unit.leds
+    )
 
 
 def _markers(markers: Markers) -> str:

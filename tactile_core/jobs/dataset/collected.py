@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import logging
 import os
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...errors import TactileError
+from ..engine import inputs
 from .recipe import FIELD, Recipe, filled
 
 TRAIN, TEST = "train", "test"
-log = logging.getLogger(__name__)
 HELD_OUT = 5  # one value in so many is for testing where the recipe names none (assumed)
 
 
@@ -62,9 +60,11 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
     names = [name for name in _names(folder) if not (folder / name).resolve().is_relative_to(out.resolve())]
     found, others, unfit = [], 0, {}
     for name in names:
+        if any(pattern.fullmatch(name) for pattern in aside):
+            continue
         fits = next((fit for pattern in patterns if (fit := pattern.fullmatch(name))), None)
-        if fits is None or any(pattern.fullmatch(name) for pattern in aside):
-            others += not any(pattern.fullmatch(name) for pattern in aside)
+        if fits is None:
+            others += 1
             continue
         if not _encodes(name):
             shown = name.encode(errors="backslashreplace").decode()
@@ -81,20 +81,12 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
 
 
 def _names(folder: Path) -> list[str]:
-    """Names of all files below a folder, relative to it."""
-
-    def refused(error: OSError) -> None:
-        """Log a warning for a folder that `os.walk` would skip silently."""
-        log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
-
-    def walked() -> Iterator[str]:
-        for place, folders, names in os.walk(folder, onerror=refused):
-            folders[:] = sorted(name for name in folders if not name.startswith("."))
-            for name in sorted(names):
-                if not name.startswith("."):
-                    yield Path(place, name).relative_to(folder).as_posix()
-
-    return sorted(walked())
+    """Names of all files below a folder, relative to it, sorted; hidden ones are left out."""
+    found = []
+    for place, folders, names in os.walk(folder, onerror=inputs.passed_over):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        found += [Path(place, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
+    return sorted(found)
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:

@@ -114,21 +114,21 @@ def _of_folder(folder: Path) -> Iterator[Path]:
 
     One that cannot be looked into, such as a disk's lost+found, is passed over with a warning.
     """
-
-    def refused(error: OSError) -> None:
-        """Log a warning for a folder that `os.walk` would skip silently."""
-        log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
-
     if _is_bag(folder):
         yield folder
         return
-    for place, folders, names in os.walk(folder, onerror=refused):
+    for place, folders, names in os.walk(folder, onerror=passed_over):
         bags = [name for name in folders if _is_bag(Path(place, name))]
         folders[:] = sorted(name for name in folders if name not in bags and not name.startswith("."))
         beside = BESIDE if any(name.endswith(SLIDE) for name in names) else ()
         files = [name for name in names if name.lower().endswith(FOLDER_ENDINGS) and not name.startswith(".")]
         for name in sorted([*bags, *(name for name in files if not name.endswith(beside))]):
             yield Path(place) / name
+
+
+def passed_over(error: OSError) -> None:
+    """Log a warning for a folder that `os.walk` would skip silently."""
+    log.warning("%s: cannot be looked into (%s), passed over", error.filename, error.strerror)
 
 
 def _is_bag(folder: Path) -> bool:

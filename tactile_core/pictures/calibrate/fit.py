@@ -6,7 +6,7 @@ On the fast picture first, then on Mitsuba's own, which has the light of one bou
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -93,18 +93,14 @@ def calibrate(
         search.fit(every, MitsubaPictures(working_preset(QUALITY, factor)), FINISHING_STEPS)
     fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
     if reflectance is not None:
-        coating = dataclasses.replace(fitted.coating, transmission=min(fitted.through / reflectance, 1.0))
-        fitted = dataclasses.replace(fitted, coating=coating, object_reflectance=reflectance)
+        fitted = _transmitting(fitted, reflectance)
     used = dataclasses.replace(photographs, presses=tuple(search.presses))
     tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
     progress(total, total)
     errors, unknown = search.identified(factor)
     metrics = {name: value for name, value in mean_metrics(tried)[0].items() if np.isfinite(value)}
     names = tuple(press.name for press in search.presses)
-    light, rest = "Mitsuba" if finish else "fast picture", "estimated" if photographs.estimated else "photographed"
-    balls = {f"{2e3 * press.radius:g}" for press in search.presses if press.radius is not None}
-    of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
-    note = f"{light}; {len(names)} presses{of}; background {rest}"
+    note = _note(search.presses, finish=finish, estimated=photographs.estimated)
     rest_radiance = Renderer(fitted, FAST).radiance(rest_height_map(fitted.camera))
     degree = AMBIENT_DEGREE if photographs.estimated else PHOTOGRAPHED_DEGREE
     calibration = dataclasses.replace(
@@ -119,6 +115,20 @@ def calibrate(
     if trouble:
         warnings = (f"fitted by the fast picture alone: {trouble}", *warnings)
     return Calibrated(calibration, tried, warnings)
+
+
+def _transmitting(unit: Calibration, reflectance: float) -> Calibration:
+    """Take the light of the object for that of one of this reflectance: the coating's transmission follows."""
+    coating = dataclasses.replace(unit.coating, transmission=min(unit.through / reflectance, 1.0))
+    return dataclasses.replace(unit, coating=coating, object_reflectance=reflectance)
+
+
+def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
+    """Say by what a calibration was fitted: which pictures, presses, balls and background."""
+    light, rest = "Mitsuba" if finish else "fast picture", "estimated" if estimated else "photographed"
+    balls = {f"{2e3 * press.radius:g}" for press in presses if press.radius is not None}
+    of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
+    return f"{light}; {len(presses)} presses{of}; background {rest}"
 
 
 class _Search:
