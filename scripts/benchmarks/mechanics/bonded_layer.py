@@ -46,19 +46,6 @@ def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
     return start + np.cumsum(step + growth * np.arange(count))
 
 
-def dimitriadis(depth: float, radius: float, thickness: float, youngs: float, poisson: float) -> float:
-    """Force, N, on a rigid ball on a bonded layer, small strain. Dimitriadis et al., Biophys. J. 82, 2002, eq. 13."""
-    chi = np.sqrt(radius * depth) / thickness
-    a = -(1.2876 - 1.4678 * poisson + 1.3442 * poisson**2) / (1 - poisson)
-    b = (0.6387 - 1.0277 * poisson + 1.5164 * poisson**2) / (1 - poisson)
-    series = (
-        1 - 2 * a / np.pi * chi + 4 * a**2 / np.pi**2 * chi**2
-        - 8 / np.pi**3 * (a**3 + 4 * np.pi**2 / 15 * b) * chi**3
-        + 16 * a / np.pi**4 * (a**3 + 3 * np.pi**2 / 5 * b) * chi**4
-    )  # fmt: skip
-    return float(4 / 3 * youngs / (1 - poisson**2) * np.sqrt(radius) * depth**1.5 * series)
-
-
 def exact_layer(
     depth: float, radius: float, thickness: float, youngs: float, poisson: float
 ) -> tuple[float, float, float]:

@@ -11,19 +11,15 @@ from tactile_core import accuracy
 from tactile_core.accuracy import Row, row
 from tactile_core.geometry.cubic_spline import EvenSpline
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, Placement, pose_at, thickness_under
-from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid
-from tactile_core.mechanics.solve import TIERS, Sensor, Solution, Step, Tier, solve, solve_path
+from tactile_core.mechanics.placement import FRICTION, Placement, pose_at, thickness_under
+from tactile_core.mechanics.solve import TIERS, Sensor, Solution, Step, Tier, solve_path
 from tactile_core.sensors import digit_surface
-
-from .incompressible import quality_rows
 
 # Targets (docs/sources.md, Targets): um rms and percent; the fast tier's shape up to 20 % depth, its force up to 40 %.
 SHAPE_TARGET, FAST_FORCE_TARGET, FULL_FORCE_TARGET = 5.0, 5.0, 1.0
 NORMAL_TARGET = 1.5  # degrees, mean inside the contact, point 2
 TIME_TARGETS = {("fast", "digit"): 2.5, ("fast", "biotac"): 3.5, ("full", "digit"): 1000.0, ("full", "biotac"): 1200.0}
 _BALL, _PLACE = Sphere(3.5e-3), Placement(-8e-3, 2e-3, 0.1, 1.0)
-_DEEPEST = DEPTH_LIMIT - 1e-6  # of the thickness
 _DEPTHS = {"digit": (0.2, 0.4, 0.6, 0.8, 1.2), "biotac": (0.3, 0.6, 0.9, 1.2)}  # mm
 
 
@@ -34,14 +30,6 @@ def rows(quick: bool) -> Iterator[Row]:
         yield from _sensor(sensor, [1e-3 * d for d in depths], 0.0)
         if not quick:
             yield from _sensor(sensor, [1e-3 * depths[2]], FRICTION)
-            yield from quality_rows(f"{sensor}_full", lambda sensor=sensor: _deepest(sensor))
-
-
-def _deepest(sensor: Sensor) -> tuple[FiniteStrainSolid, np.ndarray]:
-    """The full tier's solid and displacement under the ball at 60 % of the sensor's thickness."""
-    found = solve(sensor, _BALL, _PLACE, depth=_DEEPEST * thickness_of(sensor), tier="full")
-    solid, state = found.volume
-    return solid, state.displacement
 
 
 def thickness_of(sensor: Sensor) -> float:

@@ -16,19 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from benchmarks.measured_rows import finished, parser_of
-from benchmarks.mechanics import (
-    fluid,
-    golden,
-    hertz,
-    incompressible,
-    manufactured,
-    oracle,
-    patch,
-    symmetry,
-    thin_layers,
-    tiers,
-    work,
-)
+from benchmarks.mechanics import fluid, golden, hertz, manufactured, oracle, tiers
 from benchmarks.mechanics.mechanics_page import write
 from tactile_core.accuracy import HEADER, Row, line
 from tactile_core.accuracy import row as make_row
@@ -38,19 +26,11 @@ REPORT = ROOT / "docs" / "mechanics.md"
 
 # name -> function(quick) that yields rows, and what it shows, for the report
 CHECKS: dict[str, tuple[Callable[[bool], Iterator[Row]], str]] = {
-    "patch": (patch.rows, "Patch test: distorted cells reproduce an affine deformation, small and finite"),
     "order": (manufactured.rows, "Order of accuracy on a manufactured finite deformation (theory: 3 and 2)"),
     "oracle": (oracle.rows, "scikit-fem as oracle: the same equations assembled by another library"),
     "golden": (golden.rows, "Golden forces: a ball of 3.5 mm on a bonded layer of 3 mm, to 60 % of its thickness"),
     "hertz": (hertz.rows, "Hertz: a small contact on a deep block"),
-    "layers": (
-        thin_layers.rows,
-        "Bonded layers: Dimitriadis's formula, the exact solution, the thin incompressible limit",
-    ),
-    "work": (work.rows, "The indenter's work is the stored energy, and comes back"),
-    "symmetry": (symmetry.rows, "Turned and mirrored sensors give the turned and mirrored answer"),
     "fluid": (fluid.rows, "The fluid keeps its volume"),
-    "incompressible": (incompressible.rows, "Poisson's ratio up to .4999"),
     "tiers": (tiers.rows, "The fast and the full tier against the reference tier: error beside time"),
 }
 

@@ -18,23 +18,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.measured_rows import finished, parser_of, printed
-from benchmarks.translation import (
-    fluid_pressure,
-    grips,
-    made_up_units,
-    prints,
-    recordings,
-    sequence_rows,
-    slide_set,
-    test_set,
-    two_contact_rows,
-)
+from benchmarks.translation import grips, made_up_units, recordings, sequence_rows, test_set, two_contact_rows
 from benchmarks.translation.model_card import renew_model_card
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
-from tactile_core.recordings import electrode_gains, read
-from tactile_core.recordings.electrode_gains import ElectrodeGains
-from tactile_core.recordings.preparer import Preparer
+from tactile_core.recordings import electrode_gains
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import our_bodies
 from tactile_core.translation import translate
@@ -84,14 +72,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
         return grips.rows(folder, network, read_pairs(options.test_set))
     sensor = None if file is None else electrode_gains.read(file).gains_for(folder, "unit", file)
     most = QUICK if options.quick else None
-    found = recordings.rows(folder, network, options.out, most, sensor)
-    found += _slide_prints(folder, network, most, sensor)
-    return [*found, *fluid_pressure.slide_rows(folder, network, most, sensor)]
-
-
-def _slide_prints(folder: Path, network: Translator, most: int | None, sensor: ElectrodeGains | None) -> list[Row]:
-    paths = slide_set.reporting(folder)[:most]
-    return prints.rows("recordings", (Preparer(None, sensor)(read(path)) for path in paths), network)
+    return recordings.rows(folder, network, options.out, most, sensor)
 
 
 def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:

@@ -28,7 +28,6 @@ from tactile_core.translation.simulated_likeness import residual_shares, unlike
 from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translator, contact_center
 
-from . import fluid_pressure, prints
 from .test_set import as_read
 
 PATTERN = "*_HOLD.mat"  # <object>_<number>_<trial>_HOLD.mat
@@ -72,11 +71,8 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
     prepared = [
         Preparer(None, sensor.gains_for(one, f"finger{finger}", SOFT))(recordings.read(one)) for one, finger in held
     ]
-    every = [Preparer(None, sensor.gains_for(one, f"finger{finger}", SOFT))(recordings.read(one)) for path in files
-             if _trial(path) in REPORTING for finger, one in enumerate(each_finger(path))]  # fmt: skip
     found = [*_place_rows(hard, network, sensor), _simulated_place_row(network, simulated)]
-    found += prints.rows("grip", prepared, network)
-    return [*found, fluid_pressure.grip_row(every, network), _unexplained_row(held, prepared)]
+    return [*found, _unexplained_row(held, prepared)]
 
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
