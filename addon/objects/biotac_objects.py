@@ -8,7 +8,7 @@ import numpy as np
 from ...tactile_core import sensors
 from ...tactile_core.geometry.lattice import grid_faces
 from ..settings import properties
-from . import axes, styles, surfaces
+from . import axes, sensor_bodies, styles, surfaces
 
 SKIN_COLOUR = (0.25, 0.55, 0.45, 0.35)  # see-through, so that core and electrodes show
 CORE_COLOUR = (0.08, 0.08, 0.1, 1.0)
@@ -36,7 +36,7 @@ def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensor
 
 
 def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.Object:
-    """Add the rigid core under the pad, a child of the skin."""
+    """Add the rigid core under the pad, and the bone and nail that hold it: children of the skin."""
     sensor = properties.sensor_name(skin)
     shape = sensors.skin_of(sensor)
     known = shape.descriptor.core
@@ -55,4 +55,5 @@ def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.O
     group.objects.link(core)
     core.parent = skin
     surfaces.paint(core, CORE_COLOUR)
+    sensor_bodies.add_parts(skin)
     return core

@@ -1,6 +1,6 @@
 """Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with.
 
-Packages, acrylic and housing shine and reflect toward a camera alone: what they give the gel is part of the light held
+Acrylic and housing reflect toward a camera alone: what they give the gel is part of the light held
 in it (``held_light``), as the calibration counts it.
 """
 
@@ -11,6 +11,7 @@ import bpy
 from ...tactile_core.sensors.calibration import DIFFUSE, Coating
 from .surfaces import new_material
 
+LIT = "Lit by LEDs"  # attribute of a gel's points, 1: only these have an outer side with LEDs below it
 ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
 _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
 
@@ -30,8 +31,28 @@ def new_coating(coating: Coating) -> bpy.types.Material:
         node.name = node.label = name
         node.location = _PLACES[name]
         links.new(node.outputs[0], shader.inputs[socket])
+    keep_leds_inside(material)
     set_coating(material, coating)
     return material
+
+
+def keep_leds_inside(material: bpy.types.Material) -> None:
+    """Tilt the normals of a lit gel's outer side up, so that LEDs below its rim do not colour it; its inner side stays.
+
+    Light goes through the whole body, so that the gel's outer side has no shadow from it either.
+    """
+    nodes = material.node_tree.nodes
+    lit, own, turn = (nodes.new(f"ShaderNode{kind}") for kind in ("Attribute", "TexCoord", "VectorTransform"))
+    lit.attribute_name = LIT
+    turn.vector_type, turn.convert_from, turn.convert_to = "NORMAL", "OBJECT", "WORLD"
+    outer = math(material, "SUBTRACT", 1.0, nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"])
+    up = math(
+        material, "SCALE", (0.0, 0.0, 1.0), math(material, "MULTIPLY", lit.outputs["Fac"], outer), kind="VectorMath"
+    )
+    tilted = math(material, "ADD", own.outputs["Normal"], up, kind="VectorMath")
+    material.node_tree.links.new(tilted, turn.inputs[0])
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    material.node_tree.links.new(turn.outputs[0], shader.inputs["Normal"])
 
 
 def set_coating(material: bpy.types.Material, coating: Coating) -> None:
@@ -48,20 +69,6 @@ def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
     """Return the coating's numbers as sockets, by name, without those whose node was deleted."""
     nodes = material.node_tree.nodes
     return {name: nodes[name].outputs[0] for name in _PLACES if name in nodes}
-
-
-def glow() -> bpy.types.Material:
-    """An LED package that shines in its object's colour."""
-    found = bpy.data.materials.get("DIGIT LED")
-    if found is not None:
-        return found
-    material, shader = _new("DIGIT LED", (1, 1, 1, 1))
-    colour = material.node_tree.nodes.new("ShaderNodeObjectInfo")
-    material.node_tree.links.new(colour.outputs["Color"], shader.inputs["Emission Color"])
-    shader.inputs["Base Color"].default_value, shader.inputs["Specular IOR Level"].default_value = (0, 0, 0, 1), 0.0
-    # Shows as lit; the lamp is what lights the gel.
-    material.node_tree.links.new(toward_camera(material, 20.0), shader.inputs["Emission Strength"])
-    return material
 
 
 def acrylic() -> bpy.types.Material:
@@ -85,14 +92,18 @@ def acrylic() -> bpy.types.Material:
     return material
 
 
-def housing() -> bpy.types.Material:
-    """Black plastic."""
-    found = bpy.data.materials.get("DIGIT housing")
+def of_body(name: str, colour: list[float], roughness: float, metallic: float = 0.0) -> bpy.types.Material:
+    """A material of the table ``materials`` of ``sensor_bodies.toml``."""
+    label = f"Tactile {name}"
+    found = bpy.data.materials.get(label)
     if found is not None:
         return found
-    material, shader = _new("DIGIT housing", (0.03, 0.03, 0.035, 1.0))
-    shader.inputs["Roughness"].default_value = 0.45
-    material.node_tree.links.new(toward_camera(material, 0.015), shader.inputs["Base Color"])
+    material, shader = _new(label, (*colour, 1.0))
+    shader.inputs["Roughness"].default_value, shader.inputs["Metallic"].default_value = roughness, metallic
+    own = material.node_tree.nodes.new("ShaderNodeRGB").outputs[0]
+    own.default_value = (*colour, 1.0)
+    ray = toward_camera(material, 1.0)
+    material.node_tree.links.new(math(material, "SCALE", own, ray, kind="VectorMath"), shader.inputs["Base Color"])
     material.node_tree.links.new(toward_camera(material, 0.5), shader.inputs["Specular IOR Level"])
     return material
 

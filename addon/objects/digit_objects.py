@@ -13,7 +13,7 @@ from .style_nodes import DISPLACEMENT
 
 GEL_COLOUR = (0.75, 0.75, 0.78, 1.0)
 _BEHIND = 60e-3  # m between the gels of one skin along the finger: a housing, and the legend at its base
-BESIDE = 7.1e-3 + 23e-3 + 5e-3  # m: half widths of BioTac (docs/sources.md) and of a housing round the LEDs, a gap
+BESIDE = 35.1e-3  # m between skin and gel: a legend's width, and a gap
 
 
 def add_gel(

@@ -30,6 +30,8 @@ def write(gel: bpy.types.Object, unit: Calibration) -> None:
     """Give the gel's points a unit's held light, in place of another's."""
     levels = held_light(unit)
     mesh = gel.data
+    lit = mesh.attributes.get(digit_materials.LIT) or mesh.attributes.new(digit_materials.LIT, "FLOAT", "POINT")
+    lit.data.foreach_set("value", np.ones(len(levels), np.float32))
     for k, colour in enumerate(COLOURS):
         name = attribute(colour)
         held = mesh.attributes.get(name) or mesh.attributes.new(name, "FLOAT_VECTOR", "POINT")

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import bpy
 
-from . import electrode_markers, frame_attribute
+from . import digit_materials, electrode_markers, frame_attribute
 from .node_group import NodeGroup
 from .surfaces import new_material
 
@@ -99,6 +99,8 @@ def _material(name: str, takes: str) -> bpy.types.Material:
     colour = made.node_tree.nodes.new("ShaderNodeVertexColor")
     colour.layer_name = COLOUR
     made.node_tree.links.new(colour.outputs["Color"], shader.inputs[takes])
+    if name == MATERIAL:
+        digit_materials.keep_leds_inside(made)
     return made
 
 

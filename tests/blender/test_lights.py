@@ -118,6 +118,18 @@ def test_leds_light_the_gel_and_not_a_wall_beside_it(gel, by_cycles):
     assert linked < 0.02 * unlinked and unlinked > 1  # level; what is left is thrown on by the gel's rim
 
 
+@pytest.mark.parametrize("style", ["NONE", "DISPLACEMENT"])
+def test_leds_leave_the_outer_side_dark(gel, by_cycles, style):
+    bpy.ops.tactile.set_style(style=style)
+    for part in gel.children_recursive:
+        part.hide_render |= part.tactile.role == "LEGEND"
+    eye = bpy.data.objects.new("eye", bpy.data.cameras.new("eye"))
+    bpy.context.scene.collection.objects.link(eye)
+    eye.location, eye.data.type, eye.data.ortho_scale = (-7.5, 0, 60), "ORTHO", 32
+    bpy.context.scene.camera = eye
+    assert by_cycles().max() < 2  # levels; a rim that they colour has hundreds
+
+
 def test_parts_made_later_stand_in_the_scenes_collection(gel):
     bpy.data.objects.remove(lamp("red"))
     bpy.ops.tactile.reset_to_calibration()
