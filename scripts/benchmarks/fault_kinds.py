@@ -18,18 +18,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from benchmarks.fault_bench import (
-    LONG,
-    MOST,
-    TACTILE,
-    Bench,
-    Lost,
-    call,
-    contents,
-    start,
-    workers_of,
-    write_hdf5,
-)
+from benchmarks.fault_bench import LONG, MOST, TACTILE, Bench, Lost, call, contents, start, workers_of, write_hdf5
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine import tasks

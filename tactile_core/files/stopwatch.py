@@ -29,10 +29,7 @@ class Stopwatch:
 
         ``ms_a_frame`` is by the clock on the wall, ``cpu_ms_a_frame`` by the CPU: on a busy machine the second is less.
         """
-        return {
-            "ms_a_frame": _per_frame(self.seconds, count),
-            "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count),
-        }
+        return {"ms_a_frame": _per_frame(self.seconds, count), "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count)}
 
 
 def _per_frame(seconds: dict[str, float], count: int) -> dict[str, float]:

@@ -65,7 +65,7 @@ KEPT = {
         "traction_force": ("N", "(T, 3) what traction_digit adds up to: as large as force, along the gel's own shear"),
     },
     "marker_motion": {
-        "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: n pairs, px"),
+        "marker_motion": ("px", "(T, n, 2) right and down, of the gel's dots, row by row; attribute rest: n pairs, px")
     },
     SAMPLES: {
         "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),

@@ -59,9 +59,7 @@ def is_scene(path: Path) -> bool:
 
 
 def read_frames(
-    path: str | os.PathLike,
-    progress: Progress = lambda: nullcontext(lambda done, total: None),
-    gel: str = TARGET,
+    path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 

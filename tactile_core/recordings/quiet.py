@@ -182,13 +182,7 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
 
 
 def _tracked(
-    sums: np.ndarray,
-    n: int,
-    middle: np.ndarray,
-    possible: np.ndarray,
-    anchor: int,
-    level: float,
-    rate: float,
+    sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
     """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
 

@@ -136,14 +136,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
     time, truth = _times(store, frames), _truth(store, frames)
     columns: dict[str, Any] = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
     return assemble(
-        store.path,
-        layout,
-        electrodes=electrodes,
-        stamps=time,
-        truth=truth,
-        simulated=True,
-        about=about,
-        **columns,
+        store.path, layout, electrodes=electrodes, stamps=time, truth=truth, simulated=True, about=about, **columns
     )
 
 

@@ -11,11 +11,7 @@ from ..sensors import SAMPLE_RATE
 Unit = Literal["s", "ms", "us", "ns"]
 SECONDS: dict[Unit, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 WORDS: dict[Unit, str] = {"ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
-UNIX: dict[Unit, float] = {
-    "ns": 1e17,
-    "us": 1e14,
-    "ms": 1e11,
-}  # least stamp of unix time in that unit: of 1973
+UNIX: dict[Unit, float] = {"ns": 1e17, "us": 1e14, "ms": 1e11}  # least stamp of unix time in that unit: of 1973
 SINCE_1970 = 1e8  # s; below: seconds since something else
 LIKELY = 25.0, 500.0  # Hz; drivers of a BioTac give 100 frames a second, some loggers fewer or twice as many (assumed)
 SHARED = 0.5  # of the frames that have the stamp of the one before: the clock is coarser than the frames (assumed)

@@ -27,12 +27,7 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 
 
 def press_rows(
-    scene: Scene,
-    seed: int,
-    press: int,
-    electrodes: str = SHEET,
-    pair: tuple[str, str] = PAIR,
-    keep: Sequence[str] = (),
+    scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
     """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
 
@@ -135,11 +130,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 
 
 def pair_row(
-    biotac: Solution,
-    digit: Solution,
-    electrodes: str = SHEET,
-    pair: tuple[str, str] = PAIR,
-    keep: Sequence[str] = (),
+    biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
     """Arrays stored of one paired contact, as in the file, see ``units``. Electrodes' films are not corrected.
 

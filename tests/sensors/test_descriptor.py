@@ -52,11 +52,7 @@ def test_decimals_are_shifted_before_they_are_rounded():
         ("youngs_mpa = 4.1", "youngs_mpa = 4.1e6", "material, youngs_mpa: 4.1E+6; expected above 0.0001 and below 100"),
         ("shift_x_mm = 13.97", "shift_x_mm = inf", "frame, shift_x_mm: Infinity; expected a finite number"),
         ("lateral_sign = 1", "lateral_sign = 0", "frame, lateral_sign: 0; expected 1 or -1"),
-        (
-            "tip_x_mm = -14.0",
-            "tip_x_mm = 14.0",
-            "skin, along x: -21.3, -19.725, 14, 1.2, 5.08, 6.65 mm; expected",
-        ),
+        ("tip_x_mm = -14.0", "tip_x_mm = 14.0", "skin, along x: -21.3, -19.725, 14, 1.2, 5.08, 6.65 mm; expected"),
         ("bits = 12", "bits = 12.5", "readout, bits"),
         ("inner_poles_mm = [-19.725, 5.08]", "inner_poles_mm = [5.08]", "a list of 2"),
         ('polarity = "falls"', 'polarity = "down"', "falls or rises"),
@@ -205,21 +201,13 @@ def test_a_row_of_electrodes_that_is_none_is_named(tmp_path, row):
         ("window_z_mm = [-6.6, 6.6]", "window_z_mm = [-6.6, 6.5]", "window_z_mm: [-6.6, 6.5]; expected even about 0"),
         ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-16.2, 5]", "window_x_mm: [-16.2, 5]; expected growing"),
         ("window_x_mm = [-16.2, 1.2]", "window_x_mm = [-19, 1.2]", "corners inside the round tip"),
-        (
-            "corner_radius_mm = 1.15",
-            "corner_radius_mm = 20",
-            "corner_radius_mm: 20; expected below half_width_mm",
-        ),
+        ("corner_radius_mm = 1.15", "corner_radius_mm = 20", "corner_radius_mm: 20; expected below half_width_mm"),
         (
             "height_zero_y_mm = -8.301",
             "height_zero_y_mm = 0",
             "camera, height_zero_y_mm: 0; expected -8.2965, back_y_mm less thickness_mm, within 0.2",
         ),
-        (
-            "half_width_mm = 9.17",
-            "half_width_mm = 0.00917",
-            "half_width_mm: 0.00917; expected above 0.05",
-        ),
+        ("half_width_mm = 9.17", "half_width_mm = 0.00917", "half_width_mm: 0.00917; expected above 0.05"),
     ],
 )
 def test_a_gel_that_cannot_be_is_refused(tmp_path, old, new, words):

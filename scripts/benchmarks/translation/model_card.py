@@ -54,8 +54,7 @@ def renew_model_card(
     renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
     write_table(
-        page.with_suffix(".csv"),
-        {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen},
+        page.with_suffix(".csv"), {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen}
     )
     atomic.write_bytes(page.with_name(PICTURE), _cases(translator, pairs))
 

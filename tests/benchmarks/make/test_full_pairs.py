@@ -116,10 +116,7 @@ def test_the_film_is_that_of_the_linear_model_for_a_small_force():
     full = solve("biotac", BALL, pose, depth=0.1e-3, tier="full", friction=0.0)
     linear = ContactProblem(compliance, BALL, pose, 0.1e-3).at_depth(0.1e-3)
     rest = electrode_feet().gap
-    per_newton = [
-        (full.electrode_gaps - rest) / full.axial_force,
-        (linear.electrode_gaps - rest) / linear.axial_force,
-    ]
+    per_newton = [(full.electrode_gaps - rest) / full.axial_force, (linear.electrode_gaps - rest) / linear.axial_force]
     assert np.linalg.norm(per_newton[0] - per_newton[1]) < 0.12 * np.linalg.norm(per_newton[0])
 
 

@@ -36,11 +36,7 @@ PARTS = (
     (Sphere(1e-3), Pose(np.array([-3e-3, 0, 0]), np.eye(3))),
     (Box((2e-3, 3e-3, 1e-3), 0.2e-3), Pose(np.array([3e-3, 0, 2e-3]), LEANING)),
 )
-SHAPES = CONVEX | {
-    "ring": RING,
-    "bumpy cube": BumpyCube(14e-3, 1e-3, 1e-3, 0.5e-3, 3e-3),
-    "several": Several(PARTS),
-}
+SHAPES = CONVEX | {"ring": RING, "bumpy cube": BumpyCube(14e-3, 1e-3, 1e-3, 0.5e-3, 3e-3), "several": Several(PARTS)}
 every_shape = pytest.mark.parametrize("indenter", SHAPES.values(), ids=SHAPES)
 every_convex = pytest.mark.parametrize("indenter", CONVEX.values(), ids=CONVEX)
 
