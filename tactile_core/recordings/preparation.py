@@ -22,7 +22,7 @@ from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_
 from .signal_kind import detect, full_scale
 from .signals import EVERY, PrepareOptions, Rest, Signals, typical
 from .unit import contact_law, film, pressure_counts
-from .unit.loaded_rest import as_contact
+from .unit.contact_law import as_contact
 
 # Frames to smooth over where the user gives none. Rectified signals need it: folded noise does not average out in the
 # networks.

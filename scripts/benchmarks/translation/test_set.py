@@ -22,7 +22,6 @@ from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, posterior_rows, rectified_rows
-from .mechanics_rows import mechanics_rows
 from .slide_metrics import rank_correlation
 
 # Targets (docs/sources.md, Targets), without shear, depth bins and indenters alike.
@@ -58,7 +57,6 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         at = pairs.indenter == number
         each = {metric: np.where(at, columns[metric], np.nan) for metric in (*EACH_INDENTER, *BASELINE_METRICS)}
         found += [one for one in metric_rows(each, pairs, rows, name, {}) if one["value"] is not None]
-    found += mechanics_rows(pairs, bodies)
     return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
 
 

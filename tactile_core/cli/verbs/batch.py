@@ -176,14 +176,15 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     from ...recordings import electrode_gains
     from ...translation.answer import parse_answer
 
-    keep = results.parse_keep("latent,displacement" if options.keep is None else options.keep)
-    sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
-    asked = translate_recipe.Asked(
-        keep, Prepare(**prepare_words(options)), sensor, options.weights, options.calibration, options.target,
-        options.preset, parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples),
-        options.gel, SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
+    return translate_recipe.make(
+        paths, say,
+        keep=results.parse_keep("latent,displacement" if options.keep is None else options.keep),
+        sensor=None if options.sensor is None else electrode_gains.read(options.sensor),
+        prepare=Prepare(**prepare_words(options)),
+        weights=options.weights, calibration=options.calibration, target=options.target, preset=options.preset,
+        answer=parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples),
+        gel=options.gel, shard_frames=SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
     )  # fmt: skip
-    return translate_recipe.make(asked, paths, say)
 
 
 def _status(folder: Path, job: Job) -> int:

@@ -28,7 +28,7 @@ from ..engine import job as jobs
 from ..engine import run as runs
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
-from . import dataset_card, dataset_page, summary, survival
+from . import dataset_card, summary, survival
 from .collected import TEST, TRAIN, Collected, File, beside, collect
 from .recipe import FORCE, Recipe
 from .set_units import calibrated, file_name, readable
@@ -124,14 +124,15 @@ def _translated(
     """Translate a unit's recordings as a job, or go on with it."""
     paths = [file.path for file in files]
     place = out / JOBS / (file_name(unit) or ALL)
-    want = translate_recipe.Asked(
-        KEEP, recipe.prepare, sensor, asked.weights, asked.calibration, asked.target, asked.preset,
-        Answer(frames_apart=recipe.snapshots), every=recipe.every,
-    )  # fmt: skip
     with runs.opened(place, None):
         with asked.bar("reading", "file") as shown:
             listed = inputs.hashed(paths, shown)
-        job = jobs.make(listed, translate_recipe.make(want, paths, asked.say), asked.weights, asked.calibration)
+        wanted = translate_recipe.make(
+            paths, asked.say, keep=KEEP, prepare=recipe.prepare, sensor=sensor, weights=asked.weights,
+            calibration=asked.calibration, target=asked.target, preset=asked.preset,
+            answer=Answer(frames_apart=recipe.snapshots), every=recipe.every,
+        )  # fmt: skip
+        job = jobs.make(listed, wanted, asked.weights, asked.calibration)
         if not jobs.exists(place):
             jobs.write(place, job)
         elif jobs.read(place).id != job.id:
@@ -221,10 +222,10 @@ def _write_words(
     if survival.installed():
         with asked.bar("what survives", "step") as shown:
             rows = [row for task in recipe.tasks for row in survival.rows(task, summaries, recipe.split.kept, shown)]
-    text = dataset_card.written(recipe, named, found, source, summaries, rows, asked.layouts)
+    text = dataset_card.card_of(recipe, named, found, source, summaries, rows, asked.layouts)
     with atomic.writing(out):
         atomic.write_bytes(out / CARD, text.encode())
         with asked.bar("page", "recording") as shown:
-            atomic.write_bytes(out / PAGE, dataset_page.written(recipe, summaries, shown).encode())
+            atomic.write_bytes(out / PAGE, dataset_card.page_of(recipe, summaries, shown).encode())
         told = [row.numbers() for row in rows or ()]
         atomic.write_json(out / REPORT, {"recordings": [one.numbers() for one in summaries], "survival": told})

@@ -1,24 +1,36 @@
-"""The card of a data set: what it was made from, what is a guess, what survives, whose it is."""
+"""The card of a data set (its sources, guesses, what survives, whose it is), and its page to look at."""
 
 from __future__ import annotations
 
+import base64
+import json
 import re
+import string
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from html import escape
 
 import numpy as np
 
+from ...files.png_writer import pack_png
+from ...files.shipped import shipped
 from ...files.version import __version__
 from ..export.finished_job import Finished
 from . import survival
 from .collected import Collected
-from .recipe import Recipe
+from .recipe import SHIPPED, Recipe
 from .summary import RAW, Summary
 from .survival import Row
 
 MOST_WARNINGS, MOST_VALUES = 8, 12
 NUMBER = re.compile(r"[\d.,]+|\bE\d+")  # by which warnings of one kind differ
 GUESSED = 0.5  # of touched frames, from which on a set says in its first lines that it is a guess (assumed)
+TEMPLATE = "page.html"
+SHOWN = 6  # pictures of a recording
+SMALLER = 4  # times that they are smaller each way
+LEAST_SHARE = 0.01  # of its frames that bear a flag, for a recording to be listed under it (assumed)
+FLAG = "flag"
+
 MEASURED = """\
 On simulated touches deeper than 0.3 mm half of the answers are within 0.8 mm of the place, a twelfth of the force and
 an eighth of the dent's depth; its outline and the true one share 0.44 of what they cover. On a real finger beside a
@@ -27,7 +39,7 @@ picture beside a real DIGIT's of the same touch. `confidence`, `explained`, `exp
 to trust each frame."""
 
 
-def written(
+def card_of(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
@@ -165,3 +177,55 @@ def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touche
     """Mean of a share over all frames, or over those touched."""
     weights = [one.recording.frames * (one.touched if touched else 1.0) for one in summaries]
     return float(np.average([value(one) for one in summaries], weights=weights)) if sum(weights) else 0.0
+
+
+def page_of(recipe: Recipe, summaries: list[Summary], progress: Callable[[int, int], None]) -> str:
+    """Write the page: every recording as a strip of pictures, in one HTML file that needs nothing else."""
+    choices: dict[str, set[str]] = {}
+    articles = []
+    for number, one in enumerate(summaries, start=1):
+        for name, text in one.labels.items():
+            choices.setdefault(name, set()).update({text} - {""})
+        choices.setdefault(FLAG, set()).update(_flags(one))
+        articles.append(_article(one))
+        progress(number, len(summaries))
+    template = string.Template(shipped(f"{SHIPPED}/{TEMPLATE}").read_text("utf-8"))
+    return template.substitute(
+        title=escape(recipe.source.title),
+        notes="".join(f"<blockquote>{escape(note)}</blockquote>" for note in recipe.notes),
+        selects="".join(_select(name, sorted(texts)) for name, texts in choices.items() if texts),
+        articles="".join(articles),
+    )
+
+
+def _select(name: str, texts: list[str]) -> str:
+    options = "".join(f"<option>{escape(text)}</option>" for text in ("", *texts))
+    return f'<label>{escape(name)} <select data-label="{escape(name)}">{options}</select></label>\n'
+
+
+def _flags(one: Summary) -> list[str]:
+    return [name for name, share in one.flagged.items() if share >= LEAST_SHARE]
+
+
+def _article(one: Summary) -> str:
+    """Write a recording: labels, numbers, and pictures evenly through it."""
+    of = one.recording
+    shares = f"{of.split}; {of.frames} frames, {one.touched:.0%} in contact, {one.guesses:.0%} guesses"
+    labels = ", ".join(f"{name} {text}" for name, text in one.labels.items() if text)
+    known = (("force {:.2f} N", one.force), ("confidence {:.2f}", one.confidence), ("explained {:.2f}", one.explained))
+    numbers = ", ".join(words.format(value) for words, value in known if np.isfinite(value))
+    flags = ", ".join(f"{name} {one.flagged[name]:.0%}" for name in _flags(one))
+    frames = np.linspace(0, of.frames - 1, min(SHOWN, of.frames)).astype(int)
+    data = {
+        "labels": json.dumps(one.labels | {FLAG: _flags(one)}),
+        "confidence": f"{np.nan_to_num(one.confidence):.4f}", "force": f"{np.nan_to_num(one.force):.4f}",
+    }  # fmt: skip
+    held = " ".join(f'data-{name}="{escape(value)}"' for name, value in data.items())
+    lines = "".join(f"<p>{escape(line)}</p>" for line in (shares, labels, numbers, flags) if line)
+    pictures = "".join(_picture(of.picture(int(frame)), int(frame) * of.every) for frame in frames)
+    return f'<article id="{escape(of.name)}" {held}><h2>{escape(of.name)}</h2>{lines}{pictures}</article>\n'
+
+
+def _picture(picture: np.ndarray, frame: int) -> str:
+    data = base64.b64encode(pack_png(np.ascontiguousarray(picture[::SMALLER, ::SMALLER]))).decode()
+    return f'<img title="frame {frame}" alt="frame {frame}" src="data:image/png;base64,{data}">'

@@ -97,7 +97,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to one recording for each input, which has its own values; see ``scene_grid``.
+    """A scene to one recording for each input, which has its own values; see ``jobs.simulate``.
 
     seed : of the first; each has one more than that before it; values : name -> value, an input each
     keep : words of ``scene_recording.outputs``

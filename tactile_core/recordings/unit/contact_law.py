@@ -5,13 +5,17 @@ frame hardly shows it. What a few neighbouring simulated contacts leave unexplai
 a recording, does, and so does how much less is left with two electrodes exchanged, or where each electrode may have a
 gain of its own and those that fit best are far apart. A softer skin, or one that is filled otherwise, moves the
 electrodes alike at another pressure: the fluid's, where it is recorded, shows that (docs/accuracy.md has the table).
+
+A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Units rest at
+different counts, but of five real ones a contact explains little of how: beside a conductivity of its own it leaves
+.53 to .84. Of eight hard grips it leaves .23 to .38; soft ones (.47 to .87) are not told apart.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...sensors import SOURCE, contact_pressures_of, contacts_of
+from ...sensors import SOURCE, contact_pressures_of, contacts_of, divider, typical_rest
 from ...sensors.descriptor import of_kind
 from ...sensors.fluid_sensor import Fluid
 from ..doubt import Doubt, Reason
@@ -45,6 +49,9 @@ FEWEST_PRESSED = 6  # such contacts: one scatters by .28 in the logarithm, six b
 # Measured over simulated pressure. Real skins lie at .7 to .8 of the simulated one's stiffness (descriptor of the
 # BioTac), half of their recordings between .58 and 1.05.
 LEAST_PRESSURE, MOST_PRESSURE = 0.6, 2.0
+CONDUCTIVITIES = np.linspace(-1.5, 1.5, 151)  # tried for a level at rest: logarithms over a typical unit's
+MOST_LEFT = 0.45  # of what a conductivity leaves: between units at rest and hard grips, see above
+LEAST_APART = 100.0  # counts, root of the sum of squares: units differ by 106 to 434 beside their conductivity
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
@@ -197,3 +204,22 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
     if less > max(GAINED, beyond) and spread > SPREAD:
         return Doubt(Reason.LAW_GAINS, share=less, spread=spread, most=GAINED, usual=SPREAD)
     return None
+
+
+def as_contact(level: np.ndarray, sensor: str) -> float | None:
+    """Return the share (0..1) of how a level differs from a typical unit at rest that one contact explains.
+
+    None where that is too little for a contact, and for a sensor without simulated contacts. The unit's conductivity is
+    free. level : (e,) counts
+    """
+    typical = typical_rest(sensor)
+    if typical is None or contacts_of(sensor) is None:
+        return None
+    rest = divider.of_films(np.exp(CONDUCTIVITIES)[:, None], typical)
+    change = divider.typical(level - rest, rest, typical)
+    known = contact_signals(sensor)
+    onto = (change @ (known / np.linalg.norm(known, axis=1, keepdims=True)).T).max(axis=1)
+    squares = np.square(change).sum(axis=1)
+    alone = np.sqrt(squares.min())
+    left = np.sqrt(np.maximum(squares - np.square(np.maximum(onto, 0)), 0).min())
+    return 1 - float(left / alone) if alone > LEAST_APART and left < MOST_LEFT * alone else None

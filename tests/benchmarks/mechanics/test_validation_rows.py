@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from benchmarks.measured_rows import read_table
-from benchmarks.mechanics import mechanics_page, validate
+from benchmarks.mechanics import validate
 from benchmarks.mechanics.golden import GOLDEN_FORCE
 
 from tactile_core.accuracy import failed, line, order, row
@@ -41,7 +41,7 @@ def test_report_holds_every_row(tmp_path):
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
     page = Path(__file__).parents[3] / "docs" / "mechanics.md"
     shutil.copy(page, tmp_path)
-    mechanics_page.write(tmp_path / "mechanics.md", {"Golden": forces, "Speed": speed})
+    validate.write(tmp_path / "mechanics.md", {"Golden": forces, "Speed": speed})
     text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
     table = read_table(tmp_path / "mechanics.csv")
     assert [each["name"] for each in table] == [each["name"] for each in forces + speed]

@@ -9,7 +9,7 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.polarity import contact_signals
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.signals import PrepareOptions
-from tactile_core.recordings.unit.loaded_rest import as_contact
+from tactile_core.recordings.unit.contact_law import as_contact
 from tactile_core.sensors import REST_COUNTS, divider
 
 HARD = np.argsort(np.linalg.norm(contact_signals(), axis=1))[-50::10]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tactile_core.errors import TactileError
+from tactile_core.jobs.simulate import combinations, name_of, with_values
 from tactile_core.simulation.scene import load_scene
-from tactile_core.simulation.scene_grid import combinations, name_of, with_values
 
 
 @pytest.fixture
