@@ -1,20 +1,22 @@
-"""The legend of a style: a colour bar with its range and a scale bar, at the sensor's base, one mesh."""
+"""The legend of a style: a card under the sensor that faces the scene's camera, its range and a scale bar."""
 
 from __future__ import annotations
 
-import math
-
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..settings import properties
 from . import style_nodes, styles, surfaces
+from .node_group import NodeGroup
 
-_BEFORE = 8.0  # mm from the sensor's base, or its housing's
-_LONG, _HIGH, _LETTERS = 18.0, 2.0, 3.4  # mm
-_TILT = math.radians(50)  # toward a new file's view, which looks down and at the base
-_UNDER = -_LETTERS - 0.2  # mm, line of the numbers
-_INK = (0.95, 0.95, 0.95)
+_LONG, _HIGH, _LETTERS = 18.0, 1.8, 2.3  # mm
+_EDGE, _LIFT = 1.0, 0.05  # mm of the card round what stands on it, and under it
+_GAP = 1.5  # mm between sensor and card, as the camera sees them
+_INK, _CARD = (0.95, 0.95, 0.95), (0.03, 0.03, 0.035)
+_MIDDLE, _HALF = "Middle", "Half"
+# Without a camera: toward a new file's view, which looks down and at the base.
+_NO_CAMERA = Matrix(((0, -0.643, 0.766), (1, 0, 0), (0, 0.766, 0.643))).to_euler()
 _Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # corners (n, 2) mm, triangles (m, 3), colours (n, 3)
 
 
@@ -26,55 +28,95 @@ def remove_legend(thing: bpy.types.Object) -> None:
 
 
 def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
-    """Add a colour bar, and a scale bar of 5 mm, in front of a sensor; one that is there is replaced.
+    """Add a card with a colour bar and a scale bar of 5 mm to a sensor, in place of another; plays without the add-on.
 
     title : what the colours say; ends : what stands at the bar's ends, None where there is no bar
     """
     remove_legend(thing)
-    start = 0.0 if ends is None else _LONG + 4
-    parts = [_letters(title, 0.0, _HIGH + 1.0), _ruler(start), _letters("5 mm", start, _UNDER)]
+    row = -_EDGE - _LETTERS
+    parts = [_letters(title, 0.0, row)]
     if ends is not None:
-        parts += [_bar(style), _letters(ends[0], 0.0, _UNDER), _letters(ends[1], _LONG, _UNDER, "RIGHT")]
+        row -= _HIGH + 0.9
+        parts += [
+            _bar(style, row),
+            _letters(ends[0], 0.0, row - _LETTERS),
+            _letters(ends[1], _LONG, row - _LETTERS, "RIGHT"),
+        ]
+        row -= _LETTERS
+    row -= _LETTERS + 0.6
+    parts += [_patch(0.0, 5.0, row + 0.6, row + 1.1, _INK), _letters("5 mm", 6.0, row)]
+    parts.insert(0, _patch(-_EDGE, _LONG + _EDGE, row - _EDGE, 0.0, _CARD))
     counts = np.cumsum([0] + [len(corners) for corners, _, _ in parts])
     flat, colours = (np.concatenate([part[k] for part in parts]) for k in (0, 2))
     faces = np.concatenate([part[1] + before for part, before in zip(parts, counts, strict=False)])
+    front = np.column_stack(
+        [flat[:, 0] - _LONG / 2, flat[:, 1], np.where(np.arange(len(flat)) < counts[1], 0.0, _LIFT)]
+    )
+    nodes = np.concatenate([front, front * [-1, 1, -1]])  # read from behind too
     unit = thing.tactile.per_metre * 1e-3
-    # The origin is the sensor's own: an other one draws a dashed line across the view.
-    along, up = np.array([0, 1.0, 0]), np.array([-math.cos(_TILT), 0, math.sin(_TILT)])
-    middle = (flat[:, 0].min() + flat[:, 0].max()) / 2
-    nodes = _corner(thing, unit) + unit * ((flat[:, :1] - middle) * along + flat[:, 1:] * up)
-    legend = surfaces.new_mesh_object(f"{thing.name} legend", nodes, faces, smooth=False)
+    both = np.concatenate([faces, faces + len(front)])
+    legend = surfaces.new_mesh_object(f"{thing.name} legend", nodes * unit, both, smooth=False)
     properties.set_up_part(legend, thing, "LEGEND")
     legend.hide_select = True
+    legend.visible_shadow = legend.visible_diffuse = legend.visible_glossy = False
     legend["text"] = [title, *(ends or ())]
     shown = np.column_stack([colours, np.ones(len(colours))]).astype(np.float32)
     held = legend.data.color_attributes.new(style_nodes.COLOUR, "FLOAT_COLOR", "POINT")
-    held.data.foreach_set("color", shown.ravel())
+    held.data.foreach_set("color", np.concatenate([shown, shown]).ravel())
     styles.make_colour_active(legend.data)
     legend.data.materials.append(style_nodes.legend_material())
+    modifier = legend.modifiers.new(style_nodes.LEGEND, "NODES")
+    modifier.node_group = bpy.data.node_groups.get(style_nodes.LEGEND) or _facing()
+    low, high = _box(thing)
+    style_nodes.set_input(modifier, _MIDDLE, tuple((low + high) / 2))
+    style_nodes.set_input(modifier, _HALF, tuple((high - low) / 2 + _GAP * unit))
     return legend
 
 
-def _corner(thing: bpy.types.Object, unit: float) -> np.ndarray:
-    """The middle of a sensor's base, or of its housing's, and a little away from it, (3,) in its own units."""
+def _box(thing: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (3,) of a sensor with its body, in its own axes and units."""
     parts = [thing, *(part for part in thing.children if part.tactile.role == "BODY")]
-    low = np.min([np.array(part.bound_box).min(0) for part in parts], axis=0)
-    high = np.max([np.array(part.bound_box).max(0) for part in parts], axis=0)
-    return np.array([high[0] + _BEFORE * unit, (low[1] + high[1]) / 2, low[2] + (_LETTERS + 1) * unit])
+    corners = np.concatenate([np.array(part.bound_box) for part in parts])
+    return corners.min(0), corners.max(0)
 
 
-def _bar(style: str) -> _Part:
+def _facing() -> bpy.types.NodeTree:
+    """Turn a mesh toward the active camera, and put it under the sensor's box as that camera sees it."""
+    nodes = NodeGroup(style_nodes.LEGEND)
+    nodes.input(_MIDDLE, "Vector", "Middle of the sensor")
+    nodes.input(_HALF, "Vector", "Half its size")
+    given = nodes.tree.nodes.new("NodeGroupInput")
+    camera = nodes.add("GeometryNodeInputActiveCamera").outputs[0]
+    seen = nodes.add("GeometryNodeObjectInfo", camera, transform_space="RELATIVE")
+    size = nodes.add("ShaderNodeVectorMath", seen.outputs["Scale"], operation="LENGTH").outputs["Value"]
+    there = nodes.add("FunctionNodeCompare", size, 0.0, operation="GREATER_THAN").outputs[0]
+    turn = nodes.add("GeometryNodeSwitch", there, _NO_CAMERA, seen.outputs["Rotation"], input_type="ROTATION").outputs[
+        0
+    ]
+    down = nodes.add("FunctionNodeRotateVector", (0.0, -1.0, 0.0), turn).outputs[0]
+    reach = nodes.add("ShaderNodeVectorMath", down, operation="ABSOLUTE").outputs[0]
+    reach = nodes.add("ShaderNodeVectorMath", reach, given.outputs[_HALF], operation="DOT_PRODUCT").outputs["Value"]
+    below = nodes.add("ShaderNodeVectorMath", down, operation="SCALE")
+    nodes.tree.links.new(reach, below.inputs["Scale"])
+    place = nodes.add("ShaderNodeVectorMath", given.outputs[_MIDDLE], below.outputs[0], operation="ADD").outputs[0]
+    placed = nodes.add("GeometryNodeTransform", given.outputs["Geometry"])
+    nodes.tree.links.new(place, placed.inputs["Translation"])
+    nodes.tree.links.new(turn, placed.inputs["Rotation"])
+    return nodes.end(placed.outputs[0])
+
+
+def _bar(style: str, low: float) -> _Part:
     steps = np.linspace(0, 1, 65)
-    corners = np.array([[_LONG * s, w] for s in steps for w in (0, _HIGH)])
+    corners = np.array([[_LONG * s, low + w] for s in steps for w in (0, _HIGH)])
     index = np.arange(64)[:, None] * 2
     faces = np.concatenate([index + np.array(corner) for corner in ((0, 3, 1), (0, 2, 3))])
     places, colours = (np.array(each) for each in zip(*style_nodes.RAMPS[style], strict=True))
     return corners, faces, np.column_stack([np.interp(np.repeat(steps, 2), places, colours[:, k]) for k in range(3)])
 
 
-def _ruler(start: float) -> _Part:
-    corners = np.array([[start, 0.0], [start + 5, 0.0], [start + 5, 0.4], [start, 0.4]])
-    return corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(_INK, (4, 1))
+def _patch(left: float, right: float, low: float, high: float, colour: tuple[float, float, float]) -> _Part:
+    corners = np.array([[left, low], [right, low], [right, high], [left, high]])
+    return corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile(colour, (4, 1))
 
 
 def _letters(text: str, x: float, y: float, align: str = "LEFT") -> _Part:

@@ -17,7 +17,8 @@ from .surfaces import new_material
 
 COLOUR, DISPLACEMENT = "Tactile colour", "displacement"
 MATERIAL, LEGEND = "Tactile style", "Tactile legend"
-LARGEST, EXAGGERATION, SENSOR, FORCE, LENGTH = "Largest", "Exaggeration", "Sensor", "Force", "Length a Newton"
+LARGEST, EXAGGERATION, ERROR = "Largest", "Exaggeration", "Error"
+SENSOR, FORCE, LENGTH = "Sensor", "Force", "Length a Newton"
 STILL = (0.50, 0.50, 0.53)
 RAMPS = {
     "DISPLACEMENT": ((0.0, STILL), (0.05, (0.10, 0.15, 0.45)), (0.35, (0.0, 0.45, 0.55)), (0.65, (0.35, 0.72, 0.25)),
@@ -117,6 +118,8 @@ def _surface(style: str) -> bpy.types.NodeTree:
     quantity = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
     nodes.input(LARGEST, "Float", f"{quantity} at the colours' upper end", 1.0, 1e-6)
     nodes.input(EXAGGERATION, "Float", "How many times the dent is drawn; pictures keep the true one", 1.0, 0.0)
+    if style == "DISPLACEMENT":
+        nodes.input(ERROR, "Float", "Expected error, in the object's units: colours fade below it", 0.0, 0.0)
     given = nodes.tree.nodes.new("NodeGroupInput")
     here = nodes.add("GeometryNodeInputPosition").outputs[0]
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
@@ -128,6 +131,8 @@ def _surface(style: str) -> bpy.types.NodeTree:
     colour = ramp.outputs["Color"]
     if style == "ELECTRODES":
         colour = _near_electrodes(nodes, colour)
+    elif style == "DISPLACEMENT":
+        colour = _above_error(nodes, colour, again, given.outputs[ERROR])
     shown = nodes.store(kept, COLOUR, colour, "FLOAT_COLOR")
     more = nodes.math("SUBTRACT", given.outputs[EXAGGERATION], 1.0)
     extra = nodes.add("ShaderNodeVectorMath", again, operation="SCALE")
@@ -155,7 +160,20 @@ def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.
 def _near_electrodes(nodes: NodeGroup, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """The colour near an electrode, grey elsewhere; distances are in metres in any file."""
     near = nodes.add("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0).outputs[0]
-    mixed = nodes.add("ShaderNodeMix", near, (*STILL, 1.0), colour, data_type="RGBA")
+    return _over_grey(nodes, near, colour)
+
+
+def _above_error(
+    nodes: NodeGroup, colour: bpy.types.NodeSocket, moved: bpy.types.NodeSocket, error: bpy.types.NodeSocket
+) -> bpy.types.NodeSocket:
+    """The colour where a place has moved by the error or more, the greyer the less it has."""
+    length = nodes.add("ShaderNodeVectorMath", moved, operation="LENGTH").outputs["Value"]
+    share = nodes.math("DIVIDE", length, nodes.math("MAXIMUM", error, 1e-9))
+    return _over_grey(nodes, nodes.math("MINIMUM", share, 1.0), colour)
+
+
+def _over_grey(nodes: NodeGroup, share: bpy.types.NodeSocket, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+    mixed = nodes.add("ShaderNodeMix", share, (*STILL, 1.0), colour, data_type="RGBA")
     return next(s for s in mixed.outputs if s.enabled)
 
 

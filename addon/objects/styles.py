@@ -9,6 +9,7 @@ from ..settings import properties
 from . import style_nodes, surfaces
 
 MODIFIER = "Tactile style"
+ERROR = "expected_error_um"  # property of what was translated; negative where it is not known
 STYLES = (
     ("DISPLACEMENT", "Displacement", "Colour by how far each place has moved"),
     ("CONTACT_PATCH", "Contact Patch", "Colour what is touched; of a gel"),
@@ -37,10 +38,20 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
     old = thing.modifiers.get(MODIFIER)
     if old is not None:
         thing.modifiers.remove(old)
+        drivers = thing.animation_data.drivers if thing.animation_data else []
+        for curve in [each for each in drivers if each.data_path.startswith(f'modifiers["{MODIFIER}"]')]:
+            drivers.remove(curve)
     if style == "NONE":
         return
     get_ready(thing)
-    _add_nodes(thing, style, {style_nodes.LARGEST: largest, style_nodes.EXAGGERATION: exaggeration})
+    modifier = _add_nodes(thing, style, {style_nodes.LARGEST: largest, style_nodes.EXAGGERATION: exaggeration})
+    if style == "DISPLACEMENT" and ERROR in thing:
+        driver = thing.driver_add(
+            f'modifiers["{MODIFIER}"]{style_nodes.input_path(modifier, style_nodes.ERROR)}'
+        ).driver
+        driver.type, variable = "SCRIPTED", driver.variables.new()
+        variable.name, variable.targets[0].id, variable.targets[0].data_path = "error", thing, f'["{ERROR}"]'
+        driver.expression = f"max(error, 0) * {1e-6 * thing.tactile.per_metre!r}"
 
 
 def style_of(thing: bpy.types.Object) -> str:

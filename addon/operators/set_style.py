@@ -101,8 +101,8 @@ def animate(thing: bpy.types.Object, moved: Motion, frames: np.ndarray, how: str
     if moved.patch is not None:
         step = frames[1] - frames[0] if len(frames) > 1 else 1.0
         frame_attribute.add(thing, frame_attribute.PATCH, moved.patch, frames[0], step)
-    follow(thing, before)
     curves.write_properties(thing, values | {"dent_um": 1e6 * moved.dent}, frames)
+    follow(thing, before)
     return summary
 
 

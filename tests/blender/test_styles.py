@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 
 @pytest.fixture
@@ -29,6 +30,47 @@ def test_the_colours_follow_the_displacement(gel, part):
     far, still = length.argmax(), length < 0.01 * length.max()
     assert colours[far, 0] > 0.3 and colours[far, 2] < 0.3  # green to yellow
     assert still.any() and np.ptp(colours[still, :3], axis=1).max() < 0.2  # grey
+
+
+def test_colours_fade_below_the_expected_error(gel, part):
+    true = part("addon.objects.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
+    for _ in range(2):  # a style that takes its own place is driven once
+        bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    colours, length = shown(gel, "Tactile colour", 4, "color"), 1e6 * np.linalg.norm(true, axis=1)
+    below = length < 0.2 * gel["expected_error_um"]
+    assert below.any() and np.abs(colours[below, :3] - [0.5, 0.5, 0.53]).max() < 0.2
+    assert len(gel.animation_data.drivers) == 1
+
+
+VIEWS = [(150, -60, 100), (-150, 20, 60), (10, 200, 30), (60, 35, -150), None]
+
+
+@pytest.mark.parametrize("place", VIEWS)
+def test_legends_face_the_camera_below_their_sensors_and_apart(gel, nodes_of, place):
+    bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    scene, camera = bpy.context.scene, None
+    turn = np.array([[0, -0.643, 0.766], [1, 0, 0], [0, 0.766, 0.643]])  # toward a new file's view
+    if place is not None:
+        camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+        scene.collection.objects.link(camera)
+        camera.location = place
+        camera.rotation_euler = (Vector(place) - gel.location).to_track_quat("Z", "Y").to_euler()
+        scene.camera = camera
+        bpy.context.view_layer.update()
+        turn = np.array(camera.matrix_world.to_3x3())
+    boxes = []
+    for sensor in (thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT")):
+        legend = next(thing for thing in sensor.children if "text" in thing)
+        nodes = (nodes_of(legend) + np.array(sensor.location)) @ turn  # right, up, toward
+        card, title = nodes[:4], nodes[4 : len(nodes) // 2]
+        assert np.ptp(card[:, 2]) < 1e-3 and (title[:, 2] > card[0, 2]).all()  # flat, and letters before it
+        assert (card[1] - card[0])[0] > 10 and (card[3] - card[0])[1] > 5  # neither mirrored nor on its head
+        body = (nodes_of(sensor) + np.array(sensor.location)) @ turn
+        assert card[:, 1].max() < body[:, 1].min()
+        boxes.append((card[:, :2].min(0), card[:, :2].max(0)))
+    (low, high), (other_low, other_high) = boxes
+    apart = np.maximum(low, other_low) > np.minimum(high, other_high)
+    assert apart.any() or place == (10, 200, 30)  # along the line through both the sensors hide each other too
 
 
 def test_a_dent_drawn_larger_leaves_the_picture_alone(gel, part, nodes_of):
