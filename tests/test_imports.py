@@ -55,14 +55,6 @@ def test_importing_the_package_costs_the_standard_library_alone():
     assert third_party(loaded("import sys, tactile_core; print(*sys.modules)")) == set()
 
 
-def test_help_imports_no_numpy():
-    code = (
-        "import sys, tactile_core.cli.main as c\n"
-        "try: c.main(['convert', '--help'])\nexcept SystemExit: pass\nprint(); print(*sys.modules)"
-    )
-    assert third_party(loaded(code)) == set()
-
-
 def test_every_module_but_training_imports_with_all_heavy_libraries_out_of_reach():
     names = loaded(BLOCKER.format(blocked=set(HEAVY), modules=MODULES))
     assert names >= set(MODULES)

@@ -111,7 +111,6 @@ def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], Non
     with tqdm(desc=name, unit=unit, delay=0 if forced else 2, file=sys.stderr) as shown:
 
         def show(done: int, total: int) -> None:
-            """Move the bar."""
             shown.total = total
             shown.update(done - shown.n)
 
@@ -123,7 +122,6 @@ def _lines(name: str, unit: str) -> Callable[[int, int], None]:
     last = time.monotonic()
 
     def show(done: int, total: int) -> None:
-        """Print a line if the last one is long ago."""
         nonlocal last
         if time.monotonic() - last >= EVERY:
             last = time.monotonic()

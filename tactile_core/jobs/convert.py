@@ -158,7 +158,6 @@ def _write_frames(
     pictures, done = _Pictures(folder / results.IMAGES) if "image" in options.keep else None, 0
 
     def take(some: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Report and draw some frames, as they come."""
         nonlocal done
         report.take(some, arrays)
         if pictures is not None:

@@ -109,7 +109,6 @@ def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signal
     unit = None if sensor is None else sensor.gains_for(path, split(path).section, "--sensor", source)
 
     def parts() -> Iterator[Recording]:
-        """Yield the parts once more."""
         return (part.recording for part in read_parts(path, options.columns, source))
 
     prepare = Preparer(options, unit, parts)
@@ -186,7 +185,6 @@ class Prepared:
         start, about = int(frames[0]), self.about()
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:
-            """Read them from an open file."""
             arrays = {name: file[name][start : frames[-1] + 1][frames - start] for name in COLUMNS}
             rest = file["rest"][int(np.searchsorted(file["part"][()], start, side="right")) - 1]
             return arrays.pop("time"), Signals(

@@ -65,7 +65,6 @@ class Store:
         cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
 
         def load(name: str) -> np.ndarray:
-            """Load an array, of long ones the rows alone."""
             return self.load_rows(name, rows) if self.load_rows and name in long else self.load(name)
 
         return replace(self, shapes=self.shapes | cut, load=load)
@@ -124,7 +123,6 @@ def open_hdf5(path: str) -> Iterator[Store]:
             attributes = {key: _plain(value) for key, value in file.attrs.items()}
 
         def attributes_of(name: str) -> dict[str, Any]:
-            """Read the attributes of an array."""
             with damage_reported(f"{path}, {name}", "attributes"):
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
@@ -172,7 +170,6 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
             header = _npy_header(file)
 
         def load_whole(name: str) -> np.ndarray:
-            """Read the one array there is."""
             file.seek(0)
             return np.lib.format.read_array(file, allow_pickle=False)
 
@@ -195,7 +192,6 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
                         shapes[member.filename[:-4]] = _npy_header(stream)
 
         def load(name: str) -> np.ndarray:
-            """Unpack an array."""
             with archive.open(name + ".npy") as stream:
                 return np.lib.format.read_array(stream, allow_pickle=False)
 

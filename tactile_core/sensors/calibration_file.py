@@ -157,11 +157,10 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
     Numbers keep six digits. A photograph is named as it lies beside the file.
     """
-    text = astoml_value(calibration)
-    atomic.write_bytes(path, text.encode())
+    atomic.write_bytes(path, to_toml(calibration).encode())
 
 
-def astoml_value(unit: Calibration) -> str:
+def to_toml(unit: Calibration) -> str:
     """Format a calibration, numbers with six digits; a photograph is named as it lies beside the file."""
     camera, coating, response = unit.camera, unit.coating, unit.response
     sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"

@@ -190,21 +190,6 @@ def test_an_older_result_stops_before_any_work(tactile, slide_csv, tmp_path, mon
     assert "already holds a result" in only_line(err) and "--overwrite" in err
 
 
-def test_an_output_that_is_a_file_stops_before_any_work(tactile, slide_csv, monkeypatch):
-    path = slide_csv()
-    monkeypatch.setattr(convert, "convert", lambda *arguments: pytest.fail("work was done"))
-    status, _, err = tactile("convert", path, "--out", path)
-    assert status == 2
-    assert "cannot be written" in only_line(err)
-
-
-def test_missing_weights_end_in_one_message(slide_csv, tmp_path):
-    done = command("convert", slide_csv(), "--out", tmp_path / "out", "--weights", tmp_path / "none")
-    assert done.returncode == 2
-    assert only_line(done.stderr).startswith(f"tactile: error: {tmp_path / 'none'}")
-    assert not (tmp_path / "out").exists()
-
-
 def test_weights_with_a_flipped_byte_end_in_one_message(slide_csv, tmp_path, capsys):
     copy = Path(shutil.copytree(networks.WEIGHTS_FOLDER, tmp_path / "weights"))
     file = copy / "S2MPN.safetensors"

@@ -163,17 +163,6 @@ def test_meshes(name, tmp_path):
     refused(lambda path: mesh_file.solid(mesh_file.read_bytes(path), path, 1e-3, "z"), path, str(path))
 
 
-@pytest.mark.parametrize("way", ["/etc/passwd", "../out.stl", "link.stl", "C:\\out.stl"])
-def test_scenes_name_no_files_outside_of_their_folder(way, tmp_path):
-    folder = tmp_path / "scene"
-    folder.mkdir()
-    (tmp_path / "out.stl").write_bytes(b"secret")
-    (folder / "link.stl").symlink_to(tmp_path / "out.stl")
-    indenter = f"[[indenters]]\nkind = 'mesh'\nname = 'a'\nfile = {json.dumps(way)}\n"
-    (folder / "scene.toml").write_text(f"format = '{scene.FORMAT}'\nname = 'a'\ndescription = ''\n{indenter}")
-    refused(scene.load_scene, folder, "a file in the scene's folder")
-
-
 LONG_TOML = {
     "brackets": b"a = " + b"[" * 10**6,  # a thousand times as deep as Python goes
     "comment": b"#" * (2 * MOST_TEXT),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 import shutil
 from pathlib import Path
 
@@ -15,10 +14,9 @@ from gel_pictures import NO_MITSUBA, Press
 from tactile_core.cli.main import main
 from tactile_core.jobs.frames_file import FramesFile
 from tactile_core.pictures.height_map import gel_mapper
-from tactile_core.pictures.presets import measured
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors import digit_surface
-from tactile_core.sensors.calibration_file import SHIPPED, load_calibration, write_calibration
+from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
 SCENES = Path(__file__).parents[2] / "scenes"
 RECORDING = SCENES / "press_roll_slide" / "press_roll_slide.h5"
@@ -303,32 +301,6 @@ def test_the_size_of_a_photographs_correction_is_said(render, heights, tmp_path,
     assert background["corrects_lights_by"]["mean_levels"] == pytest.approx(7, abs=0.1)
     render(heights, out="plain")
     assert json.loads((tmp_path / "plain" / "note.json").read_text())["background"] == "lights"
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("radius_mm = ", "radius_mm = 9", "leds, red.*a sphere above the gel"),
-        ("radiance = ", "radiance = -", "red, radiance"),
-        ("index = 1.41", "index = 0.9", "gel, index.*1 to 4"),
-        ('"tactile-calibration-3"', '"tactile-calibration-1"', "expected tactile-calibration-3 .*tactile calibrate"),
-        ('photograph = ""', 'photograph = "../../secret.png"', "beside this one"),
-        ('photograph = ""', 'photograph = "absent.png"', "absent.png"),
-    ],
-)
-def test_a_calibration_that_cannot_be_is_named_in_one_sentence(render, heights, tmp_path, old, new, words):
-    text = SHIPPED.read_text()
-    assert old in text
-    (tmp_path / "unit.toml").write_text(re.sub(re.escape(old), new, text, count=1))
-    status, out, err = render(heights, "--calibration", tmp_path / "unit.toml")
-    assert (status, out) == (2, "") and re.search(words, err) and len(err.splitlines()) == 1
-    assert not (tmp_path / "out").exists()
-
-
-def test_an_error_below_every_presets_says_so(render, heights):
-    status, _, err = render(heights, "--error", "0.01levels")
-    best = min(measured()["presets"].items(), key=lambda item: item[1]["error"])
-    assert status == 2 and f"{best[1]['error']:.3g} or more, which {best[0]} has" in err
 
 
 def test_llvm_that_is_missing_is_named_with_what_to_do(render, heights, monkeypatch, any_variant):

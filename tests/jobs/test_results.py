@@ -20,13 +20,6 @@ def make_result(folder):
     (folder / results.NOTE).write_text(json.dumps({"format": results.FORMAT}))
 
 
-def test_keep_is_read_in_any_order_and_unknown_words_are_named():
-    assert results.parse_keep("image, latent") == ("latent", "image")
-    assert results.parse_keep("") == ()
-    with pytest.raises(TactileError, match="--keep: 'images'; expected words out of latent, displacement"):
-        results.parse_keep("latent,images")
-
-
 def test_two_recordings_of_one_name_are_refused(tmp_path):
     with pytest.raises(TactileError, match="same name") as error:
         results.result_folders(["day1/touch.csv", "day2/Touch.h5"], tmp_path, False)

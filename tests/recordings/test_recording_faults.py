@@ -5,7 +5,6 @@ import os
 import stat
 import zipfile
 
-import h5py
 import numpy as np
 import pytest
 
@@ -169,13 +168,6 @@ def test_folder_missing_file_and_locked_file(tmp_path, slide_lines, write):
             recordings.read(path)
     finally:
         os.chmod(path, stat.S_IRUSR | stat.S_IWUSR)
-
-
-def test_a_huge_declared_shape_is_refused_unread(tmp_path):
-    with h5py.File(tmp_path / "huge.h5", "w") as file:
-        file.create_dataset("electrode_vals/data", shape=(10**11, 19), dtype="f8", chunks=(1000, 19))
-    with pytest.raises(TactileError, match=r"electrode_vals/data: shape .* GB in memory"):
-        recordings.read(tmp_path / "huge.h5")
 
 
 def test_names_that_are_no_text_are_told(press, in_layout):

@@ -7,7 +7,7 @@ from shlex import quote
 
 from ...errors import TactileError
 from ..terminal import next_step, say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument, weights_argument
+from .common import NOTHING, add, columns_of
 
 BRIEF = "fit rest, gains and offsets of a BioTac unit to its recordings"
 TEXT = """\
@@ -46,9 +46,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="FILE|COLUMNS",
         help="force measured beside the first RECORDING, N; or its columns in the recordings, as fx,fy,fz",
     )
-    polarity_argument(verb)
-    columns_argument(verb)
-    weights_argument(verb)
+    add(verb, "--polarity", "--columns", "--weights")
 
 
 def run(options: argparse.Namespace) -> int:

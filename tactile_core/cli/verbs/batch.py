@@ -10,15 +10,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ..terminal import bar, complain, counted, next_step, say, tell
 from . import engine
-from .common import (
-    PRESETS,
-    RESUMES,
-    answer_arguments,
-    prepare_arguments,
-    prepare_words,
-    progress_argument,
-    unit_arguments,
-)
+from .common import ANSWER, PREPARE, PRESETS, RESUMES, UNIT, add, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.engine.job import Job
@@ -59,20 +51,20 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         metavar="WORDS",
         help="outputs, out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
     )
-    unit_arguments(verb)
+    add(verb, *UNIT)
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames in a shard (default: 1000)")
-    answer_arguments(verb)
+    add(verb, *ANSWER)
     verb.add_argument(
         "--preset", choices=PRESETS, help="preset of the pictures, as of `tactile render` (default: fast)"
     )
-    prepare_arguments(verb)
+    add(verb, *PREPARE)
     engine.place_arguments(verb)
     verb.add_argument("--array", metavar="I/N", help="do part I of N alone (from 0), others do the rest")
     doing = verb.add_mutually_exclusive_group()
     doing.add_argument("--plan", action="store_true", help="write job.json, print what 1,000 frames cost, and stop")
     doing.add_argument("--status", action="store_true", help="print how much of the job is done; changes nothing")
     doing.add_argument("--verify", action="store_true", help="read every shard; exit status 2 if one is damaged")
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

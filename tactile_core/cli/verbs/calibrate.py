@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import bar, next_step, say, tell
-from .common import NOTHING, object_argument, progress_argument
+from .common import NOTHING, add
 
 if TYPE_CHECKING:
     from ...pictures.calibrate.evaluate import Evaluation
@@ -57,14 +57,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the unit (default: that of --start, else digit)")
     verb.add_argument("--start", metavar="FILE", help="calibration to start from (default: the one that ships)")
     verb.add_argument("--unit", metavar="TEXT", help="the unit's name in the file (default: the file's)")
-    object_argument(verb, "the ball (default: fitted, or with --test the file's)")
+    add(verb, "--object-reflectance", whose="the ball (default: fitted, or with --test the file's)")
     verb.add_argument("--only", metavar="NAMES", help="photographs to use, file names separated by commas")
     verb.add_argument("--quick", action="store_true", help="fit the fast picture alone, in half the time")
     verb.add_argument("--test", metavar="FILE", help="test this calibration instead of fitting one")
     verb.add_argument("--preset", choices=TRIED, help="with --test: preset that draws the pictures (default: fast)")
     verb.add_argument("--json", metavar="FILE", help="with --test: write the errors to this file")
     verb.add_argument("--sheet", metavar="FILE", help="with --test: write photographs, renders, differences as PNG")
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,16 +9,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, complain, next_step, say, tell
-from .common import (
-    NOTHING,
-    answer_arguments,
-    error_argument,
-    object_argument,
-    prepare_arguments,
-    prepare_words,
-    progress_argument,
-    unit_arguments,
-)
+from .common import ANSWER, NOTHING, PREPARE, UNIT, add, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.convert import Options, ToolOptions
@@ -91,15 +82,15 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights and --overwrite",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
-    prepare_arguments(verb)
-    unit_arguments(verb)
-    object_argument(verb, "what touches the gel (default: the calibration's)")
-    answer_arguments(verb)
-    error_argument(verb, "levels of a picture, such as 0.6levels")
+    add(verb, *PREPARE)
+    add(verb, *UNIT)
+    add(verb, "--object-reflectance", whose="what touches the gel (default: the calibration's)")
+    add(verb, *ANSWER)
+    add(verb, "--error", bound="levels of a picture, such as 0.6levels")
     verb.add_argument(
         "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
     )
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...errors import TactileError
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import PRESETS, RESUMES, progress_argument, weights_argument
+from .common import PRESETS, RESUMES, add
 from .export import LAYOUTS
 
 BRIEF = "convert a whole data set, from its folder to labelled pictures with a card"
@@ -43,9 +43,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--target", default="digit", metavar="SENSOR", help="gel to translate to (default: digit)")
     verb.add_argument("--pictures", choices=PRESETS, help="preset of the pictures (default: fast)")
     verb.add_argument("--calibration", metavar="FILE", help="camera and lights, by `tactile calibrate`")
-    weights_argument(verb)
+    add(verb, "--weights")
     engine.place_arguments(verb)
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..terminal import bar, next_step, say, tell
-from .common import NOTHING, progress_argument
+from .common import NOTHING, add
 
 BRIEF = "write a finished batch job as NPZ, PNG, OpenEXR or LeRobot data"
 TEXT = """\
@@ -34,7 +34,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("job", metavar="JOB", help="folder of the job")
     verb.add_argument("--to", required=True, choices=LAYOUTS, help="layout")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder")
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

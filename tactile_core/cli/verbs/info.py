@@ -7,7 +7,7 @@ import os
 
 from ...errors import TactileError
 from ..terminal import complain, say, tell
-from .common import NOTHING, prepare_arguments, prepare_words
+from .common import NOTHING, PREPARE, add, prepare_words
 
 BRIEF = "describe recordings, or a sensor"
 TEXT = """\
@@ -32,7 +32,7 @@ LEAVES = NOTHING
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="*", metavar="FILE", help="recordings, in any known layout")
-    prepare_arguments(verb)
+    add(verb, *PREPARE)
     verb.add_argument(
         "--sensor", metavar="FILE|NAME", help="rest and gains of a unit, from `tactile adapt`; or a sensor's name"
     )

@@ -8,7 +8,7 @@ from shlex import quote
 from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import RESUMES, SOURCE, TARGET, check_seed, electrodes_argument, progress_argument, seed_argument
+from .common import RESUMES, SOURCE, TARGET, add, check_seed
 
 BRIEF = "simulate the same contacts on two sensors, to train on"
 TEXT = "Simulate random contacts of a scene's indenters on two sensors, at the same force, angle and place on both."
@@ -29,7 +29,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters, ranges of places, angles, depths")
     verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
-    seed_argument(verb, "file")
+    add(verb, "--seed", same="file")
     verb.add_argument(
         "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json beside it describes it"
     )
@@ -41,9 +41,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"
     )
-    electrodes_argument(verb)
+    add(verb, "--electrodes")
     engine.parts_arguments(verb)
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import NOTHING, PRESETS, error_argument, object_argument, progress_argument
+from .common import NOTHING, PRESETS, add
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -60,11 +60,11 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("input", metavar="INPUT", help="frames, heights or a scene, see above")
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
     verb.add_argument("--preset", choices=PRESETS, help="method, see above (default: standard)")
-    error_argument(verb, "levels of the picture, such as 0.6levels; picks the preset")
+    add(verb, "--error", bound="levels of the picture, such as 0.6levels; picks the preset")
     verb.add_argument(
         "--calibration", metavar="UNIT.toml", help="unit, by `tactile calibrate` (default: the one that ships)"
     )
-    object_argument(verb, "what touches the gel (default: the calibration's)")
+    add(verb, "--object-reflectance", whose="what touches the gel (default: the calibration's)")
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the gel (default: the calibration's, else digit)")
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="frames to draw, as a Python slice")
     verb.add_argument("--size", metavar="WxH", help="size in pixels, such as 480x640 (default: the calibration's)")
@@ -76,7 +76,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
     engine.parts_arguments(verb)
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ..terminal import agree, bar, duration, next_step, say, tell
 from . import engine
-from .common import NOTHING, check_seed, electrodes_argument, error_argument, progress_argument, seed_argument
+from .common import NOTHING, add, check_seed
 
 if TYPE_CHECKING:
     from ...jobs.plan import Plan
@@ -42,7 +42,7 @@ LEAVES = NOTHING
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("scene", metavar="SCENE", help="scene.toml with a [recording]")
-    seed_argument(verb, "file")
+    add(verb, "--seed", same="file")
     verb.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
     verb.add_argument(
         "--keep",
@@ -51,8 +51,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone;"
         " displacement_NAME and traction_NAME of any other sensor, too",
     )
-    electrodes_argument(verb)
-    error_argument(verb, "um of the surface, such as 50um")
+    add(verb, "--electrodes")
+    add(verb, "--error", bound="um of the surface, such as 50um")
     verb.add_argument(
         "--yes", action="store_true", help="begin at once, however long the tier that --error picks will take"
     )
@@ -66,7 +66,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " one more than that before it",
     )
     engine.parts_arguments(verb)
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from shlex import quote
 from ...errors import TactileError
 from ...training.options import DEVICES
 from ..terminal import bar, next_step, say, tell
-from .common import RESUMES, check_seed, progress_argument, seed_argument
+from .common import RESUMES, add, check_seed
 
 BRIEF = "train the networks on pairs, or fine-tune one"
 TEXT = """\
@@ -33,14 +33,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--real", metavar="FILE", help="with s2mpn: the labelled recording")
     verb.add_argument("--weights", metavar="DIR", help="with s2mpn: weights to start from (default: those that ship)")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder to write")
-    seed_argument(verb, "weights")
+    add(verb, "--seed", same="weights")
     verb.add_argument("--effort", type=float, default=1.0, metavar="X", help="factor on all epochs (default: 1)")
     verb.add_argument("--without", action="append", default=[], metavar="NAME", help="indenter to leave out")
     verb.add_argument("--without-below-x", type=float, metavar="MM", help="leave out contacts at smaller x")
     what = "auto (default) is a GPU where torch sees one; weights repeat to the byte on the same device only"
     verb.add_argument("--device", choices=DEVICES, default="auto", help=what)
     verb.add_argument("--overwrite", action="store_true", help="train again over older weights in DIR")
-    progress_argument(verb)
+    add(verb, "--progress")
 
 
 def run(options: argparse.Namespace) -> int:

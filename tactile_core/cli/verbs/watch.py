@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, columns_argument, columns_of, polarity_argument, tare_argument, unit_arguments
+from .common import NOTHING, UNIT, add, columns_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -64,10 +64,9 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )
     verb.add_argument("--idle", type=float, metavar="S", help="end after S s without a new frame (default: never)")
     verb.add_argument("--rate", type=float, default=100.0, metavar="HZ", help="rate of the recording (default: 100)")
-    polarity_argument(verb)
-    columns_argument(verb)
-    tare_argument(verb, ", of the first 10 s,")
-    unit_arguments(verb)
+    add(verb, "--polarity", "--columns")
+    add(verb, "--tare", among=", of the first 10 s,")
+    add(verb, *UNIT)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -169,7 +168,6 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
         say(f"serving frames at {server.address}, to programs of this machine alone")
 
         def publish(shown: Shown, seen: dict[str, np.ndarray]) -> bool:
-            """Send the frame; returns true: serving never ends the view."""
             server.send(shown, seen)
             return True
 
@@ -192,7 +190,6 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
     from ...files.png_writer import pack_png
 
     def draw(picture: np.ndarray) -> bool:
-        """Write the picture (H, W, 3) uint8; returns true: a file never ends the view."""
         with atomic.writing(path, "a file in a writable folder", ""):
             atomic.write_bytes(path, pack_png(picture))
         return True
@@ -211,7 +208,6 @@ def _window(title: str) -> Callable[[np.ndarray], bool]:
     shown = None
 
     def draw(picture: np.ndarray) -> bool:
-        """Show the picture (H, W, 3) uint8; returns false once the window is closed."""
         nonlocal shown
         if shown is None:
             shown = axes.imshow(picture)

@@ -67,7 +67,6 @@ def _summary(one: Recorded, tasks: Sequence[str]) -> Summary:
     force = np.linalg.norm(held["force"], axis=1)
 
     def typical(values: np.ndarray) -> float:
-        """Median over touched frames."""
         known = values[touched & np.isfinite(values)]
         return float(np.median(known)) if len(known) else float("nan")
 

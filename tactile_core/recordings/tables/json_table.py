@@ -132,7 +132,6 @@ def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dic
     cells, values = Cells(names, rows), array("d")
 
     def add(each: dict[str, Any]) -> None:
-        """Add a row."""
         values.extend(_value(cells, place, each.get(name)) for place, name in enumerate(names))
         if len(values) > MAX_FRAMES * len(names):
             raise TactileError(path, f"over {MAX_FRAMES:,} records", "fewer", "Split the recording")

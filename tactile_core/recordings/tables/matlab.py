@@ -53,7 +53,6 @@ def open_matlab(path: str, file: BinaryIO) -> Iterator[Store]:
     shapes = {name: (tuple(shape), np.dtype(CLASSES.get(kind, "O"))) for name, shape, kind in listed}
 
     def load(name: str) -> np.ndarray:
-        """Read one array; the others are skipped."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = loadmat(file, variable_names=[name])[name]
