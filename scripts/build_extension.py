@@ -1,13 +1,13 @@
 """Build installable zips of the Blender extension.
 
-    python3 scripts/build_extension.py                               linux-x64, for Blenders with Python 3.11
-    python3 scripts/build_extension.py --platform windows-x64 --python 3.13
+    python3 scripts/build_extension.py                               linux-x64, for Blender 4.2 to 5.0 (Python 3.11)
+    python3 scripts/build_extension.py --platform windows-x64 --python 3.13      Blender 5.1 and later
+    python3 scripts/build_extension.py --python 3.13 --debian        Debian's 4.3, whose Python is another
     python3 scripts/build_extension.py --no-wheels                   24 MB, any platform: numpy alone, see Preferences
 
 What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
-simulating and rendering need: about 210 MB a platform and Python (Windows 170, macOS 155), so each has a zip of its
-own. Blender 4.2 to 5.0 run Python 3.11, 5.1 and later 3.13, Debian's 5.2 3.14. The same commit, platform and wheels
-give the same bytes.
+simulating and rendering need: 155 to 210 MB a platform and Python, so each has a zip of its own. The same commit,
+platform and wheels give the same bytes.
 """
 
 from __future__ import annotations
@@ -24,15 +24,18 @@ ROOT = Path(__file__).resolve().parent.parent
 # platform of Blender -> platforms of wheels, newest first
 PLATFORMS = {
     "linux-x64": [f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17)] + ["manylinux2014_x86_64"],
+    "linux-arm64": [f"manylinux_2_{minor}_aarch64" for minor in (28, 27, 24, 17)] + ["manylinux2014_aarch64"],
     "windows-x64": ["win_amd64"],
     "macos-arm64": [f"macosx_{major}_0_arm64" for major in range(14, 10, -1)],
 }
-PYTHONS = ("3.11", "3.13", "3.14")
+# Python -> the first Blender that has it, and the first that has another
+BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None), "3.14": (None, None)}
 # Never torch (users translate with numpy), never numpy (Blender ships it).
 WHEELS = (
     "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit",
     "threadpoolctl", "rosbags", "apsw", "backports.zstd", "lz4", "ruamel.yaml", "typing_extensions",
 )  # fmt: skip
+MISSING = {("backports.zstd", "3.14"), ("cholespy", "linux-arm64")}  # part of that Python; no wheel: SciPy's solver
 PACKED = ("__init__.py", "blender_manifest.toml", "LICENSE", "addon/", "tactile_core/", "scenes/")
 LEFT_OUT = ("scenes/training/", "tactile_core/training/")  # 1.8 MB for tests; torch
 KEPT = ("tactile_core/training/__init__.py", "tactile_core/training/options.py")  # the verb `train` names its choices
@@ -43,14 +46,18 @@ def main(arguments: list[str] | None = None) -> int:
     """Build one zip and say how large it is; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--platform", choices=tuple(PLATFORMS), default="linux-x64")
-    parser.add_argument("--python", choices=PYTHONS, default="3.11", help="of the Blender it is for (default: 3.11)")
+    parser.add_argument(
+        "--python", choices=tuple(BLENDERS), default="3.11", help="of the Blender it is for (default: 3.11)"
+    )
+    parser.add_argument("--debian", action="store_true", help="of a distribution: no bounds on the Blender's version")
     parser.add_argument("--no-wheels", action="store_true", help="without wheels, for any platform and Python")
     parser.add_argument("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
     options = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as folder:
         try:
             wheels = [] if options.no_wheels else fetch(options.platform, options.python, Path(folder))
-            path = build(options.out, None if options.no_wheels else options.platform, options.python, wheels)
+            platform = None if options.no_wheels else options.platform
+            path = build(options.out, platform, options.python, wheels, options.debian)
         except (subprocess.CalledProcessError, OSError) as error:
             print(f"build_extension.py: error: {error}", file=sys.stderr)
             return 2
@@ -71,31 +78,35 @@ def fetch(platform: str, python: str, folder: Path) -> list[Path]:
                "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
     for name in PLATFORMS[platform]:
         command += ["--platform", name]
-    subprocess.run([*command, *requirements(python)], check=True)
+    subprocess.run([*command, *requirements(python, platform)], check=True)
     return sorted(folder.glob("*.whl"))
 
 
-def requirements(python: str = PYTHONS[0]) -> list[str]:
-    """List ``name==version`` of every wheel for a Python."""
+def requirements(python: str, platform: str) -> list[str]:
+    """List ``name==version`` of every wheel for a Python and platform."""
     text = (ROOT / "constraints.txt").read_text(encoding="utf-8")
     pins = dict(re.findall(r"(?m)^([A-Za-z0-9_.-]+)==(\S+)$", text))
-    return [f"{name}=={pins[name]}" for name in WHEELS if (name, python) != ("backports.zstd", "3.14")]
+    return [f"{name}=={pins[name]}" for name in WHEELS if not {(name, python), (name, platform)} & MISSING]
 
 
-def manifest(platform: str | None, wheels: list[Path]) -> str:
-    """The manifest with the platform and wheels of one zip, before its first table."""
+def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool) -> str:
+    """The manifest with the platform, Blender versions and wheels of one zip, before its first table."""
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     if platform is None:
         return text
+    oldest, beyond = (None, None) if debian else BLENDERS[python]
+    if oldest:
+        text = re.sub(r'(?m)^(blender_version_min = ").*"$', rf'\g<1>{oldest}"', text)
+    limit = f'blender_version_max = "{beyond}"\n' if beyond else ""
     names = "".join(f'    "./wheels/{wheel.name}",\n' for wheel in wheels)
-    return text.replace("[permissions]", f'platforms = ["{platform}"]\nwheels = [\n{names}]\n\n[permissions]')
+    return text.replace("[permissions]", f'{limit}platforms = ["{platform}"]\nwheels = [\n{names}]\n\n[permissions]')
 
 
-def build(out: Path, platform: str | None, python: str, wheels: list[Path]) -> Path:
+def build(out: Path, platform: str | None, python: str, wheels: list[Path], debian: bool = False) -> Path:
     """Write the zip as one piece; returns its path."""
-    text = manifest(platform, wheels)
+    text = manifest(platform, python, wheels, debian)
     version = re.search(r'(?m)^version = "(.+)"$', text).group(1)
-    tag = f"-{platform}-py{python}" if platform else ""
+    tag = f"-{platform}-py{python}{'-debian' * debian}" if platform else ""
     out.mkdir(parents=True, exist_ok=True)
     path = out / f"tactile-{version}{tag}.zip"
     partial = path.with_suffix(".partial")

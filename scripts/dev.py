@@ -177,13 +177,13 @@ def run_in_binary(binary: Path, pytest_arguments: list[str]) -> int:
         raise SetupError(f"{binary} runs no Python")
     work = ROOT / "out" / "test-blender"
     site, wheels = work / "site", work / "dist"
-    build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", found.group(1)]
+    build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--debian", "--python", found.group(1)]
     constraint = ["--constraint", str(ROOT / "constraints.txt")]
     pytest = [sys.executable, "-m", "pip", "install", "--upgrade", "--target", str(site), *constraint]
     for step in ([*build, "--out", str(wheels)], [*pytest, *TEST_PACKAGES]):
         if subprocess.call(step, env=environment()):
             raise SetupError("the step before failed")
-    packed = max(wheels.glob(f"*-py{found.group(1)}.zip"), key=lambda path: path.stat().st_mtime)
+    packed = max(wheels.glob(f"*-py{found.group(1)}-debian.zip"), key=lambda path: path.stat().st_mtime)
     run = ROOT / "tests" / "blender" / "run_in_blender.py"
     say(f"pytest tests/blender, {binary}, {packed.name}")
     known = dict(environment(), TACTILE_ZIP=str(packed), TACTILE_SITE=str(site))

@@ -116,7 +116,15 @@ def photograph(binary: Path) -> None:
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]
     answer = subprocess.run(ask, check=True, capture_output=True, text=True).stdout
     python = answer.split("PY ")[1].split()[0]
-    build = [sys.executable, str(ROOT / "scripts" / "build_extension.py"), "--python", python, "--out", str(out)]
+    build = [
+        sys.executable,
+        str(ROOT / "scripts" / "build_extension.py"),
+        "--debian",
+        "--python",
+        python,
+        "--out",
+        str(out),
+    ]
     packed = subprocess.run(build, check=True, capture_output=True, text=True).stdout.rsplit(" (", 1)[0].strip()
     for stage in STAGES:
         known = {"STAGE": stage, "OUT": str(out / f"{stage}.png"), "ZIP": packed,

@@ -114,7 +114,8 @@ CLASSES = (TACTILE_OT_clear_cache, TactilePreferences)
 
 
 def register() -> None:
-    """Take up what the user set before: the library of LLVM, the folder of sensors."""
+    """Keep the cache in the extension's folder, and take up what the user set before: LLVM, the folder of sensors."""
+    os.environ.setdefault(array_cache.CHOSEN, bpy.utils.extension_path_user(ID, path="cache"))
     stored = bpy.context.preferences.addons.get(ID)
     if stored is not None and stored.preferences is not None:
         _tell(stored.preferences)

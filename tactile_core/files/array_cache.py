@@ -13,13 +13,14 @@ import numpy as np
 from ..errors import TactileError
 from . import atomic, outside
 
+CHOSEN = "TACTILE_CACHE"  # variable that names the folder
 HASHES = "sha256.json"  # in each folder of arrays, with the hash of each; written last: else an entry is not whole
 _MOST = 2**16  # bytes of that file; a few names and hashes
 
 
 def cache_folder() -> Path:
     """Return ``$TACTILE_CACHE``, else ``~/.cache/tactile`` (``%LOCALAPPDATA%`` on Windows); it need not exist."""
-    chosen = os.environ.get("TACTILE_CACHE")
+    chosen = os.environ.get(CHOSEN)
     if chosen:
         return Path(chosen)
     base = os.environ.get("LOCALAPPDATA") or os.environ.get("XDG_CACHE_HOME")

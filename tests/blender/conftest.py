@@ -22,6 +22,8 @@ collect_ignore_glob = [] if HERE else ["test_*.py"]
 if HERE and "bpy" not in sys.modules:
     # A user folder of its own, before Blender starts: the tests neither see nor change the developer's settings.
     os.environ["BLENDER_USER_RESOURCES"] = tempfile.mkdtemp(prefix="tactile-blender-")
+# What takes minutes to compute is kept between runs, as the command line does.
+os.environ.setdefault("TACTILE_CACHE", str(Path.home() / ".cache" / "tactile"))
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path
 
@@ -32,6 +33,7 @@ def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, needs, mo
 
 
 def test_every_operator_is_documented(extension):
-    page = PAGE.read_text(encoding="utf-8")
+    with (PAGE.parent / "blender_operators.csv").open(encoding="utf-8", newline="") as file:
+        named = {name for row in csv.reader(file) for name in row[0].split(", ")}
     registered = {name for name in dir(bpy.ops.tactile) if not name.startswith("_")}
-    assert {name for name in registered if f"`{name}`" not in page} == set()
+    assert registered <= named

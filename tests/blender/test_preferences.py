@@ -15,6 +15,16 @@ def preferences(extension):
     found.calibration = found.llvm = ""
 
 
+def test_the_cache_lies_in_the_extension_s_folder_unless_it_is_named(monkeypatch, part, extension):
+    own, named = bpy.utils.extension_path_user(PACKAGE, path="cache"), "elsewhere"
+    for before, after in ((None, own), (named, named)):
+        monkeypatch.delenv("TACTILE_CACHE", raising=False)
+        if before:
+            monkeypatch.setenv("TACTILE_CACHE", before)
+        part("addon.settings.preferences").register()
+        assert str(part("tactile_core.files.array_cache").cache_folder()) == after
+
+
 def test_clearing_the_cache_removes_our_arrays_alone(monkeypatch, tmp_path, part):
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
     for name in ("compliance-digit-1", "mine"):
