@@ -60,7 +60,7 @@ class Drawer:
         """Return the unit's dots; raises TactileError where it has none."""
         if self.dots is None:
             found = "asked of a unit without dots"
-            advice = "Give a --calibration with a [markers] table (docs/calibration.md)"
+            advice = "Give a --calibration with a [markers] table (docs/optics.md)"
             raise TactileError("--keep marker_motion", found, "a gel with dots printed on it", advice)
         return self.dots
 

@@ -37,7 +37,7 @@ EXR, EXR_NAME, REST, CAMERA = "exr", "{:05d}.exr", "rest.exr", "camera.exr"
 UNITS = (
     "Linear radiance of the coating: R, G, B the light of the red, green and blue LED, in grey levels of that channel "
     "in the picture's middle. Channel R of the picture, 8-bit levels: response.R.red R + response.R.green G + "
-    "response.R.blue B + ambient.R of camera.exr; so G and B."
+    "response.R.blue B + ambient.R of camera.exr, bent by the camera's toe and shoulder; so G and B."
 )
 
 Progress = Callable[[int, int], None]

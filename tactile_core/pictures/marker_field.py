@@ -19,7 +19,7 @@ class MarkerField:
 
     def __init__(self, unit: Calibration) -> None:
         if unit.markers is None:
-            raise TactileError("calibration, markers", "missing", "a [markers] table", "See docs/calibration.md")
+            raise TactileError("calibration, markers", "missing", "a [markers] table", "See docs/optics.md")
         self.unit, self._mapper = unit, gel_mapper(unit.camera)
         markers, camera = unit.markers, unit.camera
         self._dark = 1 - markers.albedo  # share of light that ink takes

@@ -13,6 +13,7 @@ from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import load_calibration
 from ..sensors.camera import COLOURS
 from .background import correction, raised_light, resting_picture
+from .camera_curve import bent, ends
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
 from .light import Lamps
@@ -86,6 +87,7 @@ class Renderer:
         self.dots = None if calibration.markers is None else MarkerField(calibration)
         background = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(background, (*self.camera.shape, 3), "background")
+        self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)
 
@@ -158,6 +160,8 @@ class Renderer:
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
 
+        The change is bent by the camera's toe and shoulder (``camera_curve``).
+
         noise : makes the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
         """
@@ -170,10 +174,9 @@ class Renderer:
             now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
             picture, rows = np.empty(self.background.shape, np.uint8), (len(self.background), -1)
             background, drawn = self.background.reshape(rows), picture.reshape(rows)
-            _fill_levels(now, at_rest, self._response, background, np.float32(LARGEST_LEVEL), drawn)
+            _fill_levels(now, at_rest, self._response, background, self._ends, np.float32(LARGEST_LEVEL), drawn)
             return picture
-        levels = self.in_levels(radiance - self.rest_radiance)
-        levels += self.background
+        levels = self.background + bent(self.in_levels(radiance - self.rest_radiance), self.background)[0]
         if marks is not None:
             levels *= marks[..., None]
         if noise is not None:
@@ -235,10 +238,13 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 
 
 @Loop
-def _fill_levels(radiance, rest, response, background, largest, picture):  # noqa: ANN001, ANN202
-    """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W)."""
+def _fill_levels(radiance, rest, response, background, ends, largest, picture):  # noqa: ANN001, ANN202
+    """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W), bent.
+
+    ends : (4, H, 3 W) of the camera's curve
+    """
     leds, height, width = radiance.shape
-    lowest, line = np.float32(0), np.empty(3 * width, np.float32)
+    lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)
     for row in range(height):  # a row stays in the processor's cache
         for led in range(leds):
@@ -251,6 +257,15 @@ def _fill_levels(radiance, rest, response, background, largest, picture):  # noq
                     level[column] += response[channel, led, row, column] * change[led, column]
             for column in range(width):
                 line[3 * column + channel] = level[column]
+        bends = False
+        for k in range(3 * width):
+            bends |= (line[k] < ends[0, row, k]) | (line[k] > ends[2, row, k])
+        for k in range(3 * width if bends else 0):  # as ``bent``
+            below, above = line[k] - ends[0, row, k], line[k] - ends[2, row, k]
+            if below < lowest:
+                line[k] = ends[0, row, k] + ends[1, row, k] * (np.exp(below / ends[1, row, k]) - one)
+            elif above > lowest:
+                line[k] = ends[2, row, k] + ends[3, row, k] * (one - np.exp(-above / ends[3, row, k]))
         for k in range(3 * width):
             value = np.rint(line[k] + background[row, k])
             picture[row, k] = np.uint8(np.int32(min(max(value, lowest), largest)))  # by way of 32 bits: vectorised

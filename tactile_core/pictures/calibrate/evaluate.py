@@ -15,6 +15,7 @@ import numpy as np
 from ...accuracy import Row, row
 from ...errors import TactileError
 from ...sensors.calibration import LARGEST_LEVEL, Calibration
+from ..camera_curve import bent
 from .ball_pictures import BallPictures, FastPictures, working_factor
 from .photo_metrics import metrics
 from .photographs import Photographs, Press
@@ -101,7 +102,7 @@ def _try_press(
     radius = sight.radius(radius)
     ball, _ = fit_ball(working, sight, radius)
     picture, ours = _compared(press, background, whole.change(ball))
-    _, baseline = _compared(press, background, 0.0)
+    _, baseline = _compared(press, background, np.zeros_like(background))
     more = missing_light(working, sight, fit_ball(working, sight, radius, lit=True)[0])[1]
     known = whole.calibration.through
     through = min(max(known + more, 0.0), 1.0)
@@ -118,9 +119,10 @@ def _try_press(
     return Evaluation(press, ball, free, picture, through, ours, baseline, flags)
 
 
-def _compared(press: Press, background: np.ndarray, change: np.ndarray | float) -> tuple[np.ndarray, dict[str, float]]:
+def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
     """Picture (H, W, 3) uint8 of a change in levels, and its metrics; the baseline knows how light drifted as well."""
-    picture = np.rint(background + press.drift + change).clip(0, LARGEST_LEVEL).astype(np.uint8)
+    untouched = background + press.drift
+    picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 

@@ -20,6 +20,7 @@ DILATION = 9  # px, by which the region reaches beyond such pixels
 SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dust or drift, a light press has 2,000
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
+EXPOSURE = 0.1  # share by which the gel beside a press is brighter or darker, that is flagged; real sets differ by 0.06
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
 NOISE_WINDOW = 41  # px at 240 wide, of the means that are no noise
 NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
@@ -220,6 +221,10 @@ def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: flo
         flags.append("over-exposed")
     if (np.abs(difference).max(-1) > CHANGE).mean() > LARGEST_SHARE:
         flags.append("changed nearly all over: another lighting than the background's")
+    beside = ~touched & (background.max(-1) > CHANGE)
+    brighter = float(np.median(picture[beside].sum(-1) / background[beside].sum(-1))) - 1 if beside.any() else 0.0
+    if abs(brighter) > EXPOSURE:
+        flags.append(f"exposed otherwise: {100 * brighter:+.0f} % beside the press, of the background's light")
     return Press(name, picture, drift, change, touched, region, tuple(flags), radius)
 
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..camera_curve import bent
 from .ball_pictures import BallPictures, smaller, working_factor
 from .photo_metrics import windowed
 from .photographs import Press, dilated
@@ -68,6 +69,7 @@ class Ball(NamedTuple):
 class Sight:
     """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w).
 
+    shown : (n, 3) levels of change of those that count; untouched : (n, 3) of the gel at rest, in that day's light
     factor : by which the photograph is made smaller; None for that of fits
     """
 
@@ -78,6 +80,13 @@ class Sight:
         spoilt = smaller((press.picture.max(-1) == 255).astype(np.float32), factor) > 0
         self.region = smaller(press.touched.astype(np.float32), factor) > 0.25
         self.counts = dilated(self.region, MARGIN) & ~spoilt
+        self.shown = self.change[self.counts]
+        self.untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown
+
+    def missed(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a change (n, 3) of linear light misses of the photograph, levels, and the camera's slope."""
+        seen, slope = bent(change, self.untouched)
+        return seen - self.shown, slope
 
     def radius(self, common: float) -> float:
         """Return the radius, m, of the photograph's own ball; without one that of the whole set's."""
@@ -123,7 +132,7 @@ class _PressProblem:
         ball = (*x[:3], x[3] if len(x) > 3 else self._radius)
         if self._lit:
             return missing_light(self._bench, self._sight, ball)[0].ravel()
-        return (self._bench.change(ball) - self._sight.change)[self._sight.counts].ravel()
+        return self._sight.missed(self._bench.change(ball)[self._sight.counts])[0].ravel()
 
     def cost(self, x: np.ndarray) -> float:
         """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture and table."""
@@ -164,6 +173,7 @@ def missing_light(
     Returns what the picture with it misses (n, 3), grey levels, of the pixels that count; and that light, by least
     squares, as a share of a coating's own that faces the LEDs
     """
-    missed, white = (each[sight.counts] for each in (bench.change(ball) - sight.change, bench.white(ball)))
+    missed, slope = sight.missed(bench.change(ball)[sight.counts])
+    white = slope * bench.white(ball)[sight.counts]
     more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)
     return missed + more * white, more

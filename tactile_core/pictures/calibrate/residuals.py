@@ -1,8 +1,9 @@
 """The sum of squares that a unit's calibration makes small: photographs of presses against their pictures.
 
-The unknowns are the unit's numbers and three numbers a press. The gain C is linear in the picture, so that it is solved
-for at each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). What is
-assumed of units holds the numbers that few photographs do not tell: one more square each.
+The unknowns are the unit's numbers and three numbers a press. The gain C is linear in light, so that it is solved
+for at each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by steps of
+Gauss and Newton's, as the camera's toe and shoulder bend the picture. What is assumed of units holds the numbers that
+few photographs do not tell: one more square each.
 """
 
 from __future__ import annotations
@@ -75,6 +76,7 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
     return changed.with_gain(calibration.gain).with_through(through)
 
 
+GAIN_STEPS = 2  # by Gauss and Newton's method, from the gain of the last cost
 GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
 PRESS_STEP = 10e-3  # mm
 
@@ -108,7 +110,6 @@ class UnitResiduals:
         thickness = shape_of(start.camera.sensor).thickness
         self._deepest = np.array([deepest(sight.radius(radius), thickness) for sight in sights])
         self._numbers = parameters_of(start)
-        self._seen = [sight.change[sight.counts].T.astype(float) for sight in sights]  # (3, p) each
         gain = start.gain
         terms = [np.asarray(gain.centre), 1e-3 * np.asarray(gain.along_right), 1e-3 * np.asarray(gain.along_down)]
         self._start_gain = np.concatenate(terms, axis=1)  # (channel, term and LED)
@@ -144,7 +145,7 @@ class UnitResiduals:
         self._bench, self._last, self._balls_now = bench, lights, self.balls(x)
         self._solve_gain()
         numbers = parameters_of(bench.calibration)
-        cost = sum(np.square(missed).sum() for missed in self._missed())
+        cost = sum(np.square(missed).sum() for missed, _ in self._missed())
         cost += (self._weight * (numbers - self._numbers) ** 2).sum()
         cost += (self._gain_weight * (self.gain - self._start_gain) ** 2).sum()
         return float(cost / 2)
@@ -157,15 +158,13 @@ class UnitResiduals:
 
     def unexplained(self) -> np.ndarray:
         """Return the share (n,) of each photograph's squares that the pictures of the last cost leave."""
-        pairs = zip(self._missed(), self._seen, strict=True)
-        return np.array([np.square(missed).sum() / np.square(seen).sum() for missed, seen in pairs])
+        pairs = zip(self._missed(), self._sights, strict=True)
+        return np.array([np.square(missed).sum() / np.square(sight.shown).sum() for (missed, _), sight in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
         """Return the standard errors of the gain and its two slopes, rms over LEDs, at the last cost's presses."""
-        matrix = np.diag(self._gain_weight)
-        for lights in self._last:
-            matrix = matrix + lights.terms @ lights.terms.T
-        squares = MODEL_ERROR**2 * np.diag(np.linalg.inv(matrix)).reshape(3, 3).mean(1)
+        inverse = np.linalg.inv(self._gain_equations()[0])  # (channel, 9, 9)
+        squares = MODEL_ERROR**2 * inverse.diagonal(0, 1, 2).mean(0).reshape(3, 3).mean(1)
         return tuple(np.sqrt(squares).tolist())
 
     def _sensible(self, x: np.ndarray) -> bool:
@@ -183,17 +182,25 @@ class UnitResiduals:
         right, down = (1e3 * values[sight.counts] for values in (bench.right, bench.down))
         return np.concatenate([changes, right * changes, down * changes])
 
-    def _missed(self) -> list[np.ndarray]:
-        """Residuals (3, p) of the pictures of each press."""
-        return [self.gain @ lights.terms - seen for lights, seen in zip(self._last, self._seen, strict=True)]
+    def _missed(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Residuals (3, p) of the pictures of each press, and the slopes (3, p) of the camera's curve there."""
+        pairs = zip(self._last, self._sights, strict=True)
+        found = (sight.missed((self.gain @ lights.terms).T) for lights, sight in pairs)
+        return [(missed.T, slope.T) for missed, slope in found]
+
+    def _gain_equations(self) -> tuple[np.ndarray, np.ndarray]:
+        """Gauss-Newton's matrix (3, 9, 9) and gradient (3, 9) of each channel's gain."""
+        matrix, gradient = np.diag(self._gain_weight), self._gain_weight * (self.gain - self._start_gain)
+        for lights, (missed, slope) in zip(self._last, self._missed(), strict=True):
+            bright = slope[:, None] * lights.terms
+            matrix = matrix + bright @ bright.swapaxes(1, 2)
+            gradient = gradient + (bright @ missed[..., None])[..., 0]
+        return matrix, gradient
 
     def _solve_gain(self) -> None:
-        matrix = np.diag(self._gain_weight)
-        right_side = self._start_gain * self._gain_weight
-        for lights, seen in zip(self._last, self._seen, strict=True):
-            matrix = matrix + lights.terms @ lights.terms.T
-            right_side = right_side + seen @ lights.terms.T
-        self.gain = np.linalg.solve(matrix, right_side.T).T
+        for _ in range(GAIN_STEPS):
+            matrix, gradient = self._gain_equations()
+            self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the matrix and gradient over x, the gain eliminated."""
@@ -203,18 +210,18 @@ class UnitResiduals:
         numbers = parameters_of(self._bench.calibration)
         matrix[:free, :free] = np.diag(self._weight[self._free])
         gradient[:free] = (self._weight * (numbers - self._numbers))[self._free]
-        own = np.diag(self._gain_weight)
+        own, _ = self._gain_equations()
         mixed = np.zeros((3, count, 9))  # by channel
         unit_steps = self._steps_of_unit(numbers)
-        for k, (lights, missed) in enumerate(zip(self._last, self._missed(), strict=True)):
+        for k, (lights, (missed, slope)) in enumerate(zip(self._last, self._missed(), strict=True)):
             columns = np.r_[:free, free + 3 * k : free + 3 * k + 3]
             slopes = np.concatenate([unit_steps[k], self._steps_of_press(x, k)], axis=1)  # (3, free + 3, p)
+            slopes *= slope[:, None]
             matrix[np.ix_(columns, columns)] += np.einsum("cap,cbp->ab", slopes, slopes, optimize=True)
             gradient[columns] += np.einsum("cap,cp->a", slopes, missed, optimize=True)
-            own = own + lights.terms @ lights.terms.T
-            mixed[:, columns] += slopes @ lights.terms.T
-        for channel in mixed:
-            matrix -= channel @ np.linalg.solve(own, channel.T)
+            mixed[:, columns] += slopes @ (slope[:, None] * lights.terms).swapaxes(1, 2)
+        for channel, terms in zip(mixed, own, strict=True):
+            matrix -= channel @ np.linalg.solve(terms, channel.T)
         return matrix, gradient
 
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:

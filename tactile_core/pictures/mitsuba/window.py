@@ -15,7 +15,9 @@ from ...sensors.calibration import Calibration
 from ...sensors.camera import Camera
 from ...sensors.gel_shape import shape_of
 
-ACRYLIC = 3e-3  # m, thickness: assumed
+# m, thickness: the maker's guide cuts it from 4 mm; units that GelSight sells have 5.5 mm, the design file 6.15 mm
+# (github.com/facebookresearch/digit-design, issues 12 and 38). 4 or 6 mm in place of 3 moves gel by under .02 px.
+ACRYLIC = 4e-3
 _SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inverts Snell's law
 
 

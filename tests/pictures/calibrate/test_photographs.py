@@ -93,6 +93,16 @@ def test_over_exposed_photograph_is_flagged(tmp_path: Path) -> None:
     assert any("another lighting" in flag for flag in flags["press_1.png"])
 
 
+@pytest.mark.parametrize(("exposure", "words"), [(0.8, "-20 % beside"), (0.95, ""), (1.15, "+15 % beside")])
+def test_another_exposure_than_the_background_s_is_flagged(
+    folder: Path, tmp_path: Path, exposure: float, words: str
+) -> None:
+    press = np.asarray(Image.open(folder / "press_1.png")) * exposure
+    Image.fromarray(np.rint(press).astype(np.uint8)).save(tmp_path / "press.png")
+    (found,) = read_photographs(tmp_path, folder.parent / "untouched.png").presses
+    assert any("exposed otherwise" in flag and words in flag for flag in found.flags) == bool(words)
+
+
 def test_no_folder_no_picture_no_press(tmp_path: Path) -> None:
     with pytest.raises(TactileError, match="no folder"):
         read_photographs(tmp_path / "absent")

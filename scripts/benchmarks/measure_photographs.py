@@ -1,0 +1,165 @@
+"""Hold pictures against photographs of DIGITs, and write the rows to docs/calibration.csv.
+
+    python scripts/benchmarks/measure_photographs.py DATA                  DATA holds digit_real, biotac_force ...
+    python scripts/benchmarks/measure_photographs.py DATA --parts levels   that part alone; the file's others stay
+
+Fits begin at round numbers (`start.toml`) or at the unit that ships, end on the fast picture, and are tried on
+photographs that they have not seen. `levels` compares how dark, bright and colourful photographs are with pictures of
+real recordings.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
+
+from benchmarks.measured_rows import parser_of, printed, read_table, write_table
+from tactile_core.accuracy import Row, row
+from tactile_core.pictures.background import read_photograph
+from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_metrics
+from tactile_core.pictures.calibrate.fit import calibrate
+from tactile_core.pictures.calibrate.photographs import CHANGE, Photographs, chosen, press_of, read_photographs
+from tactile_core.pictures.renderer import Renderer
+from tactile_core.recordings import PrepareOptions, read
+from tactile_core.recordings.assemble import assemble
+from tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
+from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.translation.translate import translate
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE, START = ROOT / "docs/calibration.csv", ROOT / "scenes/calibrations/start.toml"
+DIAMETER = 6e-3  # m, of the balls
+FRAMES = 100, 25  # between those drawn of the long recording, and of the short one
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print and write the parts."""
+    parser = parser_of(__doc__)
+    parser.add_argument("data", type=Path, metavar="DATA")
+    parser.add_argument("--parts", default=",".join(PARTS), help="which, by commas")
+    options = parser.parse_args(arguments)
+    parts: dict[str, list] = {}
+    for each in read_table(PAGE) if PAGE.exists() else []:
+        parts.setdefault(each["part"], []).append(each)
+    for name in options.parts.split(","):
+        parts[name] = printed(PARTS[name](options.data))
+        write_table(PAGE, parts)
+    return 0
+
+
+def own_unit(data: Path) -> Photographs:
+    """The 14 photographs of the unit that ships."""
+    return read_photographs(data / "digit_real" / "presses")
+
+
+def deeper(data: Path, known: Photographs) -> Photographs:
+    """Two presses of another day, deeper and of another ball, beside the first day's untouched gel."""
+    files = sorted((data / "digit_real" / "deeper").glob("*.png"))
+    found = (press_of(file.name, read_photograph(file), known.background) for file in files)
+    return dataclasses.replace(known, presses=tuple(press for press in found if press is not None))
+
+
+def other_unit(data: Path) -> Photographs:
+    """Ten photographs of Taxim's unit, with its untouched gel."""
+    folder = data / "digit_other_unit"
+    return read_photographs(folder, folder / "untouched.jpg")
+
+
+def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
+    """Yield a fit without each ``count``-th of the photographs, and these."""
+    names = [press.name for press in photographs.presses]
+    for fold in range(count):
+        apart = names[fold::count]
+        others = chosen(photographs, [name for name in names if name not in apart])
+        yield calibrate(others, DIAMETER, start, unit="", quick=True).calibration, chosen(photographs, apart)
+
+
+def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
+    """Yield the means over photographs, and the worst."""
+    ours, baseline = mean_metrics(tried)
+    for name, unit in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("through_psnr", "dB"), ("through_l1", "levels")):
+        yield row(name, ours[name], unit, baseline=baseline[name], of=of)
+    yield row("lobe_iou", ours["lobe_iou"], "", of=of)
+    yield row("below_background", 100 * (1 - ours["roi_l1"] / baseline["roi_l1"]), "%", of=of)
+    yield row("worst_psnr", min(each.metrics["roi_psnr"] for each in tried), "dB", of=of)
+
+
+def thirds(data: Path) -> Iterator[Row]:
+    """Yield rows of fits of two thirds of the 14, from round numbers, tried on the third and on the deeper two."""
+    known = own_unit(data)
+    start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
+    for unit, third in folds(known, 3, start):
+        apart += evaluate_unit(unit, third, DIAMETER / 2, search_radius=False)
+        deep_tried += evaluate_unit(unit, deep, DIAMETER / 2, search_radius=False)
+    yield from metric_rows(apart, "14 photographs by thirds")
+    yield from metric_rows(deep_tried, "2 deeper, by the fits of the 14")
+
+
+def five(data: Path) -> Iterator[Row]:
+    """Yield rows of the unit that ships on the five photographs that it was not fitted to, and on another unit's."""
+    unit, known = load_calibration(), own_unit(data)
+    apart = [press.name for press in known.presses if press.name not in unit.fit.photographs]
+    for of, each in (("5 not fitted", chosen(known, apart)), ("another unit", other_unit(data))):
+        yield from metric_rows(evaluate_unit(unit, each, DIAMETER / 2, search_radius=False), f"unit that ships, {of}")
+
+
+def fifths(data: Path) -> Iterator[Row]:
+    """Yield rows of another unit by fifths, from the unit that ships."""
+    tried = []
+    for unit, fifth in folds(other_unit(data), 5, load_calibration()):
+        tried += evaluate_unit(unit, fifth, DIAMETER / 2, search_radius=False)
+    yield from metric_rows(tried, "another unit by fifths")
+
+
+def levels(data: Path) -> Iterator[Row]:
+    """Yield rows of touched places on photographs, and on pictures of real recordings."""
+    known, other = own_unit(data), other_unit(data)
+    for of, each in (("14 photographs", known), ("2 deeper", deeper(data, known)), ("another unit", other)):
+        shown = np.stack([press.picture for press in each.presses])
+        yield from level_rows(shown, each.background + np.stack([press.drift for press in each.presses]), of)
+    renderer = Renderer(preset="fast")
+    for of, displacement in recordings(data):
+        yield from level_rows(renderer.render(displacement), renderer.background, f"pictures of {of}")
+
+
+def recordings(data: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the gel's displacement (T, n, 3) m on real recordings: a finger on a force sensor, and a slide."""
+    folder = data / "biotac_force"
+    rest, pressed = (np.loadtxt(folder / f"finger1_{name}.txt") for name in ("rest", "counts"))
+    counts = np.concatenate([rest, pressed])
+    recording = assemble("finger1", "text", electrodes=counts, stamps=np.arange(len(counts)) / 100)
+    tare = PrepareOptions(tare=slice(0, len(rest)))
+    frames = slice(len(rest), None, FRAMES[0])
+    yield "a pressed finger", translate(recording, prepare=tare, frames=frames).displacement_digit
+    slide = read(data / "biotac_recordings" / "slide" / "mat10_31_bio.csv")
+    yield "a slide", translate(slide, frames=slice(None, None, FRAMES[1])).displacement_digit
+
+
+def level_rows(pictures: np.ndarray, rest: np.ndarray, of: str) -> Iterator[Row]:
+    """Yield the levels of touched pixels of pictures (n, H, W, 3); rest : of the untouched gel, the same or one."""
+    rest = np.broadcast_to(rest, pictures.shape)
+    touched = np.abs(pictures - rest.clip(0, LARGEST_LEVEL)).max(-1) > CHANGE
+    seen, share = pictures[touched].astype(float), pictures[touched] / np.maximum(rest[touched], 1)
+    saturation = 1 - seen.min(1) / np.maximum(seen.max(1), 1)
+    yield row("clipped", 100 * np.mean((pictures == 0) | (pictures == LARGEST_LEVEL)), "% of all", of=of)
+    yield row("clipped_touched", 100 * np.mean((seen == 0) | (seen == LARGEST_LEVEL)), "% of touched", of=of)
+    for percent in (50, 99, 99.9):
+        yield row(f"saturation_{percent:g}", float(np.percentile(saturation, percent)), "", of=of)
+    for percent in (0.1, 1, 5):
+        yield row(f"of_rest_{percent:g}", float(np.percentile(share, percent)), "", of=of)
+    for percent in (1, 10, 50, 90, 99):
+        yield row(f"level_{percent}", float(np.percentile(seen, percent)), "levels", of=of)
+
+
+PARTS: dict[str, Callable[[Path], Iterator[Row]]] = {
+    each.__name__: each for each in (levels, five, thirds, fifths)
+}  # fmt: skip
+
+if __name__ == "__main__":
+    sys.exit(main())
