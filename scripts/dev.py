@@ -127,10 +127,7 @@ def run_demo(folder: Path) -> int:
 
 
 def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
-    """Ruff, then pytest, whatever ruff says; the status of the first that fails.
-
-    The whole suite runs in as many processes as there are cores, up to WORKERS, of one thread each.
-    """
+    """Run ruff, then pytest on up to WORKERS processes of one thread; return the status of the first that fails."""
     extras = ("plain" if options.numpy else "dev", *(("train",) if options.train else ()))
     python = install(options.venv, extras, options.numpy)
     variables, workers = environment(), min(os.cpu_count() or 1, WORKERS)

@@ -38,10 +38,7 @@ SETS = {  # what is added -> the outputs asked for, each beside those before it
 
 
 class Part(NamedTuple):
-    """Measured cost.
-
-    start : s before the first frame; ms : a frame; mb : peak resident; kb : on disk, a frame.
-    """
+    """Measured cost. start : s before the first frame; ms : a frame; mb : peak resident; kb : on disk, a frame"""
 
     start: float
     ms: float

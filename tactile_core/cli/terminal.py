@@ -79,10 +79,7 @@ def duration(seconds: float) -> str:
 
 
 def agree(cost: str, seconds: float, agreed: bool) -> None:
-    """Print what a job will cost; ask whether to begin where it takes long and a person is at the terminal.
-
-    agreed : in advance, by --yes. Raises TactileError without an agreement.
-    """
+    """Print a cost; ask to begin where it takes long, unless `agreed`. Raises TactileError without consent."""
     say(cost)
     if agreed or seconds <= LONG:
         return
@@ -99,10 +96,7 @@ EVERY = 10.0  # s between two lines of progress in a log
 
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """Return a callback (done, in all) that shows progress.
-
-    A bar on a terminal, for over two seconds of work, or if forced; elsewhere, as in a log, a line every ten seconds.
-    """
+    """Return a callback (done, in all): a bar on a terminal or if `forced`, else a line every ten seconds."""
     if not forced and not sys.stderr.isatty():
         yield _lines(name, unit)
         return

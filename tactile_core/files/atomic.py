@@ -56,10 +56,7 @@ def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False
 
 
 def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
-    """Write readable JSON with sorted keys, so that equal content is equal bytes; raises ValueError for NaN.
-
-    A list of numbers or names takes one line.
-    """
+    """Write readable JSON, keys sorted, lists of numbers or names in one line. Raises ValueError for NaN."""
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     text = _PLAIN_LIST.sub(lambda found: "[" + ", ".join(_PLAIN.findall(found[0])) + "]", text)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
@@ -113,10 +110,7 @@ def sweep_files(folder: str | os.PathLike) -> None:
 
 
 def _beside(path: Path, role: str) -> Path:
-    """Return a hidden name in the same folder that no other program uses.
-
-    Raises TactileError for a path without a name.
-    """
+    """Return a hidden name beside a path that no other program uses. Raises TactileError without a name."""
     if not path.name:
         raise TactileError(path, "no name", "a new file or folder")
     return path.with_name(f".{_short(path.name)}.tactile-{role}")

@@ -36,10 +36,7 @@ def described() -> list[str]:
 
 
 def copy(names: Sequence[str], out: str | Path) -> list[Path]:
-    """Copy scenes, all of them where none is named, to ``out``/NAME; each appears whole.
-
-    Raises TactileError for a name that is no scene, and before anything is copied where one is there already.
-    """
+    """Copy scenes, or all, to ``out``/NAME, each whole. Raises TactileError for unknown ones or those there."""
     known = _names()
     for name in names:
         if name not in known:

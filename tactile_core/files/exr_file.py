@@ -59,10 +59,7 @@ def _check_size(path: str | os.PathLike) -> None:
 
 
 def read_height(path: str | os.PathLike) -> np.ndarray:
-    """Read the height map (H, W) m in an EXR file: its channel "height", or its only one.
-
-    Raises TactileError for a file without such a channel.
-    """
+    """Read heights (H, W) m of an EXR file: channel "height", or its only one. Raises TactileError for neither."""
     planes, _ = read_exr(path)
     if len(planes) == 1:
         return next(iter(planes.values()))

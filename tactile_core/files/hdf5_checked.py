@@ -79,7 +79,6 @@ def open_plain(path: str | os.PathLike, look: Callable = lambda *_: None) -> Ite
     Meant for files of plain numbers, see ``check_plain``. Every object is opened once under `bounded_memory`: on two
     kinds of file, found by fuzzing, the HDF5 library (up to 2.0) would use up all memory. One begins with a driver's
     information of up to 4 GB; in the other, one changed byte makes a list of free places circular.
-
     look : called with path, name and object, of every group and dataset
     """
     import h5py
@@ -114,10 +113,7 @@ def declared(data: h5py.Dataset, where: str) -> None:
 
 
 def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
-    """Read a dataset, or some rows of it, at most MOST_CHUNKS of its chunks at a time.
-
-    Raises TactileError for a row of more.
-    """
+    """Read a dataset, or some rows, at most MOST_CHUNKS chunks at a time. Raises TactileError for a row of more."""
     if data.chunks is None or not data.ndim:
         return data[()] if rows is None else data[rows]
     start, stop, _ = (rows or slice(None)).indices(len(data))
@@ -131,10 +127,7 @@ def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
 
 
 def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
-    """Raise TactileError for a dataset other than plain numbers in this file, uncompressed, with or without checksums.
-
-    Meant for the project's own files, of which a few rows are read many times: `open_checked` would check each chunk.
-    """
+    """Raise TactileError unless a dataset is plain numbers of this file, uncompressed, which need no further check."""
     layout, name = data.id.get_create_plist(), data.name
     if layout.get_external_count() or data.is_virtual or data.dtype.kind not in "fiub":
         raise _refused(path, name, "no plain numbers", "numbers in this file")

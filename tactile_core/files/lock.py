@@ -31,10 +31,7 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def awaited(file: Path) -> Iterator[None]:
-    """Wait for the lock on ``file`` and hold it, so that what several processes need is made once; the file stays.
-
-    On a file system without locks every process gets it at once.
-    """
+    """Wait for the lock on ``file``, which stays, and hold it; without locks in the file system all get it at once."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         with contextlib.suppress(OSError):

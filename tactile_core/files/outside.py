@@ -24,10 +24,7 @@ MOST_DOTS = 100  # in a TOML key; tomllib's time grows with the square of them (
 
 
 def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
-    """Raise TactileError for a pipe, socket or device, OSError where nothing or a folder is; links count as their ends.
-
-    expected : what should be there, in words
-    """
+    """Raise TactileError for a pipe, socket or device, OSError for nothing or a folder; links are followed."""
     return _regular(path, os.stat(path), expected)
 
 
@@ -53,10 +50,7 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
-    """Read the UTF-8 text of a file of at most `most` bytes; a byte order mark is skipped.
-
-    Raises OSError and UnicodeDecodeError, TactileError for a longer file, a pipe or a device.
-    """
+    """Read UTF-8 text of at most `most` bytes, without its mark. Raises OSError, UnicodeDecodeError, TactileError."""
     return read(path, most, "a text file").decode("utf-8-sig")
 
 

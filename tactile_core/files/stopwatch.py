@@ -25,10 +25,7 @@ class Stopwatch:
             self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + time.process_time() - cpu_start
 
     def per_frame(self, count: int) -> dict[str, dict[str, float]]:
-        """Return ms per frame of each stage, in the order they were first entered, and of all together.
-
-        ``ms_a_frame`` is by the clock on the wall, ``cpu_ms_a_frame`` by the CPU: on a busy machine the second is less.
-        """
+        """Return ms a frame of each stage and of all, by the wall clock and by the CPU, which is steadier."""
         return {"ms_a_frame": _per_frame(self.seconds, count), "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count)}
 
 

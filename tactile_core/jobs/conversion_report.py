@@ -36,10 +36,7 @@ SHEET_ARRAYS = (
 
 
 class ConversionReport:
-    """Keeps of the frames that it is given only what is told of all of them, and what the contact sheet shows.
-
-    flagged : frames of each flag
-    """
+    """Keeps what is told of all frames, and what the contact sheet shows of some. flagged : frames of each flag"""
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
         """Take the prepared rows, and rising frames (T,) of them that `made` takes through."""

@@ -97,10 +97,7 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : the result; warnings : what the user should know of it
-
-    remark : by how much a kept traction misses the force, in words; "" without one
-    """
+    """A finished conversion. folder : the result; warnings : sentences; remark : on a kept traction's miss, if any"""
 
     folder: Path
     warnings: tuple[str, ...]

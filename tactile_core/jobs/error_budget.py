@@ -13,10 +13,7 @@ EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6lev
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """Largest acceptable error; None where the user gives no bound.
-
-    um : micrometres rms of a surface; levels : grey levels rms of a picture
-    """
+    """Largest error that will do: um rms of a surface, grey levels rms of a picture; None without a bound."""
 
     um: float | None = None
     levels: float | None = None

@@ -37,10 +37,7 @@ class Tools:
 
 
 class FramePass:
-    """All arrays of a recording's frames, some at a time, and the file that they are kept in.
-
-    folded : height maps so far of a gel that folds over itself
-    """
+    """All arrays of a recording's frames, part by part, and their file. folded : height maps of folded gels so far"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None

@@ -119,10 +119,7 @@ def netcdf_value(value: Any) -> Any:
 
 
 class FramesFile:
-    """Writer of ``frames.h5``, some frames at a time; it holds the kept arrays alone.
-
-    All methods raise OSError, naming the file, where the disk cannot be written.
-    """
+    """Writer of ``frames.h5``, part by part, of the kept arrays alone. Raises OSError where the disk refuses."""
 
     def __init__(
         self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0,
@@ -131,9 +128,7 @@ class FramesFile:
         """Create the file.
 
         pair : the sensor that was read and the gel, after which datasets are named
-
         path : new file; count : T; attributes : of the file itself, beside format and version.
-
         room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's seal; pictures are then in the file,
             and a large array has one chunk a frame
         """

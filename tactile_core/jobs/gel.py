@@ -172,10 +172,7 @@ class Gel:
             return gel_mapper(self._renderer.camera)(self._contact.displacement)
 
     def picture(self) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8 that the sensor's camera takes of the last contact.
-
-        Raises TactileError for the BioTac, which has no camera.
-        """
+        """Return the picture (H, W, 3) uint8 of the last contact. Raises TactileError for a sensor without camera."""
         heights = self.height_map()
         return self._renderer(heights, self._renderer.marks(self._contact.displacement))
 

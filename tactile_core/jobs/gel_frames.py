@@ -64,7 +64,6 @@ def read_frames(
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
 
     gel : whose displacement is read, or solved
-
     Raises TactileError for anything else, or what cannot be read.
     """
     path = Path(path)
@@ -82,10 +81,7 @@ def read_frames(
 
 
 def read_displacement(path: str | os.PathLike, gel: str = TARGET) -> Frames:
-    """Read the displacement of a sensor's surface from ``frames.h5`` or a simulated recording.
-
-    Raises TactileError for another file, and one whose displacement was not kept or lies on another surface.
-    """
+    """Read a surface's displacement from ``frames.h5`` or a simulated recording. Raises TactileError for others."""
     if not os.path.isfile(path):
         raise TactileError(path, "there is no such file", EXPECTED)
     with open(path, "rb") as file:  # the project's own files for this have no user block

@@ -25,10 +25,7 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 
 
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return the last contact as arrays: force (3,) N, motion of markers (rows, columns, 2) m along x, z, and picture.
-
-    markers : from ``marker_nodes``; picture : whether to draw one, the slowest part
-    """
+    """Return the last contact as force (3,) N, motion (rows, columns, 2) m of the markers along x, z, and picture."""
     moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
     seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}
     return seen | {"picture": gel.picture()} if picture else seen

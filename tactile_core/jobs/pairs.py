@@ -139,10 +139,7 @@ def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
-    """Estimate the blocks that `count` contacts take, from the blocks already made: exact where these suffice.
-
-    Raises TactileError for a scene whose presses touch nothing.
-    """
+    """Estimate the blocks for `count` contacts from those made so far. Raises TactileError where none touches."""
     have, number = 0, 0
     while have < count and number in counts:
         have += counts[number]

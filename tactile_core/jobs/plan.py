@@ -90,10 +90,7 @@ def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[st
 
 
 def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
-    """Plan `tactile pairs` of so many contacts, each solved on both sensors in the fast tier.
-
-    A sensor whose cost was not measured counts for nothing, and its line says so.
-    """
+    """Plan `tactile pairs` in the fast tier; a sensor whose cost was not measured counts for nothing and says so."""
     parts = []
     for sensor in pair:
         what = f"{title(sensor)} contacts"
@@ -140,10 +137,7 @@ def _matrices(sensor: str) -> Part:
 
 
 def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept: int) -> Part:
-    """The solves of one sensor, in its tier: of contacts that differ, of which so many frames are kept.
-
-    rough : with friction, which takes the full tier several times as long
-    """
+    """Plan the solves of one sensor. kept : frames that are kept; rough : with friction, which takes longer"""
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":

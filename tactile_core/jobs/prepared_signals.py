@@ -46,10 +46,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts reported of a recording. prepared : reports of its parts; sha256 : of the recording; frames : in all
-
-    labels : of all frames; see ``recordings.labels``
-    """
+    """Facts of a recording. prepared : its parts' reports; frames, labels : of all of it, see ``recordings.labels``"""
 
     recording: str
     layout: str
@@ -67,10 +64,7 @@ class About(TypedDict):
 
 
 def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare recording `index` of the job, unless it is; returns its frames, and whether anything was made.
-
-    Raises TactileError for a recording that cannot be read or has changed since the job was made.
-    """
+    """Prepare recording `index` unless it is; returns its frames, and if made. Raises TactileError if it changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     frames = checksummed.stated_rows(file)
@@ -165,10 +159,7 @@ class _Writer:
 
 
 class Prepared:
-    """An open look into a prepared file; every call opens it again, so that nothing stays open in a worker.
-
-    Each raises TactileError for a damaged file.
-    """
+    """A prepared file, which each call opens anew, so that none stays open. Raises TactileError where it is damaged."""
 
     def __init__(self, file: Path) -> None:
         self._path = file

@@ -125,10 +125,7 @@ def claimed(out: Path, options: Options) -> str:
 
 
 def choose_preset(options: Options) -> str:
-    """Return the preset that was named, the cheapest that is exact enough, or the default.
-
-    Raises TactileError for both, or an error that no preset has.
-    """
+    """Return the preset named, the cheapest that is exact enough, or the default. Raises TactileError for both."""
     if options.levels is None:
         return options.preset or DEFAULT
     if options.preset is not None:
@@ -137,10 +134,7 @@ def choose_preset(options: Options) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration in pixels of height maps (H, W), or of a given size (width, height).
-
-    Raises TactileError where both are there and differ.
-    """
+    """Return the calibration in pixels of height maps (H, W) or of size (width, height). Raises where they differ."""
     if heights is not None:
         height, width = heights
         if size not in (None, (width, height)):
@@ -215,10 +209,7 @@ class Pictures:
 def pictures(
     options: Options, preset: str, heights: tuple[int, int] | None, clock: Stopwatch | None = None
 ) -> Pictures:
-    """Return the writer of frames; heights : (H, W) of height maps, None for displacements.
-
-    Raises TactileError for a bad calibration or size, and what ``Renderer`` raises.
-    """
+    """Return the writer of frames; heights : (H, W) of maps, None for displacements. Raises as ``Renderer`` does."""
     unit = at_size(load_calibration(options.calibration, None, options.object_reflectance), heights, options.size)
     about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
     renderer = Renderer(unit, preset, options.variant)

@@ -36,10 +36,7 @@ DEFAULT_KEEP = ("latent", "displacement", "image")
 
 
 def parse_keep(text: str) -> tuple[str, ...]:
-    """Parse ``"latent,image"`` to ("latent", "image") in the order of KEEPABLE; ``""`` keeps the minimum.
-
-    Raises TactileError for an unknown word.
-    """
+    """Parse ``"latent,image"`` to words of KEEPABLE, in its order. Raises TactileError for an unknown word."""
     return parse_words(text, KEEPABLE, least=0)
 
 
@@ -105,10 +102,7 @@ def is_result(folder: Path, maker: str = "") -> bool:
 
 
 def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
-    """Parse ``"image,electrodes"`` to known words, in their order; None: all.
-
-    Raises TactileError for other words, or fewer than ``least``.
-    """
+    """Parse ``"image,electrodes"`` to known words, in their order; None: all. Raises TactileError for others."""
     words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in known:

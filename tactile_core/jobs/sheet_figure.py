@@ -180,10 +180,7 @@ class SheetFigure:
         z: tuple[float, float],
         contact_center: np.ndarray | None,
     ) -> Axes:
-        """Draw one row of maps of |displacement| over the plan (n, 2) = (x, z) m, with the gel's outline.
-
-        All maps share their axes, for half of a sheet's time goes into making and drawing those.
-        """
+        """Draw a row of maps of |displacement| over the plan (n, 2) = (x, z) m; one set of axes takes half the time."""
         from matplotlib.tri import Triangulation
 
         axes, height = self._row(self._row_height(x, z)), self._row_height(x, z)
@@ -252,10 +249,7 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write below each column its force (k, 3) N and how far it is to be trusted, and how to read the maps.
-
-        trust : confidence (k,) 0..1, flags (k,), expected error (k,) m and dent (k,) m, for `trust_words.in_words`
-        """
+        """Write each column's force (k, 3) N and `trust`, as `trust_words.in_words` takes it, and a key to the maps."""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]

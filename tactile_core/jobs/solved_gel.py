@@ -69,10 +69,7 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
 
 
 def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str) -> Iterator[tuple[int, BodyContact]]:
-    """Yield frames that touch and their contacts, read off a gel displaced by (T, n, 3) m; see the module.
-
-    center : (T, 2) = (x, z) m, NaN without contact; size : (T,) N, of the force
-    """
+    """Yield touching frames and their contacts, of gels (T, n, 3) m, places (T, 2) m and sizes of force (T,) N."""
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
     deepest = np.einsum("tni,ni->tn", moved, normals).argmin(axis=1)
@@ -119,7 +116,6 @@ def describe_miss(total: np.ndarray, force: np.ndarray, solved: bool = False) ->
     """Say by how much tractions that add up to (T, 3) N miss the size of the force (T, 3) N that the networks estimate.
 
     Their directions are not compared: the force is the one on the finger, whose pad is curved.
-
     solved : whether gels were solved under that force, rather than translated beside it
     """
     size, carried = accuracy.lengths(force), accuracy.lengths(total)

@@ -51,10 +51,7 @@ def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, b
 
 
 def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
-    """Translate the frames of a shard unless it is there and whole; returns whether it was made.
-
-    Raises TactileError for a damaged prepared file, OSError where the disk cannot be written.
-    """
+    """Translate a shard unless it is whole; returns whether it was made. Raises TactileError; OSError of the disk."""
     recipe, name = job.recipe, job.inputs[index].name
     pictures, pair = (job.calibration, recipe.preset, recipe.variant or None), (recipe.target, recipe.source)
     options = ToolOptions(job.weights, *pictures, recipe.answer, recipe.gel, *pair)

@@ -33,10 +33,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
 
 
 def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> Signals:
-    """Prepare the frames in which a finger answers; the others (T,) bool get no change and the flag dead_channel.
-
-    Raises TactileError where the user names frames for the tare in which it does not.
-    """
+    """Prepare the frames in which a finger answers; others get no change and a flag. Raises for a tare among those."""
     heard = np.flatnonzero(~silent)
     first = np.flatnonzero(silent)[0]
     where = f"{recording.row_word} {recording.rows[first]}"

@@ -26,11 +26,7 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file.
-
-    shapes : name -> (shape, dtype) as declared; attributes : of the file's root; taken : names of the arrays that were
-        read so far, or that belong to another recording of the file
-    """
+    """Named arrays of an open file. shapes : as declared; attributes : of its root; taken : names read, or others'"""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
@@ -160,10 +156,7 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Read an opened file; never unpickles. Sizes come from the arrays' own headers, not from unpacking them.
-
-    The one array of an NPY file is called ``electrodes``.
-    """
+    """Open NPZ, or NPY as array ``electrodes``, never unpickling; sizes are those of the arrays' own headers."""
     if file.read(len(NPY)) == NPY:
         file.seek(0)
         with damage_reported(path, "NPY"):

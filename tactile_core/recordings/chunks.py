@@ -36,7 +36,6 @@ def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, s
     """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
 
     columns, sensor : as of `read`
-
     Raises TactileError like `readers.read`.
     """
     path = os.fspath(path)

@@ -59,7 +59,6 @@ def silent(electrodes: np.ndarray) -> np.ndarray:
     """Mark the frames (T,) bool in which a finger does not answer: its electrodes read one end, or none ever changes.
 
     A few such frames are a glitch, which is interpolated.
-
     electrodes : (T, e) float, in the file's unit. Real electrodes rest hundreds of counts apart; changes against rest
     may all be 0, so that equal readings are no answer only beside raw ones. A raw recording whose noise stops in all
     electrodes for `FROZEN` frames repeats an old answer.
@@ -120,10 +119,7 @@ def _noisy(electrodes: np.ndarray) -> bool:
 def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Interpolate what was not read: return readings (T, 19), flags (T,), and what was repaired, for the report.
-
-    repair : also glitches and rows that came twice; findings are added to the warnings
-    """
+    """Interpolate what was not read, with `repair` glitches and twins, too; return readings, flags (T,), a report."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
@@ -143,10 +139,7 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark the rows (T,) bool that equal the one before, and return whether noise should keep rows apart.
-
-    electrodes : (T, e) counts. Of a simulation without noise rows at rest are equal, too.
-    """
+    """Mark rows (T,) of electrodes (T, e) counts equal to the one before; tell whether noise should keep rows apart."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and _noisy(electrodes[~same])
 
@@ -209,10 +202,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return the flags (T,) of raw readings at an end of the 12-bit range; other kinds do not show it.
-
-    readings : (T, 19) counts; findings are added to the warnings
-    """
+    """Return flags (T,) of raw readings (T, 19) counts at an end of the 12-bit range; adds findings to warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)
@@ -226,10 +216,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Return the flags (T,) where an electrode is constant for 1 s or more; none in recordings that are shorter.
-
-    readings : (T, 19) counts; findings are added to the warnings
-    """
+    """Return flags (T,) of readings (T, 19) counts constant for 1 s in an electrode; findings are added to warnings."""
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():

@@ -83,10 +83,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     def gains_for(
         self, recording: str | os.PathLike, section: str, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
-        """Return the unit that made a sensor's recording. Raises TactileError where the file has no section for it.
-
-        section : of `recording.split`, or of the Recording
-        """
+        """Return the unit that made the recording of a `section`. Raises TactileError where there is none."""
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
             expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
@@ -106,10 +103,7 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Convert signals to the simulated sensor's: (change - offset) / gain, in counts of a typical unit.
-
-    The report records it. A rectified change has lost offset and sign: it is only divided by the gain.
-    """
+    """Convert signals to the simulated sensor's, (change - offset) / gain; rectified ones have no offset left."""
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     stiffness = 1.0 if sensor.stiffness is None else sensor.stiffness

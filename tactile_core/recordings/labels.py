@@ -13,10 +13,7 @@ MOST_WORDS = 20  # of a label that a summary counts one by one
 
 
 def labels_of(columns: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Return named texts as (T,) object arrays of str, without those that say nothing in any frame.
-
-    Names and texts are shortened, and made fit for HDF5, which takes neither ``/`` in a name nor NUL.
-    """
+    """Return named texts as (T,) object arrays of str that say something, shortened and made fit for HDF5."""
     found = {}
     for name, column in columns.items():
         found[_plain(name).replace("/", "_").strip(". ")] = [_plain(text) for text in column]

@@ -28,10 +28,7 @@ PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
 
 
 class Opened(NamedTuple):
-    """Open file of recordings. container : csv, json, hdf5, npz, mat or bag; path : the file's
-
-    finger : requested, or None; file : its bytes from the start; none of a bag that is a folder
-    """
+    """Open file. container : csv, json, hdf5, npz, mat or bag; finger : requested, or None; file : its bytes"""
 
     container: str
     path: str
@@ -54,10 +51,7 @@ def _reading(path: str) -> Iterator[None]:
 
 @contextmanager
 def opened(path: str) -> Iterator[Opened]:
-    """Open a file of recordings once, and detect what it is from its first bytes.
-
-    Raises TactileError for what is no file, and for errors of the operating system while it is open.
-    """
+    """Open a file once, and tell its kind by its first bytes. Raises TactileError, for the system's errors too."""
     with _reading(path):
         file, finger, topic = split(path)
         if is_bag_folder(file):
@@ -122,10 +116,7 @@ GZIP, STEP = b"\x1f\x8b", 2**20
 
 @contextmanager
 def unpacked(path: str, file: BinaryIO) -> Iterator[BinaryIO]:
-    """Yield the file from its start, unpacked where it is gzipped.
-
-    Raises TactileError for damage, and for what unpacks to more than a text may have.
-    """
+    """Yield the file from its start, unpacked where gzipped. Raises TactileError for damage and too long a text."""
     packed = file.read(len(GZIP)) == GZIP
     file.seek(0)
     if not packed:

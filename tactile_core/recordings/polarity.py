@@ -88,10 +88,7 @@ class Polarity:
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
-    """Return the polarity given by the user, else by the file, else the one that the recording shows.
-
-    A stated one is not sure where the recording shows the other; a word that is no polarity states nothing.
-    """
+    """Return the polarity by user, file or recording, in this order; one that the recording contradicts is not sure."""
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
             against = shown.sure and shown.name != stated
@@ -194,10 +191,7 @@ def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
 
 
 def contact_signals(sensor: str = SOURCE) -> np.ndarray:
-    """Return the changes (P, e) float64 counts of simulated contacts, as raw readings have them.
-
-    Raises TactileError for a sensor whose descriptor has none.
-    """
+    """Return changes (P, e) float64 counts of simulated contacts, as raw. Raises TactileError where there are none."""
     found = contacts_of(sensor)
     if found is None:
         raise TactileError(f"sensor {sensor!r}", "no simulated contacts", "a table that [electrodes] contacts names")

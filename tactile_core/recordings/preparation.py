@@ -108,10 +108,7 @@ def _film(
 
 
 def doubt_law(signals: Signals) -> Signals:
-    """Flag the frames in contact, and warn, where together they resemble no simulated ones; undoes an older doubt.
-
-    Simulated ones of a sensor whose descriptor has none come with its weights: their law is not judged.
-    """
+    """Flag, and warn of, frames in contact that together resemble no simulated ones of the sensor's descriptor."""
     changes = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(changes, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
     return replace(signals, flags=flags, warnings=(*without(signals.warnings, LAW), *filter(None, [doubt])))

@@ -25,10 +25,7 @@ DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 
 
 class Preparer:
-    """Prepares the parts of one recording in order; what earlier ones showed of kind, rest and polarity holds for all.
-
-    A recording that is a single part is as `prepare` has it, its gains and offsets corrected.
-    """
+    """Prepares a recording's parts in order, by what earlier ones showed; a single part is as `prepare` has it."""
 
     def __init__(
         self,

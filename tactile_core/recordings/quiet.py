@@ -75,7 +75,6 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
     """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
 
     electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz.
-
     A held press is calm too. PDC separates it from rest: the fluid pressure is lowest without contact. Without PDC,
     calm parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is
     near zero.

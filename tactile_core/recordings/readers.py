@@ -51,7 +51,6 @@ def read(
     sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
     lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
         in single precision where that is exact, as it is of counts: a third of the memory
-
     Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
     ``tdc`` where the file has them, ``warnings`` for what is odd in it, ``not_taken`` for what else the file holds.
     Nothing is resampled, repaired or dropped.
@@ -114,10 +113,7 @@ def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
-    """Return the sensor of a recording, ``"biotac"`` or ``"biotac_sp"``, from a CSV file's columns or a bag's messages.
-
-    Raises TactileError for what is no recording.
-    """
+    """Return a recording's sensor, by a CSV file's columns or a bag's messages. Raises TactileError for none."""
     path = os.fspath(path)
     with opened(path) as (container, where, _, file):
         if container == "bag":
@@ -159,7 +155,6 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
     """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one.
 
     Of a bag of several topics, ``path#topic/finger0`` and so on. A map picks one finger itself.
-
     Raises TactileError like `read` for a file that is no recording.
     """
     path = os.fspath(path)
@@ -209,10 +204,7 @@ def names(store: Store) -> set[str]:
 def table_reader(
     path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
 ) -> Callable[[Table], Recording]:
-    """Return the function that makes a Recording of a CSV file's table: by the map, or by the layout of its header.
-
-    Raises TactileError for another sensor's file, and for a finger of a file of one.
-    """
+    """Return the reader of a CSV file's table, by map or header. Raises TactileError for another sensor's file."""
     if columns is not None:
         reader = partial(read_mapped, columns=columns)
     else:

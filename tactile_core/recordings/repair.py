@@ -39,7 +39,6 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     """Mark (T, C) bool samples that left the signal's level for a moment and came back.
 
     values : (T, C) float, counts, finite.
-
     A run of samples is a glitch when all of these hold:
     it begins with a jump of more than 30 counts in one sample and ends with one in the opposite direction; the level
     after it is the one before it, and its own samples lie on one level, both within a third of the jump; the jumps are
@@ -183,10 +182,7 @@ def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, in
 
 
 def smooth(values: np.ndarray, frames: int) -> np.ndarray:
-    """Average values (T, k) over each frame and (frames - 1) / 2 to each side, fewer at the ends; ``frames`` is odd.
-
-    Less noise without delay, for complete recordings.
-    """
+    """Average values (T, k) over an odd number of frames round each, fewer at the ends: less noise without delay."""
     if frames == 1:
         return values
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0, dtype=np.float64)])

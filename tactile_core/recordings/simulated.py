@@ -95,10 +95,7 @@ def _write_whole(
     forces: dict[str, np.ndarray],
     tractions: dict[str, np.ndarray],
 ) -> None:
-    """Write a file that appears whole or not at all, its datasets in this order: the same arrays give the same bytes.
-
-    It is made in memory: HDF5 keeps a file open whose writing failed on a full disk, and crashes at the process's end.
-    """
+    """Write the file whole or not at all, equal arrays to equal bytes; in memory, as HDF5 crashes on a full disk."""
     import h5py
 
     memory = io.BytesIO()
@@ -122,10 +119,7 @@ def _write_whole(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Read the Recording of an opened file of this format, with its truth as float32 in m.
-
-    Raises TactileError for what does not belong together, and for a file that was made without electrodes.
-    """
+    """Read an opened file, its truth float32 in m. Raises TactileError for misfits, and without electrodes."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")

@@ -22,10 +22,7 @@ MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
 def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
-    """Return what stamps (T,) say: time and start as `seconds_of`, the frames at which it jumps, and sentences.
-
-    rows : (T,) of the file, which are called row_word
-    """
+    """Return start and times as `seconds_of`, the frames where stamps (T,) jump, and sentences that name `rows`."""
     seconds, start, notes = seconds_of(stamps)
     jumps, found = time_jumps(seconds, rows, row_word)
     return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
@@ -73,10 +70,7 @@ def is_likely(values: np.ndarray) -> bool:
 
 
 def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Spread the frames (T,) that share a stamp evenly up to the next one, where most do; and say so.
-
-    At both ends, where a run may be cut off, frames take the usual step.
-    """
+    """Spread frames (T,) of one stamp evenly up to the next, at the ends by the usual step; and say so."""
     steps = np.diff(seconds)
     if len(steps) < FEWEST or not (steps >= 0).all() or (steps == 0).mean() < SHARED:
         return seconds, []

@@ -50,10 +50,7 @@ def electrode_count(sensor: str) -> int:
 
 
 def electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Electrode positions (19, 3), m, shared frame; (24, 3) of a BioTac SP.
-
-    Raises TactileError for places outside the body, and where their table is missing.
-    """
+    """Electrode positions (19, 3) m, shared frame; (24, 3) of a BioTac SP. Raises TactileError for a bad table."""
     places = from_maker(1e-3 * places_of(sensor).sensing, sensor)
     skin_of(sensor).check_inside(places)
     return places
@@ -96,10 +93,7 @@ def rest_normals(sensor: str) -> np.ndarray:
 
 
 def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the point (3,) m of a resting surface at (x, z) m of the common plane, and its outward unit normal (3,).
-
-    On a skin it is the place of the pad that rolls onto (x, z).
-    """
+    """Return a resting surface's point (3,) m and outward unit normal (3,) at (x, z) m of the common plane."""
     return shape_of(sensor).dome_point(x, z) if is_gel(sensor) else roll_up(np.array([x, z]), sensor)
 
 
@@ -117,10 +111,7 @@ def thickness_at(sensor: str, node: int) -> float:
 
 
 def is_gel(sensor: str) -> bool:
-    """Return true for a sensor with a gel, false for one of skin and fluid, by its descriptor.
-
-    Raises TactileError for a name that is none.
-    """
+    """Return true for a gel, false for skin and fluid, by the descriptor. Raises TactileError for no sensor's name."""
     return isinstance(describe(sensor), GelSensor)
 
 

@@ -13,10 +13,7 @@ from .gel_sensor import GelSensor
 
 
 def about(name: str) -> str:
-    """Describe a sensor in a few lines: kind, size, material, nodes of its surface, folder, sources.
-
-    Raises TactileError for an unknown name, and for a descriptor, a table or a calibration of it that is not sound.
-    """
+    """Describe a sensor in a few lines, by its descriptor. Raises TactileError for an unknown or unsound one."""
     found, surface = describe(name), sensor_surface(name)
     size = " x ".join(f"{1e3 * each:.2f}" for each in np.ptp(surface.rest, axis=0)[[0, 2]])
     lines = [

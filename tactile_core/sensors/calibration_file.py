@@ -153,10 +153,7 @@ def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
 
 
 def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None:
-    """Write a calibration file, whole or not at all; equal calibrations give equal bytes.
-
-    Numbers keep six digits. A photograph is named as it lies beside the file.
-    """
+    """Write a calibration file, whole or not at all, numbers with six digits; equal ones give equal bytes."""
     atomic.write_bytes(path, to_toml(calibration).encode())
 
 

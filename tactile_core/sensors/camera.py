@@ -31,7 +31,6 @@ class Camera:
 
     It stands where refraction by gel and acrylic makes it appear. A gel point appears at its central projection onto
     the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
-
     width, height : pixels
     px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture

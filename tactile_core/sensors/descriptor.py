@@ -89,10 +89,7 @@ def of_kind(name: str, form: type[_S]) -> _S:
 
 
 def read(folder: Path) -> Fluid | GelSensor:
-    """Read the descriptor in a folder.
-
-    Raises TactileError naming file and field for one that is missing, unknown, in another unit or out of its range.
-    """
+    """Read a folder's descriptor. Raises TactileError naming file and field that is missing, unknown or wrong."""
     return read_toml(folder / FILE, lambda content: _sensor(content, folder), "a sensor's descriptor")
 
 

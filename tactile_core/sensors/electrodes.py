@@ -39,7 +39,6 @@ def places_of(name: str) -> Places:
     """The electrodes of a sensor, from the table that its descriptor names.
 
     The table lies beside the descriptor, or in ``$TACTILE_SENSORS/<name>/``.
-
     Raises TactileError for a sensor without electrodes, and for a table that is missing or bad.
     """
     found, path = of_kind(name, Fluid), table_of(name)
@@ -64,29 +63,20 @@ def table_of(name: str) -> Path:
 
 
 def typical_rest(name: str) -> np.ndarray | None:
-    """Return the counts (e,) of a sensor's typical unit without contact; None where they are not known.
-
-    Raises TactileError for a sensor without electrodes, and for a table that is bad.
-    """
+    """Return the counts (e,) of a sensor's typical unit at rest, or None. Raises TactileError for a bad table."""
     rest = places_of(name).rest_counts if table_of(name).is_file() else np.array([np.nan])
     return rest if np.isfinite(rest).all() else None
 
 
 @functools.cache
 def contacts_of(name: str) -> np.ndarray | None:
-    """Load the changes (P, e) float64 counts of simulated contacts, as raw readings have them; None without a table.
-
-    Raises TactileError for a sensor without electrodes.
-    """
+    """Load changes (P, e) float64 counts of simulated contacts, or None. Raises TactileError without electrodes."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contacts)
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the rise (P,) float64 Pa of the fluid's pressure in the contacts of `contacts_of`; None without a table.
-
-    Raises TactileError for a sensor without electrodes.
-    """
+    """Load the rise (P,) float64 Pa of fluid pressure in these contacts, or None. Raises without electrodes."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 

@@ -90,10 +90,7 @@ class SkinLattice:
 
 @dataclasses.dataclass(frozen=True)
 class FluidFilm:
-    """The conducting fluid between core and skin.
-
-    conductivity : S/m; interface : ohm, in series with every electrode; thinnest : m, film that is still known
-    """
+    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, still known"""
 
     conductivity: float = number("s_per_m", above=0)
     interface: float = number("ohm", above=-1)
@@ -119,10 +116,7 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """Origin of the counts: each electrode in a voltage divider with a load, read by a converter.
-
-    polarity : falls or rises, what counts do where a film gets thinner; pressure : Pa a count
-    """
+    """Voltage dividers and a converter. polarity : falls or rises, as a film thins; pressure : Pa a count"""
 
     bits: int = number(above=0, below=32)
     rate: float = number("hz", above=0)

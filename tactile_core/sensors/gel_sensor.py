@@ -15,10 +15,7 @@ ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex t
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The outline of a gel on the plane, even in z. Lengths in m.
-
-    tip : ``"round"``, a half circle of half_width, or ``"square"``; corner_radius : of the corners of square ends
-    """
+    """The outline on the plane, even in z, m. tip : half circle (round) or square; corner_radius : of square ends"""
 
     half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     tip_x: float = number("mm")
@@ -29,10 +26,7 @@ class Outline:
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A gel between its surface and its flat back, which is bonded to a rigid window. Lengths in m.
-
-    thickness : at the apex; edge_drop, edge_width : of the rounded edge
-    """
+    """A gel from surface to flat, bonded back, m. thickness : at the apex; edge_drop, edge_width : of rounded edges"""
 
     back_y: float = number("mm")
     thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
@@ -76,10 +70,7 @@ class GelLattice:
 
 @dataclasses.dataclass(frozen=True)
 class CameraMount:
-    """Place of the camera. height_zero_y : m, of the plane whose height is zero in pictures
-
-    calibration : of a unit's camera and lights, see ``calibration_file``; empty where there is none
-    """
+    """Place of the camera. height_zero_y : m, of zero height; calibration : a unit's file, empty where there is none"""
 
     height_zero_y: float = number("mm")
     calibration: str = file_beside(or_none=True)

@@ -79,10 +79,7 @@ class Material:
 
 
 def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, advice: str = "") -> _T:
-    """Return what ``made`` makes of a file's content, decimals as they are written.
-
-    Raises TactileError naming the file, and the field that ``made`` raises it for. expected : what the file is to be
-    """
+    """Return what ``made`` makes of a file's content, decimals as written. Raises TactileError with the field."""
     try:
         content = tomllib.loads(read_toml_text(file), parse_float=Decimal)
     except OSError as error:
@@ -96,10 +93,7 @@ def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, a
 
 
 def read_table(form: type[_T], content: Any, where: str = "", **others: Any) -> _T:
-    """Convert a table of the file to a dataclass, in SI units. where : of the file, "" for its top level
-
-    others : fields that are not in the file. Raises TactileError for one that is missing, unknown or wrong.
-    """
+    """Convert a table, at `where` of a file, and `others` to a dataclass, SI units. Raises TactileError."""
     if not isinstance(content, dict):
         raise TactileError(where, repr(content), "a table")
     types = typing.get_type_hints(form)

@@ -34,7 +34,6 @@ def press_rows(
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
     with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
     contacts of the same depth in place of those of the same force.
-
     electrodes : their law, of ``biotac_sheet.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
     """
     spec = paired(scene)
@@ -132,10 +131,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 def pair_row(
     biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Arrays stored of one paired contact, as in the file, see ``units``. Electrodes' films are not corrected.
-
-    keep : fields of both solutions to store beside, of ``pairs_file.KEEPABLE``
-    """
+    """Return the arrays stored of one paired contact, see ``units``; keep : fields of both solutions to add."""
     source, target = pair
     both = (source, biotac), (target, digit)
     return {
@@ -157,9 +153,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if these nodes (n,) bool of the source reach beside what rolls onto the gel.
-
-    No contact of the gel is their equal.
-    """
+    """Return true if nodes (n,) bool of the source reach beside what rolls onto the gel, which has no such contact."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

@@ -55,7 +55,6 @@ class Pairs:
 
     Fields are named after the pair that ships; of another ``pair``, source and target, they hold what theirs are, and
     signals are as wide as the source has electrodes.
-
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
     scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
     force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
@@ -106,10 +105,7 @@ class Split:
 
 
 def read_pairs(path: str | os.PathLike) -> Pairs:
-    """Read and check a pairs file.
-
-    raises: TactileError if it is missing, truncated, of another format, or if shapes or numbers are wrong
-    """
+    """Read and check a pairs file. Raises TactileError for one that is missing, truncated, or of other contents."""
     try:
         with open_checked(path) as file:
             found = str(file.attrs.get("format", ""))
@@ -226,10 +222,7 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts 80/10/10 by press, so that no neighbour of a training contact is tested.
-
-    raises: TactileError if there are fewer than five presses
-    """
+    """Split contacts 80/10/10 by press, so that none has a neighbour elsewhere. Raises TactileError below five."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"

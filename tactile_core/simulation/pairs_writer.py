@@ -96,10 +96,7 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """How the contacts of a file were made: the scene's text and its indenters' names, the seed, the electrodes' law.
-
-    pair : the sensors, source and target; keep : words of ``KEEPABLE``
-    """
+    """How contacts were made: scene's text, indenters' names, seed, electrodes' law, sensors, words of ``KEEPABLE``."""
 
     scene: str
     indenters: list[str]
@@ -110,10 +107,7 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join the blocks in order into one HDF5 file, cut to ``count`` contacts; written beside and renamed.
-
-    Raises TactileError where it cannot be written.
-    """
+    """Join blocks in order into one HDF5 file, cut to ``count`` contacts. Raises TactileError where it cannot be."""
     import h5py
 
     try:

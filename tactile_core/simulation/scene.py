@@ -71,10 +71,7 @@ class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
-    """Load the scene of a ``scene.toml`` (or of the folder that holds one); also returns its text.
-
-    Raises TactileError naming file and field for anything unreadable, unknown or out of range.
-    """
+    """Load the scene of a ``scene.toml`` or its folder, and its text. Raises TactileError naming file and field."""
     file = pathlib.Path(path)
     file = file / "scene.toml" if file.is_dir() else file
     try:
@@ -151,10 +148,7 @@ def to_toml(scene: Scene) -> str:
 
 
 def write_scene(folder: str | os.PathLike, scene: Scene, meshes: dict[str, bytes]) -> pathlib.Path:
-    """Write ``scene.toml`` and its mesh files (name -> content) into a folder; returns the file's path.
-
-    Raises TactileError where the folder cannot be written.
-    """
+    """Write ``scene.toml`` and mesh files (name -> content) into a folder; returns its path. Raises TactileError."""
     folder = pathlib.Path(folder)
     with atomic.writing(folder, advice="Make room, or choose another one"):
         folder.mkdir(parents=True, exist_ok=True)

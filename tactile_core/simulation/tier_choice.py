@@ -21,10 +21,7 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier picked for a bound.
-
-    tier : its name; error : um rms, which 95 of 100 contacts stay below; ms : a contact; share : depth reached.
-    """
+    """Tier for a bound. error : um rms that 95 of 100 contacts stay below; ms : a contact; share : depth reached"""
 
     tier: Tier
     error: float
@@ -40,10 +37,7 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return each tier's error, um, at a depth over the thickness, a bound on 95 of 100 contacts, and ms a contact.
-
-    The fast tier was measured against the full one, whose own error is added to it.
-    """
+    """Return each tier's error, um, at a depth over the thickness, the full tier's own included, and ms a contact."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
         raise TactileError("--error", f"no errors are measured on the {title(sensor)}", expected, advice)
@@ -68,10 +62,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """Choose a tier for each sensor of a scene's [recording].
-
-    Raises TactileError: a bad scene, a bound that no tier meets.
-    """
+    """Choose a tier for each sensor of a scene's [recording]. Raises TactileError for a bound that none meets."""
     from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)
@@ -82,10 +73,7 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """Return the depth of a scene at its points, over the thickness there, by the fast tier.
-
-    The most that a scene may, where a point is beyond it, or where the sensor's matrices are yet to be built.
-    """
+    """Return a scene's depth over the thickness by the fast tier, or the most where that is not known."""
     if not stored(sensor).bytes:
         return DEPTH_LIMIT
     share = 0.0

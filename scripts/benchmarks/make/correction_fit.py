@@ -90,10 +90,7 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """Choose the parameters of least error on held-out presses of one kind.
-
-    For forces by all features and by the essential ones, whose mean counts, and for fields.
-    """
+    """Choose widths and ridges on held-out presses of one kind: for forces by all and few features, for fields."""
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]

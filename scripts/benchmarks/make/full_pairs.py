@@ -52,10 +52,7 @@ Pair = tuple[np.ndarray, Solution, Solution]  # slide (2,) m, and both sensors' 
 
 
 def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
-    """Press ``number``: its indenter, place (in ``REGION_X`` where odd), depth and slide.
-
-    Raises TactileError for a scene without pairs, or without exactly one box and one ring among other indenters.
-    """
+    """Draw press ``number``, in ``REGION_X`` where odd. Raises TactileError without one box, one ring and others."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()

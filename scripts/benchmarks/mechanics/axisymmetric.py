@@ -30,7 +30,6 @@ class QuadMesh:
     """Axisymmetric mesh.
 
     nodes : (n, 3) m, x >= 0 and z = 0; cells : (n_cells, 9), node a + 3 b at (xi, eta) = (a, b) - 1
-
     clamped : (n,) bool; surface : (k,) nodes of the free side, outward
     """
 
@@ -111,10 +110,7 @@ class AxisymmetricSolid:
         return f, 1 + change
 
     def _deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F and the volume change J - 1.
-
-        J - 1 is summed from F - 1, not from J: a bulk modulus a million times the shear's would show its rounding.
-        """
+        """F and the volume change J - 1, summed from F - 1: a large bulk modulus would show the rounding of J."""
         h = np.einsum("eqci,ei->eqc", self.strain, displacement.ravel()[self.dofs], optimize=True)
         rr, ra, ar, aa, hoop = np.moveaxis(h, -1, 0)
         plane = rr + aa + rr * aa - ra * ar

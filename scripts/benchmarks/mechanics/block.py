@@ -29,10 +29,7 @@ def inside(mesh: HexMesh) -> np.ndarray:
 
 
 def equilibrium(solid: FiniteStrainSolid, start: State, free: np.ndarray, load: np.ndarray | None = None) -> State:
-    """The state in which forces on ``free`` (n,) nodes are ``load`` (3 n,) N; other nodes stay as in ``start``.
-
-    Raises ArithmeticError where Newton's method does not settle.
-    """
+    """Return the state of forces ``load`` (3 n,) N on ``free`` (n,) nodes. Raises ArithmeticError for none."""
     state, loose = start.copy(), np.repeat(free, 3)
     size = np.ptp(solid.mesh.nodes, axis=0).max()
     for _ in range(_MAX_ITERATIONS):

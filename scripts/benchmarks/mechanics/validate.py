@@ -69,10 +69,7 @@ def measured(name: str, quick: bool) -> Iterator[Row]:
 
 
 def write(report: Path, parts: dict[str, list[Row]]) -> None:
-    """Renew the two tables of ``report``, whose words stay, and its rows beside it.
-
-    parts : rows by heading. Raises ValueError for a page that has not each of the tables once.
-    """
+    """Renew the two tables of a report, and its rows beside it. Raises ValueError for a page without the tables."""
     rows = [row for part in parts.values() for row in part]
     checks = [*_CHECKS, *(_check(heading, part) for heading, part in parts.items())]
     renew_tables(report, {_TIERS[0]: _tier_table(rows), _CHECKS[0]: checks})

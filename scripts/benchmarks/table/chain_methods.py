@@ -31,10 +31,7 @@ SEED_OF_CONTACTS = 5
 
 
 def measure(name: str, quick: bool, truth: str) -> Method | None:
-    """Signals of test contacts to pictures by one preset; ``truth`` makes what the others are held against.
-
-    Raises ModuleNotFoundError where mitsuba is missing.
-    """
+    """Draw pictures of test contacts by one preset; ``truth`` makes what the others are held against. Needs mitsuba."""
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
     mapper = gel_mapper(unit.camera)
     if name == "truth":

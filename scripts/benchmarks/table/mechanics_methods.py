@@ -23,10 +23,7 @@ REPEATS = {"fast": 3, "full": 1}
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one tier on one sensor: median time and error of the contacts.
-
-    The fast tier's time is that of random contacts alone, where numba is installed.
-    """
+    """Measure one tier on one sensor: median time, of random contacts alone with numba, and error of the contacts."""
     sensor, tier = name.split("_")
     if tier == "reference":
         return _reference(sensor, quick)

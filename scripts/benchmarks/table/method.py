@@ -42,10 +42,7 @@ class Method:
 
 
 def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
-    """CPU ms a frame of a call, the best of some after one that may read and compile.
-
-    Other programs only ever slow it: through caches that they empty.
-    """
+    """CPU ms a frame of a call, the best of some after a first that may compile: other programs only slow it."""
     work()
     took, began = [], time.process_time()
     while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):
@@ -56,10 +53,7 @@ def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 
 
 
 def peak_mb() -> float:
-    """Peak memory of this process so far, MB.
-
-    On Linux by the high-water mark of its own pages: getrusage begins with that of the process that started it.
-    """
+    """Peak memory of this process, MB; on Linux its own high-water mark, as getrusage adds the parent's."""
     if sys.platform == "linux":
         for text in Path("/proc/self/status").read_text().splitlines():
             if text.startswith("VmHWM:"):

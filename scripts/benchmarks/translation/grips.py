@@ -57,10 +57,7 @@ def hard_to_report(files: list[Path]) -> list[Path]:
 
 
 def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
-    """Rows of a folder, and the place in simulated contacts, so that a constant does not pass.
-
-    Raises TactileError where trials to choose or to report by are missing.
-    """
+    """Rows of a folder, beside the place in simulated contacts. Raises TactileError without the trials it wants."""
     files = find(folder)
     soft = soft_to_choose_by(files)
     hard = hard_to_report(files)

@@ -46,10 +46,7 @@ def expected(rows: Sequence[Row]) -> list[str]:
 def renew_model_card(
     page: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Sequence[Translator] = ()
 ) -> None:
-    """Renew the tables of the card, and beside it the rows as CSV and the picture of cases.
-
-    apart : the networks of the unseen rows. Raises ValueError for a page without the tables.
-    """
+    """Renew a card's tables, CSV and picture; apart : networks of the unseen rows. Raises ValueError without tables."""
     conditions = [f"| {what} | {words} |" for what, words in _conditions(translator.card, pairs, apart)]
     renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]

@@ -155,7 +155,6 @@ def rows(
     """Translate and judge a folder's recordings kept for reporting, the first `most` or all.
 
     The baseline is the electrodes' sum.
-
     out : folder for the translations, in the form that the judging tool beside the recordings reads
     sensor : gains and offsets of the sensor that made them, as `tactile adapt` finds them
     Raises TactileError for a folder without recordings, and for one that cannot be read.
@@ -167,10 +166,7 @@ def rows(
 
 
 def rows_of(judged: list[Judged]) -> list[Row]:
-    """The rows of a set of recordings: medians over recordings unless the name says otherwise; none without a metric.
-
-    Raises TactileError where no recording has its wrench and pose beside it.
-    """
+    """Rows of recordings, medians unless named otherwise. Raises TactileError where none has wrench and pose."""
     whole = [one.metrics for one in judged if one.metrics is not None]
     if not whole:
         raise TactileError("recordings", "none with its _cw.csv and _cp.csv", "at least one", "Copy them beside it")

@@ -35,10 +35,7 @@ Errors = dict[str, np.ndarray]  # by UNITS, a number a judged frame
 
 
 def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
-    """Medians over frames from 0.1 N on, of all sequences and of those of each motion; places 90 % stay below.
-
-    every : of as many sequences one is judged
-    """
+    """Medians over frames from 0.1 N on, of all sequences and each motion; every : of as many one is judged"""
     truth = {name: values[::every] for name, values in read(file).items()}
     number = len(truth["motion"])
     followed, alone = both = measured(network, truth)

@@ -75,10 +75,7 @@ def is_whole(path: Path) -> bool:
 
 
 def load(path: Path) -> Slide:
-    """Read a recording and what lies beside it.
-
-    Raises TactileError: a file that cannot be read, no PDC, no common time, fewer than 100 frames in it.
-    """
+    """Read a recording and what lies beside it. Raises TactileError: unreadable, no PDC, under 100 common frames."""
     recording = read(path)
     wrench, pose = (_table(path.with_name(name_of(path) + topic), n) for topic, n in ((WRENCH, 7), (POSE, 4)))
     time = recording.start_time + recording.time

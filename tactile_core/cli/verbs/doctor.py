@@ -50,10 +50,7 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Optional library of the toolkit.
-
-    module : to import; package : its name in the index; extra : of ours that brings it, "" for always
-    """
+    """Optional library. module : to import; package : in the index; extra : of ours that brings it, "" for always"""
 
     module: str
     package: str

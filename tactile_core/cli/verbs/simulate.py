@@ -95,10 +95,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Return words of ``scene_recording.outputs``; ``traction`` is that of BioTac and DIGIT.
-
-    Raises TactileError for other words.
-    """
+    """Return words of ``scene_recording.outputs``; ``traction`` is both sensors'. Raises TactileError for others."""
     from ...jobs import results
     from ...sensors import PAIR
     from ...simulation.scene_recording import DEFAULT, outputs
@@ -125,10 +122,7 @@ def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mappin
 
 
 def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier]:
-    """Return the tiers within the bound, and print the reason.
-
-    Raises TactileError for a long simulation without consent.
-    """
+    """Return the tiers within the bound, and say why. Raises TactileError for a long simulation without consent."""
     choices, cost = _planned(options, keep)
     for sensor, choice in choices.items():
         say(choice.describe(sensor))

@@ -28,10 +28,7 @@ class File:
 
 @dataclass(frozen=True)
 class Collected:
-    """Files of a data set, sorted by path.
-
-    others : how many files of the folder fit no pattern; unfit : path -> why it is left out although it fits
-    """
+    """Files of a data set, sorted by path. others : how many fit no pattern; unfit : path -> why it is left out"""
 
     files: tuple[File, ...]
     others: int
@@ -46,10 +43,7 @@ class Collected:
 
 
 def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
-    """Find a data set's files in a folder; links to folders are not followed, `out` is left alone.
-
-    Raises TactileError where nothing fits: another set's folder.
-    """
+    """Find a data set's files in a folder, without links and `out`. Raises TactileError where nothing fits."""
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]
@@ -118,10 +112,7 @@ def _split(recipe: Recipe, labels: dict[str, str]) -> str:
 
 
 def beside(folder: Path, name: str, file: File) -> Path:
-    """Return the path of a file that the recipe names beside a recording, there or not.
-
-    Raises TactileError for one outside the data set's folder.
-    """
+    """Return the path of a file beside a recording, there or not. Raises TactileError for one outside the folder."""
     path = file.path.parent / filled(name, file.labels)
     if not path.resolve().is_relative_to(folder.resolve()):
         raise TactileError(path, "outside the data set's folder", "a file inside it")

@@ -31,10 +31,7 @@ def file_name(unit: str) -> str:
 
 
 def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, str]]:
-    """Return the files that hold recordings of the set's sensor, and why others do not, by path.
-
-    Where the unit is adapted to all of them, each is read whole: one that is damaged farther on is told, too.
-    """
+    """Return the files of the set's sensor, and path -> why others are none; to be adapted to, each is read whole."""
     good, aside = [], {}
     for file in files:
         path = str(file.path)

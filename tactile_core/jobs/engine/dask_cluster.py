@@ -41,18 +41,12 @@ class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Cluster:
-    """A Dask scheduler's workers. address : of the scheduler, or of a file as `QueueFile`.
-
-    say : called when all tasks wait because no worker has come yet, as in a full queue
-    """
+    """A Dask scheduler's workers. address : its own, or a `QueueFile`'s; say : told when tasks wait for a worker"""
 
     def __init__(
         self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
     ) -> None:
-        """Raise TactileError for an address or a file that is neither, and for other machines without TLS.
-
-        insecure : do without TLS, as in a private network
-        """
+        """Raise TactileError for a bad address or file, and for other machines without TLS unless `insecure`."""
         self._say, self._insecure = say, insecure
         if address.startswith(("tcp://", "ucx://")) and not _here(address):
             self._without_tls(address)

@@ -33,10 +33,7 @@ SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wren
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Recording of a job.
-
-    name : of its files in the job folder, different for each; path : absolute; sha256, bytes : of its content
-    """
+    """Recording of a job. name : of its files, different for each; path : absolute; sha256, bytes : of its content"""
 
     name: str
     path: str
@@ -110,10 +107,7 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 
 
 def _of_folder(folder: Path) -> Iterator[Path]:
-    """Recordings in a folder and below it, by name; links to folders are not followed.
-
-    One that cannot be looked into, such as a disk's lost+found, is passed over with a warning.
-    """
+    """Yield the recordings in a folder and below it, by name, without linked folders; warn of closed ones."""
     if _is_bag(folder):
         yield folder
         return
@@ -175,10 +169,7 @@ def check_unchanged(one: Input) -> None:
 
 
 def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
-    """Read a scene; return it, its text, an input for each of some names, and the hashes of its meshes in order.
-
-    Raises TactileError for a bad scene.
-    """
+    """Return a scene, its text, an input for each name, and its meshes' hashes. Raises TactileError for a bad one."""
     from ...simulation.scene import load_scene
 
     scene, text = load_scene(scene_path)

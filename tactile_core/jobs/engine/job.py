@@ -30,10 +30,7 @@ R = TypeVar("R")
 
 
 class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
-    """A job: `inputs` by `recipe`, which one of `recipes.MODULES` does.
-
-    weights, calibration : folder of the networks, file of the unit, None for the shipped ones; versions : a note
-    """
+    """A job: `inputs` by `recipe`. weights, calibration : folder and file, None for those that ship"""
 
     format: str
     inputs: list[Input]

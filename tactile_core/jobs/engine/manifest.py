@@ -27,7 +27,6 @@ class Status:
     """Progress of a job.
 
     recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
-
     frames : of the prepared recordings; bytes : about those of their shards, 0 if not known
     aside : task -> why it could not be done
     """
@@ -74,10 +73,7 @@ def _aside(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """List the files of a job that are not as they were written; each is read once. progress : (files done, in all)
-
-    Where the job was done once, by its manifest: shards that are gone, and whole ones of another place or job, too.
-    """
+    """List a job's files that are not as written, by its manifest also those missing. progress : (done, in all)"""
     shards = [shard for recording in _read(folder) for shard in recording.shards]
     listed = {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
@@ -149,10 +145,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # disk, quota, the system's li
 
 
 def refused(folder: Path, job: Job, error: OSError) -> TactileError:
-    """Return the error for what the system refused to write in a job's folder.
-
-    A full disk is the folder's affair, not that of the file which happened to be the next, and so is its removal.
-    """
+    """Return the error for what the system refused to write; a full disk or a removal is the job folder's affair."""
     if not jobs.exists(folder):
         return TactileError(folder, "was removed while the job ran", "the job's folder", "Begin it again")
     reason = error.strerror or str(error)

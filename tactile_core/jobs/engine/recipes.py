@@ -80,10 +80,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to paired contacts. surfaces : sha256 of both sensors' nodes; files : of the meshes.
-
-    electrodes : the law of their counts; source, target : the sensors; keep : words of ``pairs_file.KEEPABLE``
-    """
+    """A scene to paired contacts. surfaces, files : sha256 of sensors' nodes and meshes; keep : of ``KEEPABLE``"""
 
     count: Annotated[int, Meta(ge=1)]
     seed: int

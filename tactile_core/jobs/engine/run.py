@@ -47,10 +47,7 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder inside the block, making it if needed; remove what killed runs left in it.
-
-    Raises TactileError where another job runs in it, or where it cannot be written.
-    """
+    """Lock the job's folder, making it if needed, and clear what killed runs left. Raises TactileError if taken."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -181,10 +178,7 @@ def folder_of(out: Path) -> Path:
 
 @contextlib.contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Lock the folder of a new job, or of the same one begun before; yields it.
-
-    Raises TactileError where it holds another job, and what `opened` raises.
-    """
+    """Lock the folder of a new job, or of the same begun before. Raises TactileError for another's."""
     folder = folder_of(out)
     with opened(folder, None):
         if not jobs.exists(folder):

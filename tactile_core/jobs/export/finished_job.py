@@ -54,10 +54,7 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield all arrays, or all but some, of blocks of frames in order, by the names of ``frames_file``.
-
-        These are a BioTac's and a DIGIT's, of whatever pair the arrays are.
-        """
+        """Yield all arrays, or all but some, in blocks of frames, under a BioTac's and a DIGIT's names in any case."""
         import h5py
 
         for path in self.shards:
@@ -94,10 +91,7 @@ class Recorded:
 
 @dataclasses.dataclass(frozen=True)
 class Finished:
-    """A job whose shards are all there.
-
-    folder, id : of the job; aside : recording or shard -> why it is not among them; warnings : recording -> sentences
-    """
+    """A finished job. aside : recording or shard -> why it is missing; warnings : recording -> sentences"""
 
     folder: Path
     id: str

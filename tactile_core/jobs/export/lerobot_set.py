@@ -169,10 +169,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _one_rate(source: Finished) -> int:
-    """Return the rate of all recordings, whole frames a second.
-
-    Raises TactileError for a recording of another rate than the first one's, and for less than a frame a second.
-    """
+    """Return the recordings' rate, whole frames a second. Raises TactileError for different ones, or below 1."""
     first = _rate(source.recordings[0])
     for one in source.recordings:
         rate = _rate(one)

@@ -55,10 +55,7 @@ class DigitCamera:
             self._ended.wait(self._pause)
 
     def picture(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the newest picture, as (H, W, 3) uint8 of that shape; black before the first and after the last.
-
-        What is wider than high is turned a quarter to the left, as digit-interface turns it.
-        """
+        """Return the newest picture, (H, W, 3) uint8, upright; black before the first and after the last."""
         import cv2
 
         frame = self._newest

@@ -35,14 +35,12 @@ class LiveSignals:
 
     Rest and film are those of the first quiet part; drift is not removed, nor glitches. The polarity is decided by the
     first contacts, and as given, or "falls", until then.
-
     rate : Hz; options : polarity, and tare, of the first LONGEST s
     unit : gains and offsets to take off, and its rest, which is taken where the first window is not calm near it
     sensor : whose counts they are
     found : where the rest is from, in words, once it is known
     polarity, evidence : "falls" or "rises", and what says so; sure : whether it stays
     silent : whether the finger does not answer: its electrodes all read the same
-
     Raises TactileError for a tare of other frames.
     """
 
@@ -126,10 +124,7 @@ class LiveSignals:
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return the signals of frames (T, 19) and PDC (T,) counts, NaN where there is none.
-
-        Raises ValueError before rest is known.
-        """
+        """Return signals of frames (T, 19) and PDC (T,) counts, or NaN. Raises ValueError before rest is known."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)

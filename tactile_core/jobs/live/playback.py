@@ -32,10 +32,7 @@ class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
-        """Raise TactileError where there is no such file; columns, sensor : as of `recordings.read`.
-
-        ``path#1`` follows finger 1 of a file of several.
-        """
+        """Follow a file, or ``path#1``, its finger 1; columns, sensor : as of `read`. Raises TactileError for none."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0

@@ -39,10 +39,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag.
-
-    topics : those with BioTacs, in the order of their names; others : those without, in words; middle : of its time, ns
-    """
+    """An open bag. topics : those with BioTacs, by name; others : those without, in words; middle : of its time, ns"""
 
     path: str
     ros1: bool
@@ -53,10 +50,7 @@ class Bag:
 
 
 def is_bag_folder(path: str) -> bool:
-    """Return true for the folder of a ROS 2 bag.
-
-    Raises TactileError for one that is compressed file by file, or holds links out of its folder.
-    """
+    """Return true for a ROS 2 bag's folder. Raises TactileError for files packed one by one, and links out of it."""
     if not os.path.isfile(os.path.join(path, MARK)):
         return False
     with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:

@@ -181,10 +181,7 @@ def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
 def _messages(
     bag: Bag, topic: Topic, start: int | None = None
 ) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
-    """Yield the stamp (unix s) of each message, the bag's where it has none, and `channels` of each sensor in it.
-
-    start : ns, from which messages are read
-    """
+    """Yield stamp (unix s, the bag's if there is none) and sensors' `channels` of each message from `start` ns on."""
     known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
         for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):

@@ -77,10 +77,7 @@ class Definition:
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
-    """Return the definitions that messages of a type may have: the bag's own, or without one those of `KNOWN`.
-
-    text : of the bag, empty where it has none. One that cannot be parsed, or has no electrodes, is left out.
-    """
+    """Return the definitions that a type may have: the bag's own, or of `KNOWN`; unreadable ones are left out."""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
     if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):

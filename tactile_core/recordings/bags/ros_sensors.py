@@ -19,10 +19,7 @@ PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SensorFields:
-    """Names of a sensor's fields. path : fields from the message to the sensor, or to a list of them
-
-    slow : of pdc, tac, tdc, empty where there is none; others : fields that nothing here reads
-    """
+    """Names of a sensor's fields. path : to the sensor, or a list of them; slow : pdc, tac, tdc; others : not read"""
 
     path: tuple[str, ...]
     electrodes: str
@@ -76,10 +73,7 @@ def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, 
 
 
 def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float], list[float]]:
-    """Return pdc, tac, tdc and the samples of pac; and the electrodes. NaN marks what the sensor has not.
-
-    Raises ValueError for more than MOST_PAC samples.
-    """
+    """Return pdc, tac, tdc, pac and the electrodes, NaN where missing. Raises ValueError for over MOST_PAC samples."""
     row = [float(sensor[name]) if name else float("nan") for name in fields.slow]
     for name in fields.pac:
         samples = sensor[name]

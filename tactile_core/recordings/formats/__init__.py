@@ -64,10 +64,7 @@ HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": 
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
-    """Return the share of a BioTac SP's columns that a file has of the finger of which it has most.
-
-    style : of the columns' names, from finger and number
-    """
+    """Return a file's largest share of the columns of a finger. style : of their names, from finger and number"""
     return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
 
 
@@ -77,10 +74,7 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build a finger's recording of a BioTac SP's table; its other columns are named in ``about``.
-
-    Raises TactileError for a missing column, and the errors of ``assemble``.
-    """
+    """Build a finger's recording of a BioTac SP's table, other columns in ``about``. Raises as ``assemble`` does."""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

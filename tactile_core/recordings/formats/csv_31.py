@@ -45,10 +45,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Read (T, 19) counts with place and force (T, 3), in the file's own units.
-
-    Raises TactileError for a column that is missing, more electrodes, or too many lines that cannot be read.
-    """
+    """Read counts (T, 19), place and force (T, 3) in the file's units. Raises TactileError as `of_table` does."""
     names = canonical(table.header)
     known, called = dict(zip(table.header, names, strict=False)), dict(zip(names, table.header, strict=False))
     table.taken.update(called.get(name, name) for name in COLUMNS)

@@ -27,10 +27,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(store: Store) -> Recording:
-    """Read (T, 19) electrodes with place and force (T, 3), in the file's own units, and the indenters' numbers.
-
-    Raises TactileError for arrays of other shapes.
-    """
+    """Read electrodes (T, 19), place, force (T, 3), indenters' numbers. Raises TactileError for other shapes."""
     electrodes = electrodes_of(store, ELECTRODES_NAME)
     frames = len(electrodes)
     return assemble(

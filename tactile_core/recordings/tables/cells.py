@@ -39,10 +39,7 @@ def number(cell: str) -> float | None:
 
 
 def seconds(cell: str) -> float:
-    """Parse a time, with the day (2012-11-08, 08.11.2012) or without, to s since 1970 or midnight.
-
-    Raises ValueError for anything else.
-    """
+    """Parse a time, with its day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight, or raise ValueError."""
     found = CLOCK.fullmatch(cell.strip())
     if found is None:
         raise ValueError(cell)
@@ -81,10 +78,7 @@ class Words:
 
 
 class Cells:
-    """What the columns of a table hold: numbers, times, or texts.
-
-    words : of the columns of texts, by name; plain : true where all columns hold numbers
-    """
+    """Kinds of a table's columns. words : of columns of texts, by name; plain : true where all hold numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Decide it by the first rows."""

@@ -98,10 +98,7 @@ def read(path: str | os.PathLike) -> ColumnMap:
 
 
 def write(path: str | os.PathLike, guessed: list[ColumnMap], held: tuple[str, ...]) -> None:
-    """Write the first of guessed maps to a new file, whole or not at all, and the others as comments.
-
-    held : the recording's columns, named in a comment
-    """
+    """Write the first guessed map to a new file, the others as comments, with the names of the columns held."""
     named = ", ".join(held[:MOST_NAMED]) + (f" and {len(held) - MOST_NAMED} more" if len(held) > MOST_NAMED else "")
     quoted = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
     columns, *others = guessed

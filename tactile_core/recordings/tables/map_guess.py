@@ -62,10 +62,7 @@ def _as_long(names: Collection[str], electrodes: tuple[str, ...]) -> Collection[
 
 
 def _series(names: Collection[str]) -> list[tuple[str, ...]]:
-    """List runs of 19 names that differ in one number alone: those called electrodes, of which some may be missing.
-
-    Where none are so called, any.
-    """
+    """List runs of 19 names that differ in one number: those called electrodes, some maybe missing, else any."""
     series: dict[tuple[str, str], dict[int, str]] = {}
     for name in names:
         for found in NUMBER.finditer(name):

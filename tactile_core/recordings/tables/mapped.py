@@ -25,10 +25,7 @@ TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers h
 
 
 def refuse_several(table: Table, columns: ColumnMap) -> None:
-    """Raise TactileError for a table of several fingers whose rows take turns: a column tells rows of one stamp apart.
-
-    Frames of one stamp, of a coarse clock or a buffer, have no such column.
-    """
+    """Raise TactileError where rows of several fingers take turns: a column tells rows of one stamp apart."""
     if not columns.time or any(name not in table.header for name in columns.names()):
         return
     keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
@@ -94,10 +91,7 @@ def _texts(table: Table, name: str) -> np.ndarray:
 
 
 def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Recording:
-    """Make the recording of a table by a map; container : of the file that the table was made of.
-
-    Raises TactileError for a column that is missing, and the errors of ``assemble``.
-    """
+    """Make the recording of a table by a map; container : of its file. Raises TactileError as ``assemble`` does."""
     refuse_several(table, columns)
     if columns.channel:
         table = widen(table, columns)
@@ -128,10 +122,7 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
 
 
 def _electrodes(table: Table, names: list[str]) -> list[str]:
-    """Return the names of E1 to E19; a single one is that of an array.
-
-    Raises TactileError where they are 19 of the 24 of a BioTac SP.
-    """
+    """Return the names of E1 to E19, or of one array's. Raises TactileError for 19 of a BioTac SP's 24."""
     known = (*table.header, *table.left_out)
     if len(names) == 1:
         inner = [name for name in known if name.startswith(f"{names[0]}[")]

@@ -23,10 +23,7 @@ LOOKED_AT = 2**18  # bytes of a text by which its map is guessed: some hundred f
 def read_by_map(
     path: str, container: str, file: BinaryIO, columns: ColumnMap, left_out: Callable[[str], bool] | None = None
 ) -> Recording:
-    """Read an open file by a map; left_out : columns that are not held of a long text.
-
-    Raises TactileError for a column or array that is missing, and the errors of ``assemble``.
-    """
+    """Read an open file by a map, without columns `left_out`. Raises TactileError for a missing column or array."""
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else read_table(path, file, left_out)
         found, taken = read_mapped(table, columns, container), table.taken
@@ -47,10 +44,7 @@ def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
 
 
 def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap], tuple[str, ...]]:
-    """Guess the maps of an open file's fingers, the first first; also returns the names of its columns.
-
-    Raises TactileError for a bag, and like `read_by_map`.
-    """
+    """Guess the maps of an open file's fingers; return its columns, too. Raises TactileError, also for a bag."""
     refuse_bag(path, container)
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else next(read_tables(path, file, LOOKED_AT, 0))[0]

@@ -94,10 +94,7 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns` (T, n), as float32 where the table is kept small and that is exact, else as float64.
-
-        Columns that the table has not are NaN, unless half of them are missing.
-        """
+        """Return `columns` (T, n), as float32 where that is exact; missing ones are NaN, unless half are missing."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:
@@ -155,10 +152,7 @@ def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None
 
 
 def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_out: Callable[[str], bool]) -> Table:
-    """Put blocks together in half the memory: what single precision holds exactly, as counts, is kept in it.
-
-    size : bytes of the whole file, from which the number of rows is guessed; left_out : columns that are not held
-    """
+    """Put blocks together in half the memory, float32 where exact. size : bytes of the file; left_out : not held"""
     path = first.path
     held = [column for column, name in enumerate(first.header) if name in first.words or not left_out(name)]
     header = tuple(first.header[column] for column in held)

@@ -20,10 +20,7 @@ NUMBERED = "column{}"  # names of columns without a header, from 1
 
 @dataclass
 class Header:
-    """Header of a table; names : of the columns, lower case; lines : up to and with it; separator : of cells.
-
-    line : the text of the header, empty where the rows have none
-    """
+    """Header of a table. names : lower case; lines : up to and with it; separator : of cells; line : its text"""
 
     names: tuple[str, ...]
     lines: int

@@ -78,10 +78,7 @@ def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float]:
-    """Return by how much fitted gains reduce the unexplained share of changes in contact (n, 19), and their spread.
-
-    The spread is the root mean square of the gains' logarithms, less their median.
-    """
+    """Return how much of (n, 19) in contact fitted gains explain more, and the rms of their logarithms, centred."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     even, log_gain = change, np.zeros(change.shape[1])
     for _ in range(FITS):
@@ -193,10 +190,7 @@ def flagged(
 
 
 def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt | None:
-    """Return the doubt that two electrodes are exchanged, or gains wrong; None where neither explains what is left.
-
-    beyond : how much more is left over than of a unit as simulated, which either must explain
-    """
+    """Return the doubt that explains more than `beyond`: two electrodes exchanged, or wrong gains; else None."""
     less, (first, second) = exchanged_share(change, sensor)
     if less > max(EXCHANGED, beyond):
         return Doubt(Reason.LAW_EXCHANGED, share=less, first=first + 1, second=second + 1, most=EXCHANGED)

@@ -76,7 +76,6 @@ class Film:
 
         They are zero where they are no larger than what the largest drift leaves, and like no simulated contact. A rest
         of another recording may be off by `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
-
         perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself
         """
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:

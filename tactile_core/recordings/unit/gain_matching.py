@@ -27,7 +27,6 @@ class Match:
     """Fitted gains and offsets.
 
     log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
-
     alike : number of different typical signals matched; settled : true if the last iteration changed nothing
     """
 
@@ -68,10 +67,7 @@ def _nearest(frames: np.ndarray, typical: np.ndarray) -> np.ndarray:
 def _log_gain(
     change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Log gains (19,), and the number of contacts behind each.
-
-    A mean of log ratios is unbiased by noise on both sides, where least squares would shrink the gain.
-    """
+    """Return log gains (19,) and contacts behind each: a mean of logarithms is unbiased by noise on both sides."""
     wanted = typical[near]
     size = np.square(wanted * np.exp(before))
     weight = size / (size + SURE**2)

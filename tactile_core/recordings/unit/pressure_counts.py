@@ -17,10 +17,7 @@ MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Return PDC (T,) of raw electrodes in counts; None where it is 0 throughout, or of no unit that is known.
-
-    unit : counts a unit of the electrodes; what is found is added to the warnings
-    """
+    """Return PDC (T,) of raw electrodes in counts, or None; unit : counts a unit of theirs; adds to the warnings."""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -34,10 +31,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return the counts a unit of PDC (T,), 0 where it cannot be told, and its pressure's unit, "" where it is none.
-
-    unit : counts a unit of the electrodes, which PDC shares where it has their range
-    """
+    """Return counts a unit of PDC (T,), 0 if unknown, and its pressure's unit, if any; unit : of the electrodes"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):
