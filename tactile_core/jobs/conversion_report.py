@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 BLOCK = 2**16  # frames of signals alone that are looked at at a time
 SHEET_ARRAYS = (
     "displacement_biotac", "displacement_digit", "force", "confidence", "flags", "expected_error_digit",
-    "contact_center",
+    "contact_center", "second_center",
 )  # fmt: skip
 
 
@@ -147,6 +147,7 @@ class Contents:
     displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
     force : (k, 3) N; confidence : (k,) 0..1; flags : (k,) uint16; expected_error_digit : (k,) m, of the largest node
     contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
+    second_center : (k, 2) m of a second contact, likewise
     true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
     source : the sensor that was read, whose skin is drawn; camera : of the gel
     """
@@ -173,6 +174,7 @@ class Contents:
     warnings: Sequence[str] = ()
     source: str = SOURCE
     snapshots: bool = False
+    second_center: np.ndarray | float = np.nan
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
@@ -228,12 +230,13 @@ def _drawn(shown: Contents) -> SheetFigure:
     figure.headings(shown.time[shown.frames])
     largest = scale(displacement, truth)
     name = title(shown.source)
+    centers = np.stack(np.broadcast_arrays(shown.contact_center, shown.second_center), axis=1)
     label = f"{name}, unrolled\n" + ("translated" if shown.simulated else "displacement")
-    figure.skin_row(label, displacement, largest, shown.contact_center - shown.mount_shift, shown.source)
+    figure.skin_row(label, displacement, largest, centers - shown.mount_shift, shown.source)
     if truth is not None:
         figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
     gel = title(shown.camera.sensor)
-    figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, shown.contact_center)
+    figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, centers)
     figure.picture_row(f"{gel} picture", shown.pictures)
     dent = accuracy.lengths(shown.displacement_digit).max(axis=1)
     figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit, dent)

@@ -82,7 +82,10 @@ class ToolOptions:
         """Load the networks, and tell whether the target is solved under the contacts that they find."""
         must_lead_to = None if self.gel == SOLVED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
-        return translator, self.gel == SOLVED or translator.target != self.target
+        solves = self.gel == SOLVED or translator.target != self.target
+        if solves and self.answer.contacts > 1:
+            raise TactileError("--contacts 2", "a gel that is solved", "one that is translated to", "Leave one out")
+        return translator, solves
 
 
 def load_tools(options: ToolOptions) -> Tools:

@@ -44,7 +44,7 @@ ALWAYS = {
     ),
     "flags": ("bits", "what is remarkable about a frame; attribute names: JSON, name -> bit"),
 }
-SAMPLES = "samples"  # what --samples asks for, no word of --keep
+SAMPLES, SECOND = "samples", "second"  # what --samples and --contacts 2 ask for, no words of --keep
 KEPT = {
     "latent": {
         "latent_signal": ("1", "(T, K) code of the electrodes (SVB)"),
@@ -71,6 +71,10 @@ KEPT = {
         "sample_center": ("m", "(T, S, 2) = (x, z) on the DIGIT of contacts that the frame may be as well; NaN: none"),
         "sample_force": ("N", "(T, S) of these contacts; 0 without contact"),
     },
+    SECOND: {
+        "second_center": ("m", "(T, 2) = (x, z) on the DIGIT of the weaker of two contacts; NaN without one"),
+        "second_force": ("N", "(T, 3) of that contact; 0 without one. Displacements are those of both"),
+    },
 }
 PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in shards; elsewhere they are PNG files
 # Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms a frame
@@ -84,8 +88,8 @@ LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk 
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Return the words of KEPT: `keep`, and the posterior's samples where the options ask for some."""
-    return (*keep, SAMPLES) if answer.samples else tuple(keep)
+    """Return the words of KEPT: `keep`, the posterior's samples and a second contact where the options ask for them."""
+    return (*keep, *[SAMPLES] * (answer.samples > 0), *[SECOND] * (answer.contacts > 1))
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:

@@ -139,19 +139,19 @@ class SheetFigure:
         self.top += HEADING
 
     def skin_row(
-        self, label: str, displacement: np.ndarray, largest: float, contact_center: np.ndarray | None, sensor: str
+        self, label: str, displacement: np.ndarray, largest: float, centers: np.ndarray | None, sensor: str
     ) -> None:
-        """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; contact_center : (k, 2) m."""
+        """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; centers : (k, c, 2) m."""
         plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
-        self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, contact_center)
+        self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, centers)
         self.top += GAP
 
-    def gel_row(self, label: str, displacement: np.ndarray, contact_center: np.ndarray) -> None:
-        """Draw maps of (k, M, 3) m on the gel, with the border of its picture; contact_center : (k, 2) m."""
+    def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
+        """Draw maps of (k, M, 3) m on the gel, with the border of its picture; centers : (k, c, 2) m of contacts."""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(
-            label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, contact_center
+            label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
         )
         border = np.stack([self.camera.gel_x[[0, 0, -1, -1, 0]], self.camera.gel_z[[0, -1, -1, 0, 0]]], axis=1)
         ticks = Z_TICKS[(z[0] < Z_TICKS) & (z[1] > Z_TICKS)]
@@ -178,7 +178,7 @@ class SheetFigure:
         largest: float,
         x: tuple[float, float],
         z: tuple[float, float],
-        contact_center: np.ndarray | None,
+        centers: np.ndarray | None,
     ) -> Axes:
         """Draw a row of maps of |displacement| over the plan (n, 2) = (x, z) m; one set of axes takes half the time."""
         from matplotlib.tri import Triangulation
@@ -193,9 +193,10 @@ class SheetFigure:
             outline = self._on_sheet(_outline(self._gel), k, z).T
             drawn = [colors, *axes.plot(*outline, color="white", linewidth=2.2)]
             drawn += axes.plot(*outline, color="black", linewidth=0.9)
-            if contact_center is not None:
-                center = self._on_sheet(contact_center[k], k, z)
-                drawn += axes.plot(*center, "+", color=MARK, markersize=9, markeredgewidth=1.6)
+            if centers is not None:
+                drawn += axes.plot(
+                    *self._on_sheet(centers[k], k, z).T, "+", color=MARK, markersize=9, markeredgewidth=1.6
+                )
             for artist in drawn:
                 artist.set_clip_path(frame)
         left, right = (self._on_sheet(corners, k, z)[:, 0] for k in (0, self.columns - 1))

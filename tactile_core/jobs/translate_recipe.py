@@ -42,7 +42,7 @@ def make(
     """
     prepare.options().check()
     source = None if weights else readers.sensor_of_first(paths, prepare.columns)
-    tools = convert.ToolOptions(weights, gel=gel, target=target, source=source)
+    tools = convert.ToolOptions(weights, answer=answer, gel=gel, target=target, source=source)
     network, solves = tools.load_networks()
     if shard_frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(shard_frames), f"1 to {MAX_SHARD_FRAMES}")

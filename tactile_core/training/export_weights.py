@@ -13,7 +13,7 @@ from ..sensors import places_of
 from ..sensors.descriptor import NODES
 from ..sensors.fluid_sensor import FALLS
 from ..translation import reference_signals
-from ..translation.card import ERROR_FEATURES, NETS, PLACE, POSTERIORS, REST, SURFACES
+from ..translation.card import ERROR_FEATURES, NETS, PARTS, PLACE, POSTERIORS, REST, SURFACES
 from ..translation.networks import Networks, load
 from ..translation.weights import CARD_FORMAT, CARD_NAME, card_bytes, sha256, to_safetensors, write_bytes
 from .data import Contacts
@@ -23,6 +23,7 @@ from .options import label
 from .stages import FORCE_BLOCKS, FORCE_WIDTH, Model
 from .step_errors import PRESSURE_FROM, Bodies
 from .surface_codec import SurfaceCodec
+from .two_contacts import parts_sizes
 
 DRAWS = 4  # noisy readings of each training contact for the distance's statistics
 COLLAPSED = 1e-3  # share of the largest variance: latents that vary less are unused, their noise is no distance
@@ -35,8 +36,12 @@ UNITS = {
 }
 
 
-def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: Path) -> dict:
+def export(
+    model: Model, contacts: Contacts, parts: dict[str, np.ndarray], bodies: Bodies, seed: int, folder: Path
+) -> dict:  # fmt: skip
     """Write one safetensors file a network and the card; returns the card.
+
+    parts : tensors of the network that tells two contacts apart
 
     The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights.
     """
@@ -47,6 +52,7 @@ def export(model: Model, contacts: Contacts, bodies: Bodies, seed: int, folder: 
     tensors = {net: net_tensors(net, model, contacts) for net in NETS}
     tensors["SVB"] |= signal_statistics(model, contacts, seed)
     tensors["pressure"]["rectified"] = pressure_of_rectified(contacts, seed)
+    tensors[PARTS] = parts
     sizes = net_sizes(contacts)
     typical = reference_signals.make(contacts.pairs.signal[contacts.split.train], seed)
     measure = Measure(assemble(tensors, sizes), contacts, bodies, seed)
@@ -109,6 +115,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
         "force": {"inputs": biotac, "outputs": 3, **head},
         "pressure": {"inputs": contacts.electrodes, "outputs": 1, **head},
         "error": {"inputs": signal + ERROR_FEATURES, "outputs": len(SURFACES), **head},
+        PARTS: parts_sizes(contacts.electrodes),
     }
 
 
@@ -152,7 +159,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
     """Return the numpy networks before there is a card."""
-    return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in NETS}})
+    return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in tensors}})
 
 
 def versions(device: torch.device) -> dict[str, str]:
@@ -168,13 +175,15 @@ def versions(device: torch.device) -> dict[str, str]:
 
 def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, object]]:
     """Write the files; returns the card's entries: file, sha256, sizes, shapes."""
-    entries = {}
-    for net in NETS:
-        data = to_safetensors(tensors[net])
-        write_bytes(folder / f"{net}.safetensors", data)
-        shapes = {name: list(array.shape) for name, array in sorted(tensors[net].items())}
-        entries[net] = {"file": f"{net}.safetensors", "sha256": sha256(data), "sizes": sizes[net], "shapes": shapes}
-    return entries
+    return {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()}
+
+
+def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dict[str, int]) -> dict[str, object]:
+    """Write the file of one network; returns the card's entry: file, sha256, sizes, shapes."""
+    data = to_safetensors(tensors)
+    write_bytes(folder / f"{net}.safetensors", data)
+    shapes = {name: list(array.shape) for name, array in sorted(tensors.items())}
+    return {"file": f"{net}.safetensors", "sha256": sha256(data), "sizes": sizes, "shapes": shapes}
 
 
 def pairs_entry(contacts: Contacts) -> dict[str, object]:

@@ -26,7 +26,7 @@ from ..recordings.flags import Flag
 from ..sensors import unrolling
 from ..simulation.pairs_file import Split, split_presses
 from ..translation import networks, reference_signals
-from ..translation.card import NETS, PLACE, STATE
+from ..translation.card import PLACE, STATE
 from ..translation.contact_frame import ContactFrame
 from ..translation.gel_place import on_gel, place_on
 from ..translation.layers import COMPRESSED_LIMIT
@@ -247,7 +247,7 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
     """Write the weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
-    for name in [*(f"{net}.safetensors" for net in NETS if net != tuned), reference_signals.FILE]:
+    for name in [*(f"{net}.safetensors" for net in card["nets"] if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)
     write_bytes(folder / f"{tuned}.safetensors", data)

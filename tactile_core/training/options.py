@@ -26,6 +26,8 @@ class Options:
     components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
     epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
         simulated contacts better, not real recordings (docs/train.md)
+    parts_steps : batches of the network that tells two contacts apart, times `effort`: errors on presses kept apart
+        hardly fall after it
     beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
     astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
     noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
@@ -93,6 +95,7 @@ class Options:
     pressure_epochs: int = 6
     error_epochs: int = 2
     back_epochs: int = 5
+    parts_steps: int = 8000
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:

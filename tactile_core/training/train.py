@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from ..accuracy import lengths
 from ..errors import TactileError
 from ..files import atomic
 from ..sensors import sensor_surface
@@ -31,11 +32,13 @@ from .export_weights import export, versions
 from .options import Options, device_of
 from .stages import STAGES, Model, Stage
 from .step_errors import Bodies, our_bodies
+from .two_contacts import Presses, train_parts
 
 log = logging.getLogger(__name__)
 Progress = Callable[[float, str], None]
 CHECKPOINT = "checkpoint.npz"  # in the training's folder, until all else is written
 WARM_UP = 0.02  # share of the steps over which the learning rate rises (assumed)
+NETS_SHARE = 0.8  # of a training's time, before what tells two contacts apart is trained
 VALIDATION_SEED = 2**31  # stands in the place of the epoch; no training has as many
 
 
@@ -74,8 +77,14 @@ def train(
         }
         contacts = Contacts(pairs, split, options, frames, generator, where)
         model = Model(options, contacts, generator).to(where)
-        history = run_stages(model, contacts, seed, out / CHECKPOINT, progress or quiet)
-        card = export(model, contacts, bodies, seed, out / "weights")
+        say = progress or quiet
+        history = run_stages(model, contacts, seed, out / CHECKPOINT, lambda share, text: say(NETS_SHARE * share, text))
+        presses = Presses(pairs.signal, pairs.place[:, :2], lengths(pairs.force))
+        parts = train_parts(
+            presses, split, options, contacts.rest, pairs.pair[0], seed,
+            lambda share, text: say(NETS_SHARE + (1 - NETS_SHARE) * share, text),
+        )  # fmt: skip
+        card = export(model, contacts, parts, bodies, seed, out / "weights")
         write_log(out / "log.csv", history)
         draw_losses(out / "loss.png", history)
         (out / CHECKPOINT).unlink()

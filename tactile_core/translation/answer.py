@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import TactileError
 
+CONTACTS = 1, 2  # looked for in a frame
 MOST_SAMPLES = 100  # contacts a frame; 50 bytes each (assumed: more tell nothing new)
 FARTHEST = 25.0  # mm, the gel's length: beyond, no contact of the BioTac lies on it
 Estimate = Literal["likely", "mean"]
@@ -26,12 +27,15 @@ class Answer:
     frames_apart : estimate each frame from its own signals; otherwise the contact is tracked through all frames
     mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: the position of the BioTac on it
     samples : number of contacts drawn for each frame from its posterior
+    contacts : 2 to look for a second contact in each frame. On another unit than the simulated one a single wide
+        contact is often taken for two: ask where you know that there may be two
     """
 
     kind: Estimate = LIKELY
     frames_apart: bool = False
     mount_shift_mm: tuple[float, float] = (0.0, 0.0)
     samples: int = 0
+    contacts: int = 1
 
     def __post_init__(self) -> None:
         """Raise ValueError for a shift longer than the gel, or for too many samples."""
@@ -39,6 +43,8 @@ class Answer:
             raise ValueError(f"mount_shift_mm {self.mount_shift_mm}: within {FARTHEST:g} mm")
         if not 0 <= self.samples <= MOST_SAMPLES:
             raise ValueError(f"samples {self.samples}: 0 to {MOST_SAMPLES}")
+        if self.contacts not in CONTACTS:
+            raise ValueError(f"contacts {self.contacts}: 1 or 2")
 
     @property
     def follows(self) -> bool:
@@ -58,14 +64,17 @@ class Answer:
         return (f"contacts lie {x:g} mm along x and {z:g} mm along z from their place on the DIGIT (--mount-shift)",)
 
 
-def parse_answer(kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int) -> Answer:
+def parse_answer(
+    kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int, contacts: int = 1
+) -> Answer:  # fmt: skip
     """Return the options of a command line; mount_shift : ``"X,Z"`` mm, or None for no shift.
 
     Raises TactileError for a shift or a number of samples out of range.
     """
     if not 0 <= samples <= MOST_SAMPLES:
         raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
-    return Answer(kind, frames_apart, (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift), samples)
+    shift = (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift)
+    return Answer(kind, frames_apart, shift, samples, contacts)
 
 
 def parse_shift(text: str) -> tuple[float, float]:

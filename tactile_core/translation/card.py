@@ -29,6 +29,7 @@ STATE = PLACE + 2  # numbers of a contact's state: the place of the gel's dent, 
 SURFACES = PAIR
 ERROR_FEATURES = 3  # beside the latent: what SVB leaves, how large the signal is, whether it is rectified
 NETS = ("SVB", "MVB", "S2MPN", "R2MPN", "MVD", "M2MPN", "D2BPN", "B2SPN", "force", "pressure", "error")
+PARTS = "parts"  # the network that tells two contacts apart, which weights may lack
 POSTERIORS = ("S2MPN", "R2MPN")
 MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small enough to refuse a damaged number
 
@@ -52,13 +53,14 @@ def tensor_shapes(net: str, sizes: dict[str, int], electrodes: int = ELECTRODES)
         shapes |= {"wide": (wide, 3 * sizes["nodes"]), "near": (near, 3 * window)}
         return shapes | {"scale": (wide + near,), "turn": (sizes["nodes"],)}
     shapes = residual_shapes("map", sizes["inputs"], sizes["outputs"], width, blocks)
-    return shapes | {"rectified": (1,)} if net == "pressure" else shapes
+    own = {"pressure": "rectified", PARTS: "single"}.get(net)
+    return shapes | {own: (1,)} if own else shapes
 
 
 _MESH = ("blocks", "columns", "half", "latent", "near", "nodes", "rows", "wide", "width")
 _MAP = ("blocks", "inputs", "outputs", "width")
 _OWN = {"SVB": ("latent",), "MVB": _MESH, "MVD": _MESH} | dict.fromkeys(POSTERIORS, ("components", *_MAP))
-SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in NETS}
+SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in (*NETS, PARTS)}
 
 
 def card_entry(card: dict, net: str, path: Path) -> dict:
@@ -98,8 +100,10 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = 
         ("force", "outputs", 3),
         ("pressure", "inputs", electrodes),
         ("pressure", "outputs", 1),
+        (PARTS, "inputs", 2 * electrodes),
+        (PARTS, "outputs", electrodes + 1),
     ]
-    for net, size, expected in links:
+    for net, size, expected in (link for link in links if link[0] in sizes):
         if sizes[net][size] != expected:
             raise TactileError(f"{path}, nets.{net}", f"{size} {sizes[net][size]}", f"{expected}", ADVICE)
 

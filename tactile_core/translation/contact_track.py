@@ -50,12 +50,15 @@ class Evidence(Posterior):
 
     size : (T,) counts, root mean square of the changes; rectified : (T,) bool
     latent : (T, K) of the signals; unsigned : (T,) bool, those of lost signs that were not recovered
+    second : (T, e) counts, changes by the weaker of two contacts, NaN where there is one; (T, 0) where none is looked
+        for. All else is then of the stronger one
     """
 
     size: np.ndarray
     rectified: np.ndarray
     latent: np.ndarray
     unsigned: np.ndarray
+    second: np.ndarray
 
     def at(self, frames: slice | np.ndarray) -> Evidence:
         """Return the evidence of some frames alone."""

@@ -7,6 +7,7 @@ M2MPN  BioTac latent -> DIGIT latent
 R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
 D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
 force  head, from the BioTac's latent       pressure and error  heads, from the signal
+parts  signal -> the signals of two contacts at once; weights may lack it
 
 Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
 part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
@@ -24,7 +25,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files.shipped import shipped
 from ..sensors import SOURCE, electrode_count
-from .card import NETS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, pair_of, tensor_shapes
+from .card import NETS, PARTS, PLACE, SIGNAL_HIDDEN, STATE, card_entry, check_chain, pair_of, tensor_shapes
 from .contact_frame import ContactFrame
 from .layers import COMPRESSED_LIMIT, SignalDistance, Tensors, compress, expand, in_blocks, plain, residual
 from .posterior import FORCE_SCALE, Posterior
@@ -33,11 +34,13 @@ from .weights import ADVICE, CARD_NAME, read_card, read_verified
 # Of a posterior's components, in units of the state: no place is known to .2 cells, no force to 2 % (assumed).
 LEAST_SPREAD = 0.02
 SPREAD_LIMITS = -8.0, 2.0  # of the logarithm of what a network adds to it
+FINE = 5.0  # times finer than the networks' scale is the second one that `parts` sees: at 3 counts noise begins
+PARTED = 0.25  # of the signal's length, the unit of half the difference between both parts (assumed)
 PRESSURE_SCALE = 300.0  # Pa: the pressure is 300 Pa sinh(head), likewise (assumed)
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = shipped("weights")
 # The card names the hash of every file of weights; this names the card that ships.
-SHIPPED_CARD_SHA256 = "7f13305fccd835b7f6d2a514a2daa29183864ca1f429fb08e979586d946ad456"
+SHIPPED_CARD_SHA256 = "9fa2615fd2ff73ac79a38a53f32e45e1d1af0587d25167aeea3b684e27d7f28c"
 
 
 class Networks:
@@ -52,10 +55,11 @@ class Networks:
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
         self.card, self.sha256 = card, sha256
         self.source, self.target = pair_of(card, CARD_NAME)
-        self.sizes: dict[str, dict[str, int]] = {net: card["nets"][net]["sizes"] for net in NETS}
+        self.sizes: dict[str, dict[str, int]] = {net: card["nets"][net]["sizes"] for net in tensors}
         self.electrodes = self.sizes["pressure"]["inputs"]
         self.tensors = {
-            net: {name: np.ascontiguousarray(array, np.float32) for name, array in tensors[net].items()} for net in NETS
+            net: {name: np.ascontiguousarray(array, np.float32) for name, array in own.items()}
+            for net, own in tensors.items()
         }
         self.frames = {"MVB": self._frame("MVB", self.source), "MVD": self._frame("MVD", self.target)}
 
@@ -71,6 +75,20 @@ class Networks:
         """Decode latent_signal (T, K) to change (T, 19) counts: SVB's reconstruction."""
         size = self.sizes["SVB"]["latent"]
         return in_blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
+
+    def parts(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Tell the signals of two contacts at once apart, of change (T, 19) counts.
+
+        Returns which frames (T,) bool have two, and the changes (T, 19) of the stronger and of the weaker one.
+        """
+        tensors, change = self.tensors[PARTS], np.asarray(change, np.float32)
+        seen = np.concatenate([compress(change), compress(np.float32(FINE) * change)], -1)
+        found = self._map(PARTS, seen)
+        half = found[:, :-1] * np.float32(PARTED) * np.sqrt(np.square(change).sum(-1, keepdims=True))
+        both = np.stack([change / 2 + half, change / 2 - half])
+        order = np.argsort(-np.square(both).sum(-1), axis=0, kind="stable")
+        stronger, weaker = np.take_along_axis(both, order[..., None], axis=0)
+        return found[:, -1] > tensors["single"], stronger, weaker
 
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""
@@ -285,9 +303,10 @@ def load(folder: str | os.PathLike | None = None, source: str | None = None) -> 
     if shipped and folder == WEIGHTS_FOLDER and digest != SHIPPED_CARD_SHA256:
         raise TactileError(folder / CARD_NAME, f"sha256 {digest}", SHIPPED_CARD_SHA256, ADVICE)
     tensors, electrodes = {}, electrode_count(pair_of(card, folder / CARD_NAME)[0])
-    for net in NETS:
+    names = [*NETS, *([PARTS] if PARTS in card.get("nets", {}) else [])]
+    for net in names:
         entry = card_entry(card, net, folder / CARD_NAME)
         shapes = tensor_shapes(net, entry["sizes"], electrodes)
         tensors[net] = read_verified(folder / f"{net}.safetensors", entry["sha256"], shapes)
-    check_chain({net: card["nets"][net]["sizes"] for net in NETS}, folder / CARD_NAME, electrodes)
+    check_chain({net: card["nets"][net]["sizes"] for net in names}, folder / CARD_NAME, electrodes)
     return Networks(tensors, card, digest)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..recordings.polarity import TOUCHING
 from ..sensors import unrolling as surface
 from . import gel_place
 from .answer import MEAN, Answer
-from .card import DOUBT, KINDS, PLACE, REST, STATE, SURFACES, doubt, error_bound
+from .card import DOUBT, KINDS, PARTS, PLACE, REST, STATE, SURFACES, doubt, error_bound
 from .contact_frame import STILL, ContactFrame
 from .contact_track import Evidence
 from .layers import COMPRESSED_LIMIT, DISTANCES
@@ -56,6 +57,8 @@ class Translation(Summary):
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
         BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
+    second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, where `Answer.contacts` asks for
+        two; NaN and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
     explained : (T,), share of the electrodes' change, 1 less the squared rest over its square, that a unit of this film
         and rest shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without
         contact
@@ -76,12 +79,28 @@ class Translation(Summary):
     error_bound_digit: np.ndarray
     flags: np.ndarray
     explained: np.ndarray
+    second_center: np.ndarray
+    second_force: np.ndarray
 
     @classmethod
     def joined(cls, parts: Sequence[Translation]) -> Translation:
         """Join translations of frames that follow each other."""
         names = [field.name for field in dataclasses.fields(cls)]
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+class _Second(NamedTuple):
+    """Second contacts of some rows (n,), and what all frames have of them.
+
+    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e); center : (T, 2) m; force : (T, 3) N
+    """
+
+    rows: np.ndarray
+    skin: np.ndarray
+    gel: np.ndarray
+    predicted: np.ndarray
+    center: np.ndarray
+    force: np.ndarray
 
 
 def _rectified(signals: Signals) -> np.ndarray:
@@ -119,6 +138,10 @@ class Translator:
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
         self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()
+        if self.answer.contacts > 1 and PARTS not in nets.tensors:
+            found = "weights that know single contacts alone"
+            advice = "Leave them out, or train weights with this version of `tactile train`"
+            raise TactileError("two contacts", found, "weights that tell two apart", advice)
         moved = self.answer.mount_shift
         self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
         self._unrolled = surface.unrolled_nodes(self.source)
@@ -129,10 +152,22 @@ class Translator:
         Raises TactileError for another sensor's signals.
         """
         change, unsigned = self.changes(signals)
+        whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
+        if self.answer.contacts > 1:
+            whole, second = change, second = self._apart(change, unsigned)
         latent = self.nets.encode_signal(change, unsigned)
-        size = np.sqrt(np.square(self._typical(signals)).mean(axis=1))
-        posterior = self.nets.posterior(latent, unsigned)
-        return Evidence(**vars(posterior), size=size, rectified=_rectified(signals), latent=latent, unsigned=unsigned)
+        size = np.sqrt(np.square(whole).mean(axis=1))
+        beside = {"rectified": _rectified(signals), "latent": latent, "unsigned": unsigned, "second": second}
+        return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, **beside)
+
+    def _apart(self, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the changes (T, e) by the stronger contact and by the weaker, NaN where there is one.
+
+        Those of lost signs (T,) are left whole.
+        """
+        two, stronger, weaker = self.nets.parts(change)
+        two = (two & ~unsigned)[:, None]
+        return np.where(two, stronger, change), np.where(two, weaker, np.float32(np.nan))
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
@@ -188,6 +223,9 @@ class Translator:
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
+        beside = self._second(evidence.second, silent, signals.stiffness)
+        both = beside.rows
+        skin[both], gel[both] = skin[both] + beside.skin, gel[both] + beside.gel
         flags = signals.flags.copy()
         flags[self.out_of_range(change, rectified)] |= np.uint16(Flag.OUT_OF_RANGE)
         shares = residual_shares(change, rectified, self._patterns)
@@ -196,17 +234,44 @@ class Translator:
         denied = contradicted(pressure, signals.pressure_measured) & (signals.kind != "scaled")
         flags[strange | (denied & ~(silent & signals.quiet))] |= np.uint16(Flag.UNEXPLAINED)
         flags[~silent & (DOUBT in self.card)] |= np.uint16(Flag.LAW_DOUBTED)
-        explained = np.where(silent, np.float32(np.nan), self._explained(signals, change, latent_source, rectified))
+        predicted = nets.decode_signal(nets.m2s(latent_source))
+        predicted[both] += beside.predicted
+        explained = np.where(silent, np.float32(np.nan), self._explained(signals, change, predicted, rectified))
         confidence = self._confidence(change, flags, rectified, explained)
         flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)
         flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
+        flags[both] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
-            confidence=confidence, flags=flags, explained=explained, **self._errors(change, rectified, center[:, 0]),
+            confidence=confidence, flags=flags, explained=explained, second_center=beside.center,
+            second_force=beside.force, **self._errors(change, rectified, center[:, 0]),
         )  # fmt: skip
+
+    def _second(self, change: np.ndarray, silent: np.ndarray, stiffness: float) -> _Second:
+        """Translate the weaker of two contacts by its changes (T, e), NaN where there is none, each frame alone.
+
+        silent : (T,) bool, frames without a first contact, which have no second
+        """
+        nets, count = self.nets, len(change)
+        center, force = np.full((count, 2), np.nan, np.float32), np.zeros((count, 3), np.float32)
+        rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
+        if not len(rows):
+            nothing = np.zeros((0, 1, 3), np.float32)
+            return _Second(rows, nothing, nothing, nothing[..., 0], center, force)
+        latent = nets.encode_signal(change[rows])
+        state = nets.contact(latent)
+        source, target = nets.latents(latent, state)
+        gel = nets.decode_target(target)
+        gel = gel if self._shift is None else self._shift(gel)
+        place = contact_center(gel, sensors.sensor_surface(self.target).rest, self.silent("digit_m"))
+        felt = touches(state) & np.isfinite(place[:, 0])
+        rows, place, source = rows[felt], place[felt], source[felt]
+        center[rows], force[rows] = place, stiffness * nets.force_in(state[felt], source)
+        predicted = nets.decode_signal(nets.m2s(source))
+        return _Second(rows, nets.decode_source(source), gel[felt], predicted, center, force)
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
@@ -226,14 +291,13 @@ class Translator:
         return found
 
     def _explained(
-        self, signals: Signals, change: np.ndarray, latent_source: np.ndarray, rectified: np.ndarray
+        self, signals: Signals, change: np.ndarray, predicted: np.ndarray, rectified: np.ndarray
     ) -> np.ndarray:
-        """Share (T,) of typical changes (T, e) that latent_source (T, L) explains as the unit's own; see `Translation`.
+        """Share (T,) of typical changes (T, e) that predicted ones (T, e) explain as the unit's own; see `Translation`.
 
         Rectified ones (T,) bool are compared without signs.
         """
         at = self.card.get(REST, sensors.typical_rest(self.source))
-        predicted = self.nets.decode_signal(self.nets.m2s(latent_source))
         own, told = (signals.of_typical(each, at) for each in (change, predicted))
         own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
         left, whole = (np.square(each).sum(axis=1) for each in (own - told, own))

@@ -31,7 +31,7 @@ from tactile_core.translation.layers import DISTANCES  # noqa: E402
 
 BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
 # The small surfaces have no mirror images.
-SMALL = {"mirrored": 0.0, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
+SMALL = {"mirrored": 0.0, "parts_steps": 10, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
 SURFACES = {"bodies": bodies(), "frame": frame}
 QUICK = Options(**SMALL, effort=0.04, checkpoint_seconds=0.0)
 
@@ -66,7 +66,7 @@ def test_it_learns(pairs, tmp_path):
 
 
 def test_result_is_complete_and_loads(quick, pairs):
-    nets = {f"weights/{net}.safetensors" for net in (*cards.NETS, "signals")}
+    nets = {f"weights/{net}.safetensors" for net in (*cards.NETS, cards.PARTS, "signals")}
     assert set(files(quick)) == {"log.csv", "loss.png", "weights/card.json", *nets}
     loaded = networks.load(quick / "weights")
     card = loaded.card
@@ -150,7 +150,7 @@ def test_progress_ends_at_one(pairs, tmp_path):
     train(pairs, tmp_path, 0, replace(QUICK, effort=0.0), lambda share, text: shares.append(share), **SURFACES)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    assert len(shares) == len(STAGES)
+    assert len(shares) == len(STAGES) + 1  # and what tells two contacts apart
 
 
 def test_stages_that_are_left_out_are_not_run(pairs, tmp_path):

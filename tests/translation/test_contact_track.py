@@ -20,7 +20,7 @@ def posterior(states, rng, right=0.9):
     mean = np.stack([means, means + OTHER], axis=1)
     size, signed = 100 * np.sinh(states[:, 2]), np.zeros(len(states), bool)  # counts, in proportion to the force
     weights, spread = np.stack([weight, 1 - weight], axis=1), np.broadcast_to(SPREAD, mean.shape)
-    return Evidence(weights, mean, spread, size, signed, states, signed)
+    return Evidence(weights, mean, spread, size, signed, states, signed, np.zeros((len(states), 0)))
 
 
 def part(whole, start, stop):

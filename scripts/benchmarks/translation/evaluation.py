@@ -82,7 +82,7 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = test_set.seen_rows(network, pairs, bodies)
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
-    found += two_contact_rows.rows(pairs)
+    found += two_contact_rows.rows(pairs) + two_contact_rows.translated_rows(network, pairs)
     few = (2, 2) if options.quick else ()
     found += made_up_units.rows(network, *few) + made_up_units.reliability(network, *few)
     apart = [translate.load_translator(folder) for folder in options.held_out]

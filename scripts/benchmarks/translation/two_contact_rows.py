@@ -1,16 +1,22 @@
-"""Measure how many of two contacts at once are recognised, on sums of two signals, and how many single ones mistaken.
+"""Measure how many of two contacts at once are recognised, how many single ones mistaken, and how both are translated.
 
-A sum stands for both at once: contacts far apart bend the skin each for itself, but for the fluid that both press.
+A sum of two signals stands for both at once: contacts far apart bend the skin each for itself, but for the fluid that
+both press. Translated are contacts of two balls that were solved at once (``benchmarks/make/make_double_contacts.py``).
 """
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
+from benchmarks.table.translation_methods import plain_signals
 from tactile_core.accuracy import Row, lengths, row
 from tactile_core.recordings.polarity import TOUCHING
 from tactile_core.simulation.pairs_file import Pairs
+from tactile_core.translation.answer import Answer
 from tactile_core.translation.simulated_likeness import residual_shares, two_contacts
+from tactile_core.translation.translator import Translation, Translator
 
 from .test_set import as_read
 
@@ -18,6 +24,9 @@ COUNT = 2000  # of each kind; the standard error of a share of a half is .011
 NEAREST, LIGHTEST = 6e-3, 1 / 3  # m between the two; share of the stronger signal that the weaker has at least
 BANDS = (6e-3, 8e-3), (8e-3, 10e-3), (10e-3, 14e-3), (14e-3, np.inf)  # m
 SEED = 5
+DOUBLE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "double_contacts.npz"
+METRICS = ("split", np.mean, "1"), ("gel", np.mean, "1"), ("overlap", np.mean, "1"), ("force", np.median, "%")
+FELT, HALF = 0.1, 0.5  # of a field's peak: nodes whose error counts, and those that overlap (docs/accuracy.md)
 
 
 def rows(pairs: Pairs) -> list[Row]:
@@ -51,3 +60,41 @@ def pairs_apart(
 
 def _marked(change: np.ndarray) -> np.ndarray:
     return two_contacts(residual_shares(as_read(change, SEED), np.zeros(len(change), bool)))
+
+
+def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> list[Row]:
+    """Rows of double contacts and of single ones, two looked for; baseline: the same networks, one looked for.
+
+    split: share that is taken for two; gel: rms error over that of no displacement; overlap of what is deeper than
+    half; force: of both, median error
+    """
+    with np.load(file, allow_pickle=False) as found:
+        double = {name: found[name] for name in found.files}
+    force = np.concatenate([lengths(double["force"]), lengths(pairs.force)])
+    gels = (double["displacement_digit"], double["scale"]), (pairs.displacement_digit, pairs.scale_digit)
+    gel = np.concatenate([each.astype(np.float32) * np.float32(unit) for each, unit in gels])
+    signals = plain_signals(as_read(np.concatenate([double["signal"], pairs.signal]), SEED))
+    answers = (Translator(network.nets, Answer(contacts=count))(signals) for count in (2, 1))
+    two, one = (_errors(answer, gel, force) for answer in answers)
+    doubles = len(double["force"])
+    found = []
+    for of, part in (("two balls", slice(doubles)), ("single contacts", slice(doubles, None))):
+        for name, middle, unit in METRICS:
+            value, baseline = (middle(errors[name][part]) for errors in (two, one))
+            found.append(row(f"two_contacts_{name}", value, unit, baseline=baseline, of=of))
+    return found
+
+
+def _errors(found: Translation, true: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
+    """Errors (C,) of translated gels against true ones (C, M, 3) m, and of forces against true ones (C,) N."""
+    size, moved = lengths(true), lengths(found.displacement_digit)
+    felt = size > FELT * size.max(1, keepdims=True)
+    left = np.square(lengths(found.displacement_digit - true)) * felt
+    deep, deepest = (each > HALF * each.max(1, keepdims=True) for each in (moved, size))
+    both = lengths(found.force) + lengths(found.second_force)
+    return {
+        "split": np.isfinite(found.second_center[:, 0]),
+        "gel": np.sqrt(left.sum(1) / (np.square(size) * felt).sum(1)),
+        "overlap": (deep & deepest).sum(1) / np.maximum((deep | deepest).sum(1), 1),
+        "force": 100 * np.abs(both / force - 1),
+    }

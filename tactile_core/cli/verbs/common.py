@@ -50,6 +50,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
         " to the base) and Z mm across it, so that those at the tip come into the picture"},
     "--samples": {"type": int, "default": 0, "metavar": "N", "help":
         "also draw N contacts a frame from the posterior, as sample_center and sample_force in frames.h5"},
+    "--contacts": {"type": int, "choices": (1, 2), "default": 1, "help":
+        "2: look for a second contact in each frame and add it to skin and gel, as second_center and second_force in"
+        " frames.h5; a single wide contact of a real finger is mostly taken for two (default: 1)"},
     "--gel": {"choices": ("translated", "solved"), "default": "translated", "help":
         "displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
         " dent's curvature at the estimated place and force, 25 ms a frame, needs scipy (default: translated)"},
@@ -68,7 +71,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 # Options that go together: how readings become signals, the estimate for a frame (``translation.answer``), and what
 # translates between which units.
 PREPARE = "--tare", "--kind", "--polarity", "--columns", "--counts-per-unit", "--smooth", "--no-drift"
-ANSWER = "--answer", "--frames-apart", "--mount-shift", "--samples", "--gel"
+ANSWER = "--answer", "--frames-apart", "--mount-shift", "--samples", "--contacts", "--gel"
 UNIT = "--sensor", "--to", "--weights", "--calibration"
 
 

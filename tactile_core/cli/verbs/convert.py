@@ -146,7 +146,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
 
     prepare = PrepareOptions(**prepare_words(options))
     keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
-    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples)
+    answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples, options.contacts)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths = readers.list_fingers(options.recordings, prepare.columns)
     source = None if options.weights else readers.sensor_of_first(paths, prepare.columns)

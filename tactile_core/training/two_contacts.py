@@ -1,0 +1,121 @@
+"""Train the network that tells the signals of two contacts apart, on sums of two simulated ones.
+
+Contacts far apart bend the skin each for itself, so that the electrodes answer about as to the sum of both; the fluid,
+which both press, is left out. A sum has no first and second: the error is that of the better order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from ..simulation.pairs_file import Split
+from ..translation.layers import COUNT_SCALE
+from ..translation.networks import FINE, PARTED
+from .data import measured
+from .modules import Residual, initialise
+from .options import Options
+from .surface_codec import image_of_electrodes
+
+WIDTH, BLOCKS = 256, 3
+BATCH = 512
+APART = (4e-3, 15e-3)  # m, between two contacts: nearer ones are one, and the gel is 19 mm wide
+LIGHTEST = 0.25  # of the other's force, at least: lighter ones are lost in the other's noise (assumed)
+TRIES = 4  # times as many pairs are drawn as are wanted: one in three lies as far apart
+SINGLE = 0.99  # share of single contacts on validation presses that are left whole
+SINGLES = 20_000  # that this is told by
+
+
+@dataclass(frozen=True)
+class Presses:
+    """Simulated contacts: true changes signal (C, e) counts, place (C, 2) m on the gel, force (C,) N."""
+
+    signal: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+
+
+def train_parts(
+    presses: Presses, split: Split, options: Options, rest: np.ndarray, sensor: str, seed: int,
+    progress: Callable[[float, str], None],
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Train on the split's training presses; returns tensors as `networks.py` names them.
+
+    rest : (e,) counts that changes are those of, of a sensor. The same arguments give the same numbers.
+    """
+    random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
+    network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)
+    initialise(network, generator)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=options.rate, weight_decay=options.weight_decay)
+    steps = max(1, round(options.effort * options.parts_steps))
+    for step in range(steps):
+        share = (step + 1) / steps
+        for group in optimiser.param_groups:
+            group["lr"] = options.rate * min(1.0, share / 0.02) * 0.5 * (1.0 + math.cos(math.pi * share))
+        optimiser.zero_grad()
+        loss = parts_loss(network, *_drawn(presses, split.train, options, rest, image, random))
+        loss.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        if step % 100 == 99 or step + 1 == steps:
+            progress(share, f"parts {step + 1}/{steps}: loss {float(loss.detach()):.4f}")
+    tensors = {f"map.{name}": tensor.numpy().astype(np.float16) for name, tensor in network.state_dict().items()}
+    alone = presses.signal[random.choice(split.validation, SINGLES)]
+    read = torch.from_numpy(measured(alone, random, options, 0.0, options.unit, rest)[:, :-1])
+    with torch.no_grad():
+        likely = network(seen(read))[:, -1].numpy()
+    return tensors | {"single": np.array([np.quantile(likely, SINGLE)], np.float32)}
+
+
+def parts_sizes(electrodes: int) -> dict[str, int]:
+    """Return the network's sizes: changes on two scales -> half the parts' difference, and how likely there are two."""
+    return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
+
+
+def seen(change: Tensor) -> Tensor:
+    """Convert changes (B, e) counts to the network's input (B, 2e)."""
+    return torch.cat([torch.asinh(change / COUNT_SCALE), torch.asinh(FINE * change / COUNT_SCALE)], -1)
+
+
+def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -> Tensor:
+    """Compute the squared error of the parts of those that have two, and the cross entropy of whether there are two.
+
+    read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero where there is one
+    """
+    found, two = network(seen(read)), second.abs().amax(-1) > 0
+    half = found[:, :-1] * read.square().sum(-1, keepdim=True).sqrt() * PARTED
+    parts = read / 2 + half, read / 2 - half
+    orders = torch.stack([_apart(parts, true) for true in ((first, second), (second, first))])
+    error = (orders.amin(0) * two).sum() / two.sum().clamp(min=1)
+    return error + nn.functional.binary_cross_entropy_with_logits(found[:, -1], two.float())
+
+
+def _apart(parts: tuple[Tensor, Tensor], true: tuple[Tensor, Tensor]) -> Tensor:
+    """Squared error (B,) of both parts on the finer scale, mean over electrodes."""
+    fine = [torch.asinh(FINE * each / COUNT_SCALE) for each in (*parts, *true)]
+    return ((fine[0] - fine[2]).square() + (fine[1] - fine[3]).square()).mean(-1)
+
+
+def _drawn(
+    presses: Presses, rows: np.ndarray, options: Options, rest: np.ndarray, image: np.ndarray,
+    random: np.random.Generator,
+) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
+    """Draw a batch, half of it sums of two contacts: as read, and the true changes of both."""
+    first, second = random.choice(rows, (2, TRIES * BATCH // 2))
+    apart = np.linalg.norm(presses.place[first] - presses.place[second], axis=1)
+    ratio = presses.force[first] / presses.force[second]
+    good = (apart > APART[0]) & (apart < APART[1]) & (ratio > LIGHTEST) & (ratio < 1 / LIGHTEST)
+    chosen = np.flatnonzero(good)[: BATCH // 2]
+    alone = random.choice(rows, BATCH - len(chosen))
+    one = presses.signal[np.concatenate([first[chosen], alone])]
+    two = np.zeros_like(one)
+    two[: len(chosen)] = presses.signal[second[chosen]]
+    turned = random.random(BATCH) < options.mirrored
+    one[turned], two[turned] = one[turned][:, image], two[turned][:, image]
+    read = measured(one + two, random, options, 0.0, options.unit, rest)[:, :-1]
+    return tuple(torch.from_numpy(np.asarray(each, np.float32)) for each in (read, one, two))
