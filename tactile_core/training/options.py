@@ -18,7 +18,7 @@ _REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 
 @dataclass(frozen=True)
 class Options:
-    """Sizes and lengths of a training. On one core the defaults take 15 minutes for 50,000 contacts.
+    """Sizes and lengths of a training. On one core the defaults take 23 minutes for 50,000 contacts.
 
     latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent

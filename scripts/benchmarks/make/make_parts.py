@@ -3,7 +3,7 @@
     tactile pairs SCENE --count 80000 --seed 0 --out pairs.h5     a scene with random_bodies = 0.5
     python scripts/benchmarks/make/make_parts.py pairs.h5
 
-Six minutes on a core at rest. Prints the card's new sha256, which `networks.SHIPPED_CARD_SHA256` must be.
+Eight minutes of CPU. Prints the card's new sha256, which `networks.SHIPPED_CARD_SHA256` must be.
 """
 
 from __future__ import annotations
