@@ -68,7 +68,7 @@ def train_parts(
     alone = presses.signal[random.choice(split.validation, SINGLES)]
     read = torch.from_numpy(measured(alone, random, options, 0.0, options.unit, rest)[:, :-1])
     with torch.no_grad():
-        likely = network(seen(read))[:, -1].numpy()
+        likely = network(network_input(read))[:, -1].numpy()
     return tensors | {"single": np.array([np.quantile(likely, SINGLE)], np.float32)}
 
 
@@ -77,7 +77,7 @@ def parts_sizes(electrodes: int) -> dict[str, int]:
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 
-def seen(change: Tensor) -> Tensor:
+def network_input(change: Tensor) -> Tensor:
     """Convert changes (B, e) counts to the network's input (B, 2e)."""
     return torch.cat([torch.asinh(change / COUNT_SCALE), torch.asinh(FINE * change / COUNT_SCALE)], -1)
 
@@ -87,7 +87,7 @@ def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -
 
     read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero where there is one
     """
-    found, two = network(seen(read)), second.abs().amax(-1) > 0
+    found, two = network(network_input(read)), second.abs().amax(-1) > 0
     half = found[:, :-1] * read.square().sum(-1, keepdim=True).sqrt() * PARTED
     parts = read / 2 + half, read / 2 - half
     orders = torch.stack([_apart(parts, true) for true in ((first, second), (second, first))])

@@ -223,7 +223,7 @@ class Translator:
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
-        beside = self._second(evidence.second, silent, signals.stiffness)
+        beside = self._weaker(evidence.second, silent, signals.stiffness)
         both = beside.rows
         skin[both], gel[both] = skin[both] + beside.skin, gel[both] + beside.gel
         flags = signals.flags.copy()
@@ -250,7 +250,7 @@ class Translator:
             second_force=beside.force, **self._errors(change, rectified, center[:, 0]),
         )  # fmt: skip
 
-    def _second(self, change: np.ndarray, silent: np.ndarray, stiffness: float) -> _Second:
+    def _weaker(self, change: np.ndarray, silent: np.ndarray, stiffness: float) -> _Second:
         """Translate the weaker of two contacts by its changes (T, e), NaN where there is none, each frame alone.
 
         silent : (T,) bool, frames without a first contact, which have no second
