@@ -32,7 +32,7 @@ PLATFORMS = {
 BLENDERS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None), "3.14": (None, None)}
 # Never torch (users translate with numpy), never numpy (Blender ships it).
 WHEELS = (
-    "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit",
+    "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "numba", "llvmlite", "mitsuba", "drjit", "OpenEXR",
     "threadpoolctl", "rosbags", "apsw", "backports.zstd", "lz4", "ruamel.yaml", "typing_extensions",
 )  # fmt: skip
 MISSING = {("backports.zstd", "3.14"), ("cholespy", "linux-arm64")}  # part of that Python; no wheel: SciPy's solver

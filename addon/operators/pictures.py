@@ -46,10 +46,10 @@ def draw(
     up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` where
     stopped() is true.
     """
-    return _drawn_of(*_shown_state(gel, depsgraph, size), preset, stopped, better)
+    return _drawn_of(*shown_state(gel, depsgraph, size), preset, stopped, better)
 
 
-def _shown_state(
+def shown_state(
     gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int] | None = None
 ) -> tuple[digit_unit.ShownUnit, np.ndarray]:
     """Return what a picture is drawn of: the unit that the scene shows, and the gel's displacement (n, 3) m."""
@@ -76,7 +76,7 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 
     And Contact, the share that is touched. Vectors are in the gel object's axes. Raises as ``draw`` does.
     """
-    shown, moved = _shown_state(gel, depsgraph, size)
+    shown, moved = shown_state(gel, depsgraph, size)
     unit = shown.unit
     heights = height_map.height_map(moved, unit.camera)
     known = gel.evaluated_get(depsgraph).data.attributes.get(frame_attribute.PATCH)
@@ -112,12 +112,12 @@ def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str = FAST) -> bpy.types.Image:
     """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
-    return _show(gel, *_shown_state(gel, depsgraph), preset)
+    return _show(gel, *shown_state(gel, depsgraph), preset)
 
 
 def follow(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Draw the fast picture where the scene shows something else than it was drawn of. Raises as ``draw`` does."""
-    shown, moved = _shown_state(gel, depsgraph)
+    shown, moved = shown_state(gel, depsgraph)
     known = _drawn is not None and (_drawn[0], _drawn[2]) == (gel.name, repr(shown.unit))
     if known and moved.shape == _drawn[1].shape and np.abs(moved - _drawn[1]).max() <= _STILL:
         return

@@ -13,7 +13,7 @@ from ...tactile_core.errors import TactileError
 from ..objects import axes, biotac_objects, curves, digit_body, digit_objects, indenter_objects
 from ..settings import properties, render_settings
 from ..settings.reports import TactileOperator, require
-from . import scene_bridge, view
+from . import pictures, scene_bridge, view
 
 _HOVER = 12e-3  # m above the sensors' frame: an indenter that presses by force is shown clear of the gel
 
@@ -116,6 +116,29 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
         self.report({"INFO"}, f"{path}: {len(found.scene.recording.points)} points")
 
 
+class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
+    """Write what the gel's picture is made of as a scene that any Mitsuba 3 renders: .xml, .ply and .camera.exr"""
+
+    bl_idname = "tactile.export_mitsuba"
+    bl_label = "Export Mitsuba Scene"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (changes no scene)
+
+    filename_ext = ".xml"
+    filter_glob: bpy.props.StringProperty(default="*.xml", options={"HIDDEN"})
+
+    def work(self, context: bpy.types.Context) -> None:
+        """See ``TactileOperator``."""
+        require("OpenEXR")
+        from ...tactile_core.pictures.height_map import height_map
+        from ...tactile_core.pictures.mitsuba.scene_file import write_scene
+
+        gel = properties.needed_gel(context.scene, context.object)
+        shown, moved = pictures.shown_state(gel, context.evaluated_depsgraph_get())
+        path = bpy.path.abspath(self.filepath)
+        write_scene(path, shown.unit, height_map(moved, shown.unit.camera))
+        self.report({"INFO"}, path + "; other lamps and bodies are left out" * bool(shown.around))
+
+
 def _has_force(thing: bpy.types.Object) -> bool:
     animation = thing.animation_data
     if animation is None or animation.action is None:
@@ -129,7 +152,8 @@ def _menu_import(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 def _menu_export(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(TACTILE_OT_export_scene.bl_idname, text="Tactile Scene (scene.toml)")
+    menu.layout.operator(TACTILE_OT_export_mitsuba.bl_idname, text="Tactile Picture's Scene (Mitsuba .xml)")
 
 
-CLASSES = (TACTILE_OT_import_scene, TACTILE_OT_export_scene)
+CLASSES = (TACTILE_OT_import_scene, TACTILE_OT_export_scene, TACTILE_OT_export_mitsuba)
 MENUS = ((bpy.types.TOPBAR_MT_file_import, _menu_import), (bpy.types.TOPBAR_MT_file_export, _menu_export))

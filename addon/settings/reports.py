@@ -21,6 +21,7 @@ MODULES = {
     "trimesh": "meshes as indenters",
     "rtree": "meshes as indenters",
     "mitsuba": "the Mitsuba presets",
+    "OpenEXR": "scenes of Mitsuba",
     "threadpoolctl": "simulating contacts",
 }
 # What errors call by the command line's names -> what Blender calls it; folders of jobs, which the user never sees.
