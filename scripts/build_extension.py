@@ -3,10 +3,10 @@
     python3 scripts/build_extension.py                               linux-x64, for Blender 4.2 to 5.0 (Python 3.11)
     python3 scripts/build_extension.py --platform windows-x64 --python 3.13      Blender 5.1 and later
     python3 scripts/build_extension.py --python 3.13 --debian        Debian's 4.3, whose Python is another
-    python3 scripts/build_extension.py --no-wheels                   24 MB, any platform: numpy alone, see Preferences
+    python3 scripts/build_extension.py --no-wheels                   42 MB, any platform: numpy alone, see Preferences
 
 What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
-simulating and rendering need: 155 to 210 MB a platform and Python, so each has a zip of its own. The same commit,
+simulating and rendering need: 172 to 227 MB a platform and Python, so each has a zip of its own. The same commit,
 platform and wheels give the same bytes.
 """
 

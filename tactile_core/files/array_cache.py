@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -45,13 +45,13 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
         raise DamagedError(str(error)) from error
 
 
-def store(folder: Path, arrays: Mapping[str, np.ndarray], room: str) -> None:
-    """Write arrays, each whole or not at all, and their hashes last.
+def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> None:
+    """Write named arrays as they come, each whole or not at all, and their hashes last.
 
     room : what it takes, in words, such as "350 MB". Raises TactileError for a folder that cannot be written.
     """
     with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
-        hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays.items()}
+        hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays}
         atomic.write_json(folder / HASHES, hashes)
 
 

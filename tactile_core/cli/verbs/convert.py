@@ -45,8 +45,8 @@ Words of --keep, beside what frames.h5 always holds:
   displacement   of the BioTac's skin and the gel, m at each node of their surfaces
   height         the gel's height under each pixel of the camera, m
   image          the camera's pictures, as PNG files
-  traction       force field on the gel, Pa at each node of its surface, by the gel's own compliance (built once, 18 s
-                 and 145 MB), as large in all as the networks' force
+  traction       force field on the gel, Pa at each node of its surface, by the gel's own compliance (unpacked once,
+                 some seconds, 151 MB), as large in all as the networks' force
   marker_motion  motion, px, of dots printed on the gel, for a --calibration with [markers]
 
 Size of a 700-frame result, measured: {SIZES}."""

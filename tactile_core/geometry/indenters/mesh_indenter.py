@@ -115,7 +115,7 @@ class MeshIndenter(Summary, Indenter):
             error = mesh_grid.error_of(mesh, built.distance, getattr(built.grid, "top", np.inf))
             log.info("%s: distance within %.1f um rms, %.1f um at most", where, *(error * 1e6))
             array_cache.claim(folder, _ROOM)
-            array_cache.store(folder, _arrays_of(built, error), _ROOM)
+            array_cache.store(folder, _arrays_of(built, error).items(), _ROOM)
             arrays = _load(folder)
         coefficients, origin, hull, error, stem, stem_place = arrays
         fine, rms_and_largest = SplineGrid(origin, spacing, coefficients), (float(error[0]), float(error[1]))

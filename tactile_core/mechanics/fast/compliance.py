@@ -12,6 +12,7 @@ import hashlib
 import json
 import logging
 import pathlib
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -20,17 +21,19 @@ from ... import sensors
 from ...errors import TactileError
 from ...files import array_cache, lock
 from ...files.array_cache import cache_folder
+from ...files.shipped import shipped
 from ...files.threads import one_thread
 from ...geometry.lattice import Lattice
 from ...sensors import TARGET, Material
 from ...sensors import unrolling as surface
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.hex_mesh import HexMesh, inner_faces, solid_mesh
-from .condense import MirrorSymmetry, axes_of, condense, mirror_nodes
+from .compact_halves import unpack
+from .condense import Half, MirrorSymmetry, axes_of, condense, mirror_nodes
 from .sensing_points import ON_PLANE, electrode_feet, facing_nodes, images, sensing_points_of
 
 log = logging.getLogger(__name__)
-_FORMAT = 6  # raise when the meaning of the cached arrays changes
+_FORMAT = 7  # raise when the meaning of the cached arrays changes, or the files that ship
 _ROOM = "350 MB"
 
 # Skin nodes that can be touched: those that unroll onto the gel or up to this far beside it, m.
@@ -86,7 +89,7 @@ ARRAYS = ("move", "watch", "watch_gap", "pressure", "inner_move", "inner_watch",
 @functools.cache
 def compliance_of(sensor: str) -> Compliance:
     """Return the compliance of a sensor that is there; built in about a minute, then read from the cache."""
-    return _cached(_solid(sensor))
+    return _cached(solid_of(sensor))
 
 
 class Solid(NamedTuple):
@@ -99,7 +102,8 @@ class Solid(NamedTuple):
     material: Material
 
 
-def _solid(sensor: str) -> Solid:
+def solid_of(sensor: str) -> Solid:
+    """Return the solid of a sensor that is there."""
     lattice, material = sensors.sensor_surface(sensor), sensors.describe(sensor).material
     touchable = np.arange(len(lattice.rest)) if sensors.is_gel(sensor) else _touchable_skin(sensor)
     return Solid(sensor, lattice, touchable, solid_mesh(sensor), material)
@@ -120,8 +124,8 @@ class Stored(NamedTuple):
 
 def stored(sensor: str) -> Stored:
     """Return the cache entry of a sensor; builds and loads nothing."""
-    solid = _solid(sensor)
-    folder = _folder(solid)
+    solid = solid_of(sensor)
+    folder = cache_entry(solid)
     files = [folder / f"{array}.npy" for array in ARRAYS]
     size = sum(file.stat().st_size for file in files) if all(file.is_file() for file in files) else 0
     return Stored(folder, size, len(solid.lattice.rest), len(solid.touchable), len(solid.mesh.nodes))
@@ -135,7 +139,7 @@ def _touchable_skin(sensor: str) -> np.ndarray:
     return np.flatnonzero(near & (np.abs(z) < gel.half_width + _BESIDE_GEL))
 
 
-def _folder(solid: Solid) -> pathlib.Path:
+def cache_entry(solid: Solid) -> pathlib.Path:
     """Return the cache's folder, named by all that decides the arrays."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
@@ -150,7 +154,7 @@ def _folder(solid: Solid) -> pathlib.Path:
 def _cached(solid: Solid) -> Compliance:
     """Read the matrices, checked against the hashes of when they were built; build them where they are not there."""
     name, lattice, touchable, mesh, _ = solid
-    folder = _folder(solid)
+    folder = cache_entry(solid)
     try:
         loaded = array_cache.load(folder, ARRAYS)
     except array_cache.DamagedError:  # not built yet, perhaps by a process that is at it now
@@ -168,52 +172,98 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
     except array_cache.DamagedError as damage:
         if (folder / array_cache.HASHES).exists():
             log.warning("%s: damaged (%s); it is built again", folder, damage)
-    log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
     with one_thread():  # what one process keeps, every other computes with
-        array_cache.store(folder, build(solid), _ROOM)
+        halves = unpack(compact_file(solid.name), folder.name)
+        if halves is None:
+            log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
+            array_cache.store(folder, build(solid).items(), _ROOM)
+        else:
+            array_cache.store(folder, _assembled(solid, *halves), _ROOM)
     return array_cache.load(folder, ARRAYS)
 
 
+def compact_file(sensor: str) -> pathlib.Path:
+    """Path of a sensor's condensed halves, where they ship; `scripts/benchmarks/make/make_compliance.py` makes them."""
+    return shipped(f"compliance/{sensor}.h5")
+
+
 def build(solid: Solid) -> dict[str, np.ndarray]:
-    """Compute the ``ARRAYS`` of a ``Compliance``, by name, from a solid that is even in z.
+    """Compute the ``ARRAYS`` of a ``Compliance``, by name, from a solid that is even in z. Raises as ``condensed``."""
+    return dict(_assembled(solid, *condensed(solid)))
+
+
+def condensed(solid: Solid) -> tuple[Half, Half]:
+    """Condense the even and the odd half of a solid to its surface; loads: ``kept_loads``, then the fluid's swell.
 
     Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where the memory does not
     suffice.
     """
-    name, lattice, touchable, mesh, material = solid
-    sensing = sensing_points_of(name, mesh)
-    source, mirrored = images(name, mesh, len(sensing.gap))
-    kept = np.unique(source)
-    loads = sensing.dense(3 * len(mesh.nodes), kept)
-    column, sign = np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
-    if len(mesh.inner):
-        loads = np.column_stack([loads, _volume_gradient(mesh)])
-        column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
-    half = np.flatnonzero(lattice.rest[:, 2] >= -ON_PLANE)
+    name, _, _, mesh, material = solid
     try:
-        even, odd = (condense(mesh, material, mesh.surface[half], loads, parity) for parity in (1, -1))
-        image = mirror_nodes(lattice.rest)
-        place, answered = MirrorSymmetry(half, image), answered_nodes(lattice, touchable, image)
-        move = place.forces(even.answer, odd.answer, answered)
-        inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
-        every = np.ix_(column, column)
-        among = even.among[every] + odd.among[every] * np.outer(sign, sign)
-        inner_pressure, pressure = np.zeros(len(sensing.gap)), np.zeros(3 * len(touchable))
-        touch_dofs = axes_of(touchable)
-        if len(mesh.inner):  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
-            swell, stiffness = inner_move[-1], 1 / among[-1, -1]
-            inner_pressure, pressure = -stiffness * among[-1, :-1], -stiffness * swell[touch_dofs]
-            on_answered = -stiffness * swell[axes_of(answered)]
-            for start in range(0, len(move), 512):  # in blocks: the whole outer product would double the memory
-                part = slice(start, start + 512)
-                move[part] += np.outer(on_answered[part], swell).astype(np.float32)
-            inner_move = inner_move[:-1] + np.outer(inner_pressure, swell)
-            among = among[:-1, :-1] + np.outer(inner_pressure, among[-1, :-1])
-        watch = np.ascontiguousarray(inner_move[:, touch_dofs].T, np.float32)
+        loads = sensing_points_of(name, mesh).dense(3 * len(mesh.nodes), kept_loads(solid)[0])
+        if len(mesh.inner):
+            loads = np.column_stack([loads, _volume_gradient(mesh)])
+        half, touched = kept_nodes(solid)
+        even, odd = (condense(mesh, material, mesh.surface[half], touched, loads, parity) for parity in (1, -1))
     except MemoryError as error:
         raise TactileError("compliance", "out of memory", "2.2 GB of free memory", "Close other programs") from error
-    inner = inner_move.astype(np.float32), among.astype(np.float32), inner_pressure
-    return dict(zip(ARRAYS, (move, watch, sensing.gap, pressure, *inner), strict=True))
+    return even, odd
+
+
+def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
+    """Surface nodes (k,) with z >= 0, and the indices (r,) among them of those that are touched, or their images."""
+    rest = solid.lattice.rest
+    half = np.flatnonzero(rest[:, 2] >= -ON_PLANE)
+    return half, np.searchsorted(half, answered_nodes(solid.lattice, solid.touchable, mirror_nodes(rest)))
+
+
+def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sensing points (v,) with z >= 0, and which of them (w,) each sensing point is, mirrored for sign (w,) -1."""
+    source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
+    kept = np.unique(source)
+    return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
+
+
+def _assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
+    """Put the halves of a solid together, and the fluid into it; yields the ``ARRAYS``, so that none need stay."""
+    name, lattice, touchable, mesh, _ = solid
+    (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
+    kept, column, sign = kept_loads(solid)
+    place, touch_dofs = MirrorSymmetry(half, mirror_nodes(lattice.rest)), axes_of(touchable)
+    filled = len(mesh.inner) > 0
+    if filled:
+        column, sign = np.r_[column, len(kept)], np.r_[sign, 1.0]
+    every = np.ix_(column, column)
+    among = odd.among[every]
+    among *= sign[:, None]
+    among *= sign
+    among += even.among[every]
+    under_last, among = among[-1:, :-1].ravel(), among.astype(np.float32)
+    inner_move = place.loads(even.under_loads, odd.under_loads, column, sign)
+    inner_pressure, pressure, pressed = np.zeros(len(gap)), np.zeros(len(touch_dofs)), np.zeros(3 * len(touched))
+    swell = np.zeros(inner_move.shape[1], np.float32)
+    if filled:  # the fluid keeps its volume: its pressure is one more force, and takes one more row away
+        inner_move, swell, stiffness = inner_move[:-1], inner_move[-1], 1 / float(even.among[-1, -1])
+        inner_pressure, pressure = -stiffness * under_last, -stiffness * swell[touch_dofs].astype(float)
+        pressed, among = -stiffness * swell[axes_of(half[touched])], among[:-1, :-1]
+        _add_outer(inner_move, inner_pressure, swell)
+        _add_outer(among, inner_pressure, under_last.astype(np.float32))
+    yield from {"watch_gap": gap, "pressure": pressure, "inner_pressure": inner_pressure}.items()
+    yield "inner_watch", np.ascontiguousarray(among)
+    del among
+    yield "inner_move", inner_move
+    yield "watch", np.ascontiguousarray(inner_move[:, touch_dofs].T)
+    del inner_move
+    move = place.forces(even.answer, odd.answer)
+    _add_outer(move, pressed, swell)
+    yield "move", move
+
+
+def _add_outer(rows: np.ndarray, factor: np.ndarray, line: np.ndarray) -> None:
+    """Add factor (r,) times line (n,) to rows (r, n) float32, one by one: the whole product would double the memory."""
+    if line.any():
+        for row, by in zip(rows, factor.astype(np.float32), strict=True):
+            row += by * line
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:

@@ -22,13 +22,12 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 @dataclasses.dataclass(frozen=True)
 class Half:
-    """The even (or odd) motion of a solid, by the nodes ``keep`` (k,) with z >= 0.
+    """The even (or odd) motion of a solid, by the nodes (k,) with z >= 0 that are kept.
 
-    answer : (3 k, 3 k) m/N, motion of the kept nodes under unit forces on them; zero where nothing can move
+    answer : (3 r, 3 k) m/N, motion of the kept nodes under unit forces on touched ones; zero where nothing can move
     under_loads : (3 k, w), their motion under the given loads; among : (w, w), work of the loads on one another's
     motion"""
 
-    keep: np.ndarray
     answer: np.ndarray
     under_loads: np.ndarray
     among: np.ndarray
@@ -44,9 +43,12 @@ def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
     return image
 
 
-def condense(mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> Half:
+def condense(
+    mesh: HexMesh, material: Material, keep: np.ndarray, touched: np.ndarray, loads: np.ndarray, parity: int
+) -> Half:
     """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
 
+    touched : (r,) indices of those that forces act on, sorted
     loads : (3 n_nodes, w), unit loads anywhere. Raises ValueError for a solid that is not even in z.
     """
     tree = _Elimination(mesh, material, keep, loads, parity)
@@ -63,13 +65,15 @@ def condense(mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndar
     held = tree.number[(3 * keep[:, None] + np.arange(3)).ravel()]
     known = held >= 0
     rows = place[held[known]]
-    answer = np.zeros((len(held), len(held)), np.float32)
-    answer[np.ix_(known, known)] = inverse[np.ix_(rows, rows)]
+    pressed = axes_of(touched)
+    pushed = known[pressed]
+    answer = np.zeros((len(pressed), len(held)), np.float32)
+    answer[np.ix_(pushed, known)] = inverse[np.ix_(place[held[pressed[pushed]]], rows)]
     load = tree.loads[dofs]
     moved = inverse @ load
     under_loads = np.zeros((len(held), loads.shape[1]))
     under_loads[known] = moved[rows]
-    return Half(keep, answer, under_loads, tree.among + load.T @ moved)
+    return Half(answer, under_loads, tree.among + load.T @ moved)
 
 
 class _Elimination:
@@ -169,19 +173,19 @@ class MirrorSymmetry:
         self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return the motion (w, 3 n) from the halves' (3 k, v): load i is ``column[i]``, mirrored for sign -1."""
-        even, odd = even.T[column], odd.T[column] * sign[:, None]
-        answer = np.empty((len(column), 3 * len(self.image)))
-        answer[:, axes_of(self.image[self.half])] = (even - odd) * self.sign
-        answer[:, axes_of(self.half)] = even + odd
+        """Return the motion (w, 3 n) float32 from the halves' (3 k, v): load i is ``column[i]``, mirrored for -1."""
+        answer = np.empty((len(column), 3 * len(self.image)), np.float32)
+        here, there = axes_of(self.half), axes_of(self.image[self.half])
+        for i, (load, mirrored) in enumerate(zip(column, sign, strict=True)):
+            answer[i, there] = (even[:, load] - mirrored * odd[:, load]) * self.sign
+            answer[i, here] = even[:, load] + mirrored * odd[:, load]
         return answer
 
-    def forces(self, even: np.ndarray, odd: np.ndarray, answered: np.ndarray) -> np.ndarray:
-        """Return the motion (3 r, 3 n) float32 under unit forces on ``answered`` (r,), from the halves' (3 k, 3 k)."""
+    def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
+        """Return the motion (3 r, 3 n) float32 under unit forces on the touched nodes, from the halves' (3 r, 3 k)."""
         here, there = axes_of(self.half), axes_of(self.image[self.half])
-        move = np.empty((3 * len(answered), 3 * len(self.image)), np.float32)
-        for i, node in enumerate(np.searchsorted(self.half, answered)):
-            rows, answer = slice(3 * node, 3 * node + 3), move[3 * i : 3 * i + 3]
-            answer[:, there] = (even[rows] - odd[rows]) * self.sign
-            answer[:, here] = even[rows] + odd[rows]  # after the other: on the mirror plane this one is right
+        move = np.empty((len(even), 3 * len(self.image)), np.float32)
+        for answer, of_even, of_odd in zip(move, even, odd, strict=True):
+            answer[there] = (of_even - of_odd) * self.sign
+            answer[here] = of_even + of_odd  # after the other: on the mirror plane this one is right
         return move

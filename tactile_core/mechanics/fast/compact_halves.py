@@ -1,0 +1,117 @@
+"""Condensed solid in little room: its two halves in a basis of wavelets, rounded to whole steps.
+
+Points fall into a tree of clusters. Each cluster turns the motions of its points into a few combinations that are
+constant or linear over it, which go on to the next larger cluster, and into details, which forces far away hardly move
+(B. Alpert, SIAM J. Math. Anal. 24, 1993, 246-262). So nearly all entries between details round to zero and pack well.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .condense import Half
+
+if TYPE_CHECKING:
+    import h5py
+
+PARITIES = ("even", "odd")
+BLOCK = 64  # rows at a time, so many as a chunk of the file has
+
+
+class Segment(NamedTuple):
+    """Unknowns ``first`` to ``last`` of a matrix, those of a point side by side, and the clusters of its points.
+
+    axes : unknowns a point; clusters : points (k,) and how their motions are turned (k, k), the smallest clusters first
+    """
+
+    first: int
+    last: int
+    axes: int
+    clusters: list[tuple[np.ndarray, np.ndarray]]
+
+
+class Basis(NamedTuple):
+    """Unknowns of a half: first the touched nodes' axes, then loads, then the other nodes' axes.
+
+    touched : how many are axes of touched nodes; rows : how many are those or loads
+    unknown : (n,) int, axis 3 i + k of the i-th kept node, or number of the load, of each
+    step : (n,) float32; an entry's own step is the product of its row's and its column's
+    """
+
+    touched: int
+    rows: int
+    unknown: np.ndarray
+    step: np.ndarray
+    segments: list[Segment]
+
+
+def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> None:
+    """Turn the rows (n, c) of an array into the basis, or back from it, in place."""
+    for first, last, axes, clusters in segments:
+        of_points = values[first:last].reshape((last - first) // axes, -1)
+        for points, turned in reversed(clusters) if back else clusters:
+            of_points[points] = (turned.T if back else turned) @ of_points[points]
+
+
+def unpack(path: Path, made_from: str) -> tuple[Half, Half] | None:
+    """Read the even and the odd half from a shipped file; None where it was made from another solid, or is none."""
+    if not path.is_file():
+        return None
+    import h5py
+
+    with h5py.File(path) as file:
+        if file.attrs["made_from"] != made_from:
+            return None
+        basis = _read_basis(file)
+        even, odd = (_half(basis, _matrix(file[parity], basis)) for parity in PARITIES)
+    return even, odd
+
+
+def _read_basis(file: h5py.File) -> Basis:
+    touched, rows = file.attrs["touched"], file.attrs["rows"]
+    size, points, turned = file["size"][()], file["points"][()], file["turned"][()]
+    segments, cluster, point, entry = [], 0, 0, 0
+    for first, last, axes, count in file["segments"][()]:
+        clusters = []
+        for k in size[cluster : cluster + count]:
+            clusters.append((points[point : point + k], turned[entry : entry + k * k].reshape(k, k)))
+            point, entry = point + k, entry + k * k
+        segments.append(Segment(first, last, axes, clusters))
+        cluster += count
+    return Basis(touched, rows, file["unknown"][()], file["step"][()], segments)
+
+
+def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
+    """Matrix (rows, n) float32 from its whole steps (n, rows), of which the symmetric part holds its upper triangle."""
+    rows, step = basis.rows, basis.step
+    turned = np.empty(packed.shape, np.float32)
+    for start in range(0, len(turned), BLOCK):
+        part = slice(start, start + BLOCK)
+        whole = packed[part]
+        signed = (whole >> 1).astype(np.int32) ^ -(whole & 1).astype(np.int32)  # 0, -1, 1, -2: small numbers first
+        np.multiply(signed, step[part, None] * step[:rows], out=turned[part], casting="same_kind")
+    for start in range(0, rows, BLOCK):
+        part = slice(start, min(start + BLOCK, rows))
+        square = turned[part, part]
+        square += np.triu(square, 1).T
+        turned[part.stop : rows, part] = turned[part, part.stop : rows].T
+    turn(turned, basis.segments, back=True)
+    matrix = np.empty(turned.shape[::-1], np.float32)
+    for start in range(0, rows, BLOCK):
+        part = slice(start, start + BLOCK)
+        matrix[part] = turned[:, part].T
+    turn(matrix, [segment for segment in basis.segments if segment.last <= rows], back=True)
+    return matrix
+
+
+def _half(basis: Basis, matrix: np.ndarray) -> Half:
+    """Sort what the basis has in its own order."""
+    touched, rows, unknown = basis.touched, basis.rows, basis.unknown
+    surface = np.r_[:touched, rows : len(unknown)]
+    columns = surface[np.argsort(unknown[surface])]
+    loads = touched + np.argsort(unknown[touched:rows])
+    answer = matrix[np.ix_(np.argsort(unknown[:touched]), columns)]
+    return Half(answer, matrix[np.ix_(loads, columns)].T, matrix[np.ix_(loads, loads)].astype(float))
