@@ -254,6 +254,10 @@ def _assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.nd
     yield "inner_move", inner_move
     yield "watch", np.ascontiguousarray(inner_move[:, touch_dofs].T)
     del inner_move
+    on_plane = axes_of(np.flatnonzero(np.abs(lattice.rest[half, 2]) < ON_PLANE)).reshape(-1, 3)
+    for answer, axes in ((even.answer, [2]), (odd.answer, [0, 1])):  # not moved there: what ships has rounded that
+        held = on_plane[:, axes].ravel()
+        answer[:, held], answer[np.isin(axes_of(touched), held)] = 0, 0
     move = place.forces(even.answer, odd.answer)
     _add_outer(move, pressed, swell)
     yield "move", move
