@@ -68,7 +68,10 @@ def network(signals: Signals) -> Translation:
     errors = [1e-6 * strength] * 4
     flags = np.zeros(count, np.uint16)
     sure = np.ones(count)
-    return Translation(codes, codes, codes, skin, moved, force, 50 * strength, center, sure, *errors, flags, sure)
+    second = np.full_like(center, np.nan), np.zeros_like(force)
+    return Translation(
+        codes, codes, codes, skin, moved, force, 50 * strength, center, sure, *errors, flags, sure, *second
+    )
 
 
 def by_name(rows: list[dict]) -> dict[str, dict]:
