@@ -10,8 +10,8 @@ import numpy as np
 
 from ..sensors.calibration import LARGEST_LEVEL
 
-# Read off all 14 photographs of the unit that ships, five of them in no fit: what is left of the picture at rest where the
-# toe begins, and what never goes; the level where the shoulder begins (or at rest where the gel is brighter).
+# Read off all 14 photographs of the unit that ships, five of them in no fit: what is left of the picture at rest where
+# the toe begins, and what never goes; the level where the shoulder begins (or at rest where the gel is brighter).
 TOE, FLOOR, SHOULDER = 0.5, 0.2, 190.0
 LEAST = 1.0  # level, over which an end bends at least
 
