@@ -69,7 +69,6 @@ ELSEWHERE = {
     "tactile watch touch.csv --serve": ("tests/jobs/live/test_frame_server.py", "--serve"),
     "tactile render frames.h5": ("tests/jobs/engine/test_batch_kinds.py", "--workers"),
     "python3 scripts/dev.py demo": (".ci/run", "dev.py demo"),
-    "python3 scripts/dev.py test-blender": (".ci/run", "dev.py test-blender"),
     "python3 scripts/dev.py test": (".ci/run", "dev.py test"),
     "python -m pip install": ("scripts/dev.py", '"install"'),
     "python scenes/mujoco_grasp/grasp.py": ("tests/jobs/test_mujoco_gel.py", "--no-speed"),
@@ -88,7 +87,6 @@ ELSEWHERE = {
 }
 # What no test runs, and why.
 NOT_RUN = {
-    "python3 scripts/fetch_blender.py": "needs root, and 1.7 GB of Debian's packages",
     "pip download --no-deps taxim": "needs a package index; 27 MB",
     "tactile calibrate fit8/": "needs photographs of that package, which do not ship",
     "tactile calibrate --test unit.toml apart16/": "needs photographs of that package, which do not ship",
