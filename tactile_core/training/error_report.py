@@ -12,10 +12,9 @@ import torch
 from .. import accuracy
 from ..accuracy import Row
 from ..sensors import TARGET
-from ..translation.card import KINDS, SURFACES, fit_bounds
+from ..translation.card import KINDS, SURFACES, fit_bounds, silent_level
 from ..translation.layers import DISTANCES
 from ..translation.networks import Networks
-from ..translation.translator import silent_level
 from ..translation.weights import write_bytes
 from .data import Contacts
 from .stages import Model

@@ -13,9 +13,8 @@ from ..geometry.lattice import Lattice
 from ..sensors import PAIR, SOURCE, TARGET, unrolling
 from ..simulation.pairs_file import Pairs
 from ..translation.card import SURFACES
-from ..translation.gel_place import contact_patch
+from ..translation.gel_place import contact_center, contact_patch
 from ..translation.networks import Networks
-from ..translation.translator import contact_center
 
 ROWS = 128  # contacts at a time, to bound memory
 LEAST_PATCH = 20  # nodes: on smaller patches a share says little

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 
 from ..simulation.pairs_file import Split
 from ..translation.layers import COUNT_SCALE
-from ..translation.networks import FINE, PARTED
+from ..translation.second_contact import FINE, PARTED
 from .data import measured
 from .modules import Residual, initialise
 from .options import Options

@@ -148,6 +148,11 @@ def doubt(card: Mapping[str, Any]) -> str:
     )
 
 
+def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
+    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
+    return float(np.interp(0.99, silence["levels"], silence[quantity]))
+
+
 LEVEL = 0.95  # share of frames whose error the bound covers
 EDGES = (-14e-3, -8e-3, -2e-3)  # m, x of the contact's middle: tip, first and last electrodes, base (assumed)
 REGIONS = len(EDGES) + 2  # results without contact first

@@ -6,17 +6,19 @@ import functools
 
 import numpy as np
 
-from .. import sensors
+from .. import accuracy, sensors
 from ..geometry.lattice import Lattice
 from ..recordings.flags import Flag
 from ..sensors.camera import Camera
 from ..sensors.unrolling import node_normals
 from .card import PLACE
 from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
+from .posterior import Posterior, touches
 
 STEPS = 8  # of Newton's method; it ends in three on our lattice, whose cells are nearly squares
 FADE = 5e-3  # m beside the gel, over which a moved field fades out (assumed: a step at its rim would show in pictures)
 SMALL = 1e-3  # cells, over which a slope is taken
+APART = 3e-3  # m, from which on two places are two contacts' (assumed)
 
 # Of the contact patch:
 SMOOTH = 0.7  # cells, width of the Gaussian that keeps the curvature from following single nodes
@@ -32,6 +34,21 @@ _MARGIN = 20  # cells of rest round the lattice, so that opposite rims do not me
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
     """Return positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, bilinearly."""
     return between_nodes(_grid(frame.sensor, frame.rows, frame.columns), place)
+
+
+def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
+    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
+    center = accuracy.dent_center(displacement, rest).astype(np.float32)
+    center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
+    return center
+
+
+def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
+    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
+    place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
+    points = on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
+    far = accuracy.lengths(points - on_gel(frame, place)[:, None]) > APART
+    return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:

@@ -34,8 +34,6 @@ from .weights import ADVICE, CARD_NAME, read_card, read_verified
 # Of a posterior's components, in units of the state: no place is known to .2 cells, no force to 2 % (assumed).
 LEAST_SPREAD = 0.02
 SPREAD_LIMITS = -8.0, 2.0  # of the logarithm of what a network adds to it
-FINE = 5.0  # times finer than the networks' scale is the second one that `parts` sees: at 3 counts noise begins
-PARTED = 0.25  # of the signal's length, the unit of half the difference between both parts (assumed)
 PRESSURE_SCALE = 300.0  # Pa: the pressure is 300 Pa sinh(head), likewise (assumed)
 ERROR_UNIT = 10e-6  # m, of the error head's logarithm
 WEIGHTS_FOLDER = shipped("weights")
@@ -75,20 +73,6 @@ class Networks:
         """Decode latent_signal (T, K) to change (T, 19) counts: SVB's reconstruction."""
         size = self.sizes["SVB"]["latent"]
         return in_blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
-
-    def parts(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Tell the signals of two contacts at once apart, of change (T, 19) counts.
-
-        Returns which frames (T,) bool have two, and the changes (T, 19) of the stronger and of the weaker one.
-        """
-        tensors, change = self.tensors[PARTS], np.asarray(change, np.float32)
-        seen = np.concatenate([compress(change), compress(np.float32(FINE) * change)], -1)
-        found = self._map(PARTS, seen)
-        half = found[:, :-1] * np.float32(PARTED) * np.sqrt(np.square(change).sum(-1, keepdims=True))
-        both = np.stack([change / 2 + half, change / 2 - half])
-        order = np.argsort(-np.square(both).sum(-1), axis=0, kind="stable")
-        stronger, weaker = np.take_along_axis(both, order[..., None], axis=0)
-        return found[:, -1] > tensors["single"], stronger, weaker
 
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""

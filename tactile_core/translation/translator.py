@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +16,14 @@ from ..recordings.polarity import TOUCHING
 from ..sensors import unrolling as surface
 from . import gel_place
 from .answer import MEAN, Answer
-from .card import DOUBT, KINDS, PARTS, PLACE, REST, STATE, SURFACES, doubt, error_bound
-from .contact_frame import STILL, ContactFrame
+from .card import DOUBT, KINDS, PARTS, PLACE, REST, STATE, SURFACES, doubt, error_bound, silent_level
+from .contact_frame import STILL
 from .contact_track import Evidence
+from .gel_place import contact_center, elsewhere
 from .layers import COMPRESSED_LIMIT, DISTANCES
 from .networks import Networks
-from .posterior import FORCE_SCALE, Posterior, touches
+from .posterior import FORCE_SCALE, touches
+from .second_contact import second_contact, told_apart
 from .simulated_likeness import Patterns, contradicted, recovered, residual_shares, two_contacts, unlike
 
 # Frames that differ from training in kind, not in degree, are worth little.
@@ -36,8 +37,7 @@ EXPLAINED, WITHIN = (-0.6, 0.2, 1.0), (0.78, 0.96, 1.0)
 # (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should. The
 # largest change of deep contacts at the tip is three times what 99 % of the contacts stay below, and is trained.
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
-# A place is undecided where more than this share of the posterior lies as far away, m, as two contacts must lie apart.
-UNDECIDED, APART = 0.3, 3e-3  # assumed
+UNDECIDED = 0.3  # share of the posterior that lies elsewhere, from which on a place is undecided (assumed)
 LEAST_SQUARE = 1.0  # counts^2 of all electrodes' change, below any reading's noise: what no contact makes
 SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterior
 
@@ -55,13 +55,11 @@ class Translation(Summary):
         simulated units; less far from the training, at most `UNTRAINED_CONFIDENCE` where a flag doubts the frame
     expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
         below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
-    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, OUT_OF_RANGE,
-        BEYOND_DIGIT, TWO_CONTACTS, UNDECIDED_PLACE and UNEXPLAINED
+    flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, where `Answer.contacts` asks for
         two; NaN and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
-    explained : (T,), share of the electrodes' change, 1 less the squared rest over its square, that a unit of this film
-        and rest shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without
-        contact
+    explained : (T,), share of the electrodes' change, 1 less the squared rest over its square, that such a unit shows
+        under the translated contact; at most 1, below 0 where no change is a better guess, NaN without contact
     """
 
     latent_signal: np.ndarray
@@ -89,42 +87,8 @@ class Translation(Summary):
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
 
-class _Second(NamedTuple):
-    """Second contacts of some rows (n,), and what all frames have of them.
-
-    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e); center : (T, 2) m; force : (T, 3) N
-    """
-
-    rows: np.ndarray
-    skin: np.ndarray
-    gel: np.ndarray
-    predicted: np.ndarray
-    center: np.ndarray
-    force: np.ndarray
-
-
 def _rectified(signals: Signals) -> np.ndarray:
     return (signals.flags & np.uint16(Flag.RECTIFIED)) > 0
-
-
-def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
-    return float(np.interp(0.99, silence["levels"], silence[quantity]))
-
-
-def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
-    center = accuracy.dent_center(displacement, rest).astype(np.float32)
-    center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
-    return center
-
-
-def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
-    place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
-    points = gel_place.on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
-    far = accuracy.lengths(points - gel_place.on_gel(frame, place)[:, None]) > APART
-    return (posterior.weight * (far & touches(posterior.mean))).sum(-1)
 
 
 class Translator:
@@ -139,9 +103,8 @@ class Translator:
         self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()
         if self.answer.contacts > 1 and PARTS not in nets.tensors:
-            found = "weights that know single contacts alone"
-            advice = "Leave them out, or train weights with this version of `tactile train`"
-            raise TactileError("two contacts", found, "weights that tell two apart", advice)
+            advice = "Look for one, or train weights with this version"
+            raise TactileError("two contacts", "weights that know single contacts alone", "a network `parts`", advice)
         moved = self.answer.mount_shift
         self._shift = gel_place.Shift(nets.frames["MVD"], moved) if moved.any() else None
         self._unrolled = surface.unrolled_nodes(self.source)
@@ -154,20 +117,12 @@ class Translator:
         change, unsigned = self.changes(signals)
         whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
         if self.answer.contacts > 1:
-            whole, second = change, second = self._apart(change, unsigned)
+            change, second = told_apart(self.nets, change, unsigned)
+            whole = change
         latent = self.nets.encode_signal(change, unsigned)
         size = np.sqrt(np.square(whole).mean(axis=1))
         beside = {"rectified": _rectified(signals), "latent": latent, "unsigned": unsigned, "second": second}
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, **beside)
-
-    def _apart(self, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the changes (T, e) by the stronger contact and by the weaker, NaN where there is one.
-
-        Those of lost signs (T,) are left whole.
-        """
-        two, stronger, weaker = self.nets.parts(change)
-        two = (two & ~unsigned)[:, None]
-        return np.where(two, stronger, change), np.where(two, weaker, np.float32(np.nan))
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
@@ -218,12 +173,13 @@ class Translator:
         touched = touches(state)
         skin = nets.decode_source(latent_source) * touched[:, None, None]
         gel = nets.decode_target(latent_target) * touched[:, None, None]
-        gel = gel if self._shift is None else self._shift(gel)
+        gel = self._mounted(gel)
         # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])
-        beside = self._weaker(evidence.second, silent, signals.stiffness)
+        way = self._mounted, self.silent("digit_m"), signals.stiffness
+        beside = second_contact(nets, evidence.second, silent, *way)
         both = beside.rows
         skin[both], gel[both] = skin[both] + beside.skin, gel[both] + beside.gel
         flags = signals.flags.copy()
@@ -239,8 +195,7 @@ class Translator:
         explained = np.where(silent, np.float32(np.nan), self._explained(signals, change, predicted, rectified))
         confidence = self._confidence(change, flags, rectified, explained)
         flags[self._beyond_digit(skin)] |= np.uint16(Flag.BEYOND_DIGIT)
-        flags[two_contacts(shares)] |= np.uint16(Flag.TWO_CONTACTS)
-        flags[both] |= np.uint16(Flag.TWO_CONTACTS)
+        flags[two_contacts(shares) | np.isfinite(beside.center[:, 0])] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         return Translation(
@@ -250,28 +205,9 @@ class Translator:
             second_force=beside.force, **self._errors(change, rectified, center[:, 0]),
         )  # fmt: skip
 
-    def _weaker(self, change: np.ndarray, silent: np.ndarray, stiffness: float) -> _Second:
-        """Translate the weaker of two contacts by its changes (T, e), NaN where there is none, each frame alone.
-
-        silent : (T,) bool, frames without a first contact, which have no second
-        """
-        nets, count = self.nets, len(change)
-        center, force = np.full((count, 2), np.nan, np.float32), np.zeros((count, 3), np.float32)
-        rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
-        if not len(rows):
-            nothing = np.zeros((0, 1, 3), np.float32)
-            return _Second(rows, nothing, nothing, nothing[..., 0], center, force)
-        latent = nets.encode_signal(change[rows])
-        state = nets.contact(latent)
-        source, target = nets.latents(latent, state)
-        gel = nets.decode_target(target)
-        gel = gel if self._shift is None else self._shift(gel)
-        place = contact_center(gel, sensors.sensor_surface(self.target).rest, self.silent("digit_m"))
-        felt = touches(state) & np.isfinite(place[:, 0])
-        rows, place, source = rows[felt], place[felt], source[felt]
-        center[rows], force[rows] = place, stiffness * nets.force_in(state[felt], source)
-        predicted = nets.decode_signal(nets.m2s(source))
-        return _Second(rows, nets.decode_source(source), gel[felt], predicted, center, force)
+    def _mounted(self, gel: np.ndarray) -> np.ndarray:
+        """Gels (T, M, 3) m where the mount shifts them."""
+        return gel if self._shift is None else self._shift(gel)
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).

@@ -11,7 +11,7 @@ from tactile_core.simulation.pairs_file import split_presses  # noqa: E402
 from tactile_core.training.options import Options  # noqa: E402
 from tactile_core.training.two_contacts import Presses, train_parts  # noqa: E402
 from tactile_core.translation.layers import compress, residual  # noqa: E402
-from tactile_core.translation.networks import FINE  # noqa: E402
+from tactile_core.translation.second_contact import FINE  # noqa: E402
 
 OPTIONS = Options(parts_steps=60, mirrored=0.0, unit=0.0)
 

@@ -12,8 +12,9 @@ from tactile_core.errors import TactileError
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import card as cards
 from tactile_core.translation import contact_frame, networks, translate
+from tactile_core.translation.gel_place import elsewhere
 from tactile_core.translation.posterior import Posterior
-from tactile_core.translation.translator import UNTRAINED, UNTRAINED_CONFIDENCE, Translator, elsewhere
+from tactile_core.translation.translator import UNTRAINED, UNTRAINED_CONFIDENCE, Translator
 
 
 @pytest.fixture(scope="module")

@@ -24,9 +24,10 @@ from tactile_core.recordings.signals import Signals
 from tactile_core.sensors import digit_surface, electrodes, shape_of
 from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.translation import adapt, networks, reference_signals
+from tactile_core.translation.gel_place import contact_center
 from tactile_core.translation.simulated_likeness import residual_shares, unlike
 from tactile_core.translation.translate import pass_over
-from tactile_core.translation.translator import Translator, contact_center
+from tactile_core.translation.translator import Translator
 
 from .test_set import as_read
 
