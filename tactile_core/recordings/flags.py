@@ -21,7 +21,7 @@ class Flag(enum.IntFlag):
     BEYOND_PICTURE = 1024  # the contact lies on the DIGIT's gel, beside what its camera sees
     UNDECIDED_PLACE = 2048  # the signals of this frame alone may as well come from a contact 3 mm or more away
     GEL_NOT_SOLVED = 4096  # no contact was solved on the DIGIT (``--gel solved``): its gel is the networks'
-    TWO_CONTACTS = 8192  # the signals look like those of two contacts at once; the translation shows one
+    TWO_CONTACTS = 8192  # the signals look like those of two contacts at once
     LAW_DOUBTED = 16384  # the recording's contacts together resemble no simulated ones: gains, order, rest or skin
     UNEXPLAINED = 32768  # the signals resemble no simulated contact's, or PDC denies it: drift, or rest under load
 

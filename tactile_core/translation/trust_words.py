@@ -40,7 +40,7 @@ SENTENCES = {
     Flag.BEYOND_DIGIT: "the contact has no counterpart on the DIGIT's gel",
     Flag.BEYOND_PICTURE: "the contact lies on the gel beside its picture (--mount-shift X,Z moves it there)",
     Flag.UNDECIDED_PLACE: "by its own signals the contact may as well lie elsewhere",
-    Flag.TWO_CONTACTS: "the signals look like two contacts at once; the translation shows one",
+    Flag.TWO_CONTACTS: "the signals look like two contacts at once (--contacts 2 looks for both)",
     Flag.UNEXPLAINED: "the signals resemble no contact's, or conductivity's more: drift, or rest under load",
     Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
