@@ -6,7 +6,7 @@
     python3 scripts/build_extension.py --no-wheels                   42 MB, any platform: numpy alone, see Preferences
 
 What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
-simulating and rendering need: 172 to 227 MB a platform and Python, so each has a zip of its own. The same commit,
+simulating and rendering need: 173 to 229 MB a platform and Python, so each has a zip of its own. The same commit,
 platform and wheels give the same bytes.
 """
 
