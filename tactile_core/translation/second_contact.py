@@ -1,5 +1,6 @@
-"""Tell two contacts at once apart, and translate the weaker one: a network parts their signals, which both networks for
-one contact then read.
+"""Tell two contacts at once apart, and translate the weaker one.
+
+A network divides the signals into those of each contact; the networks for one contact then read each part.
 """
 
 from __future__ import annotations

@@ -206,7 +206,7 @@ class Translator:
         )  # fmt: skip
 
     def _mounted(self, gel: np.ndarray) -> np.ndarray:
-        """Gels (T, M, 3) m where the mount shifts them."""
+        """Return gels (T, M, 3) m, moved by the mount's shift."""
         return gel if self._shift is None else self._shift(gel)
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
