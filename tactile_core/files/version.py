@@ -1,3 +1,3 @@
 """Hold the package's version, below every room that writes it into a file."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -156,7 +156,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
         jobs.write(folder, job)
         return job
     if job.id != there.id:
-        held, advice = "holds another job (other recordings, contents or options)", "Name another --out folder"
+        held, advice = "holds another job (other recordings, contents, options or version)", "Name another --out folder"
         raise TactileError(folder, held, "the same command that began it", advice)
     return there
 

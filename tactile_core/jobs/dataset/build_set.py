@@ -136,7 +136,7 @@ def _translated(
         if not jobs.exists(place):
             jobs.write(place, job)
         elif jobs.read(place).id != job.id:
-            found = "holds another job (other recordings, contents or options)"
+            found = "holds another job (other recordings, contents, options or version)"
             raise TactileError(place, found, "the same command that began it", "Name another --out folder")
         with asked.bar(f"translate {place.name}", "task") as shown:
             done = runs.run(place, job, asked.place(place), None, shown)

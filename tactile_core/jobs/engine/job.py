@@ -72,8 +72,17 @@ def exists(folder: Path) -> bool:
     return (folder / FILE).exists()
 
 
+def read_to_run(folder: Path) -> Job:
+    """Read a job that this version began. Raises TactileError like `read`, and for one that another version began."""
+    job = read(folder)
+    if job.recipe.version != __version__:
+        found = f"made by version {job.recipe.version}"
+        raise TactileError(folder / FILE, found, f"version {__version__}, which is running", ADVICE)
+    return job
+
+
 def read(folder: Path) -> Job:
-    """Read the job of a folder. Raises TactileError for none, for one that is damaged or of another version."""
+    """Read the job of a folder, of any version. Raises TactileError for none, or for one that is damaged."""
     file = folder / FILE
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job[Recipe])
@@ -84,9 +93,6 @@ def read(folder: Path) -> Job:
         raise TactileError(file, f"damaged ({error})", f"a job file ({FORMAT})", ADVICE) from error
     if job.format != FORMAT:
         raise TactileError(f"{file}, format", repr(job.format), repr(FORMAT), ADVICE)
-    if job.recipe.version != __version__:
-        found = f"made by version {job.recipe.version}"
-        raise TactileError(file, found, f"version {__version__}, which is running", ADVICE)
     for index, one in enumerate(job.inputs):
         odd = os.path.basename(one.name) != one.name or "\0" in one.name + one.path
         if odd or not one.name.startswith(f"{index:05d}_") or not _encodes(one.name + one.path):

@@ -184,7 +184,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
         if not jobs.exists(folder):
             jobs.check_empty(folder, "Move it away, or choose another name for the result")
             jobs.write(folder, job)
-        elif jobs.read(folder).id != job.id:
+        elif jobs.read_to_run(folder).id != job.id:
             found = "holds parts of another scene, seed, count, option or version"
             raise TactileError(folder, found, "none or the same", "Remove the folder to start again")
         yield folder

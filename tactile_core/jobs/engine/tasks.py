@@ -109,4 +109,4 @@ def _stamp(folder: Path) -> tuple[int, int]:
 
 @functools.lru_cache(maxsize=4)
 def _job(folder: str, stamp: tuple[int, int]) -> jobs.Job:
-    return jobs.read(Path(folder))
+    return jobs.read_to_run(Path(folder))

@@ -121,7 +121,6 @@ def damage(job):
     yield json.dumps(job | {"more": 1})
     yield json.dumps(job | {"inputs": [job["inputs"][0] | {"name": "00000_/../../x"}]})
     yield json.dumps(job | {"recipe": job["recipe"] | {"shard_frames": 0}})
-    yield json.dumps(job | {"recipe": job["recipe"] | {"version": "0"}})
     yield json.dumps(job | {"format": "other"})
 
 
@@ -132,6 +131,15 @@ def test_a_job_file_of_others_is_checked(new_job):
         (folder / jobs.FILE).write_text(text)
         with pytest.raises(TactileError, match=r"job\.json"):
             jobs.read(folder)
+
+
+def test_a_job_of_another_version_is_read_but_not_gone_on_with(new_job):
+    folder, _ = new_job()
+    text = json.loads((folder / jobs.FILE).read_text())
+    (folder / jobs.FILE).write_text(json.dumps(text | {"recipe": text["recipe"] | {"version": "0"}}))
+    assert jobs.read(folder).recipe.version == "0"
+    with pytest.raises(TactileError, match=r"made by version 0; expected version"):
+        jobs.read_to_run(folder)
 
 
 def test_a_refused_batch_leaves_no_folder(tmp_path, capsys):
