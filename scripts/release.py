@@ -3,9 +3,9 @@
     python3 scripts/release.py                 wheel, sdist and the extension's zips, in dist/
     python3 scripts/release.py --no-zips       wheel and sdist alone: two minutes
 
-The version is the one of tactile_core/files/version.py; the manifest, CITATION.cff and the newest heading of CHANGELOG.md
-must name the same. The wheel is built from the sdist, installed into an empty environment and must convert the recording
-that ships. The same commit and packages give the same bytes; `sha256sum --check SHA256SUMS` compares them.
+The version is the one of tactile_core/files/version.py; the manifest, CITATION.cff and the newest heading of
+CHANGELOG.md must name the same. The wheel is built from the sdist, installed into an empty environment and must convert
+the recording that ships. The same commit and packages give the same bytes: `sha256sum --check SHA256SUMS` compares.
 """
 
 from __future__ import annotations
