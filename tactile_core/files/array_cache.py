@@ -47,9 +47,7 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
 
 def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> None:
     """Write named arrays as they come, each whole or not at all, and their hashes last.
-
-    room : what it takes, in words, such as "350 MB". Raises TactileError for a folder that cannot be written.
-    """
+    room : what it takes, in words, such as "350 MB". Raises TactileError for a folder that cannot be written."""
     with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
         hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays}
         atomic.write_json(folder / HASHES, hashes)

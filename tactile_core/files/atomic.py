@@ -198,10 +198,8 @@ def _sync_folder(path: Path) -> None:
 
 def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
     """Check before a long job that `path` is free and can be written; the folders that this needs are made later.
-
     advice : what to do where something is there
-    Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written.
-    """
+    Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written."""
     if not os.fspath(path):
         raise TactileError("--out", "an empty name", "a file to write")
     path = Path(path)

@@ -1,7 +1,5 @@
 """HDF5 files with their own checksum: the first 512 bytes hold the hash of all that follows, and how many rows it has.
-
-HDF5 lets a file begin with a block for other uses (its "user block"), which every HDF5 reader skips.
-"""
+HDF5 lets a file begin with a block for other uses (its "user block"), which every HDF5 reader skips."""
 
 from __future__ import annotations
 

@@ -35,11 +35,9 @@ MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enou
 
 @contextmanager
 def bounded_memory(more: int) -> Iterator[None]:
-    """Let the process take at most ``more`` bytes beyond its present data; allocations beyond fail.
-
-    On Linux alone: macOS and Windows have no such bound within a process. In the main thread alone: beside other work,
-    as in a Dask worker, whose own limit holds, the work of other threads would fail of the bound.
-    """
+    """Let the process take at most ``more`` bytes beyond its present data; allocations beyond fail. On Linux alone:
+    macOS and Windows have no such bound within a process. In the main thread alone: beside other work, as in a Dask
+    worker, whose own limit holds, the work of other threads would fail of the bound."""
     if not sys.platform.startswith("linux") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -150,9 +148,7 @@ def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -
 
 def _check(path: str | os.PathLike, name: str, data: h5py.Dataset | h5py.Group) -> list:
     """Refuse a dataset with values elsewhere, large chunks or strange filters; return it where it is to be unpacked.
-
-    That is a list of no or one name, dataset, size of a chunk in bytes and list of filters.
-    """
+    That is a list of no or one name, dataset, size of a chunk in bytes and list of filters."""
     if not hasattr(data, "chunks"):
         return []
     layout = data.id.get_create_plist()

@@ -1,7 +1,5 @@
 """Open files that come from outside: regular files alone, up to a size, so that no pipe, socket or device hangs a verb.
-
-Whatever opens a user's or a stranger's file goes through here; a library that opens by name is asked after `check`.
-"""
+Whatever opens a user's or a stranger's file goes through here; a library that opens by name is asked after `check`."""
 
 from __future__ import annotations
 

@@ -178,11 +178,9 @@ class Contents:
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
-    """Choose the frames (k,) to show, in order: the strongest contacts that lie apart from each other.
-
-    Taken one by one, each at least half of a `count`-th of the recording away from those before.
-    strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none
-    """
+    """Choose the frames (k,) to show, in order: the strongest contacts that lie apart from each other. Taken one by
+    one, each at least half of a `count`-th of the recording away from those before.
+    strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none"""
     left = np.where(np.isfinite(strength), strength, -1.0)
     count = min(count, len(left))
     frames, chosen = np.arange(len(left)), []

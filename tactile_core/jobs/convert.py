@@ -89,10 +89,8 @@ class ToolOptions:
 
 
 def load_tools(options: ToolOptions) -> Tools:
-    """Load the weights, and camera and lights of the gel.
-
-    Raises TactileError for weights that are missing, changed or of another shape, and what `load_drawer` raises.
-    """
+    """Load the weights, and camera and lights of the gel. Raises TactileError for weights that are missing, changed or
+    of another shape, and what `load_drawer` raises."""
     translator, solves = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
     return Tools(translator, load_drawer(*unit, translator.target, options.object_reflectance, solves=solves))

@@ -43,9 +43,7 @@ class FramePass:
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None
     ) -> None:
         """Take read(frames), which gives their times, s, and signals; count : frames of the whole recording.
-
-        keep : words of results.KEEPABLE. Raises TactileError for motion of dots on a gel that has none.
-        """
+        keep : words of results.KEEPABLE. Raises TactileError for motion of dots on a gel that has none."""
         self._translator, self._drawer, self._pair = tools.translator, tools.drawer, tools.pair
         self._keep, self._clock = tuple(keep), clock or Stopwatch()
         self._decoded = RecordingPass(tools.translator, read, count)

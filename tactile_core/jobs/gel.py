@@ -1,10 +1,6 @@
-"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out.
-
-gel = Gel("digit", indenter=Sphere(3e-3))
-for pose in poses:                      # 4 x 4, or (position, quaternion), in the sensor's frame
-    contact = gel.press(pose)
-    picture = gel.picture()
-"""
+"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out. gel =
+Gel("digit", indenter=Sphere(3e-3)) for pose in poses:                      # 4 x 4, or (position, quaternion), in the
+sensor's frame contact = gel.press(pose) picture = gel.picture()"""
 
 from __future__ import annotations
 
@@ -126,11 +122,9 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose.
-
-        What is no pose or force is passed over: the contact before comes again, flagged ``refused``, and the reason is
-        logged. Raises TactileError where poses or forces end before the others.
-        """
+        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose. What is no
+        pose or force is passed over: the contact before comes again, flagged ``refused``, and the reason is logged.
+        Raises TactileError where poses or forces end before the others."""
         if forces is None:
             yield from map(self._press_or_keep, poses)
             return
@@ -160,11 +154,9 @@ class Gel:
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
-        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact.
-
-        Where a hard slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac,
-        and for a gel without a calibration.
-        """
+        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact. Where a hard
+        slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac, and for a gel
+        without a calibration."""
         if not sensors.is_gel(self.sensor):
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
             raise TactileError("Gel, picture", found, "a Gel of a sensor with a camera, as the DIGIT")
@@ -178,9 +170,7 @@ class Gel:
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
-
-        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by.
-        """
+        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by."""
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
         return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))

@@ -1,7 +1,5 @@
-"""A contact of a ``Gel``, and the pose and force that it is asked for.
-
-Poses come as simulators give them: 4 x 4 matrices, or a position and a quaternion.
-"""
+"""A contact of a ``Gel``, and the pose and force that it is asked for. Poses come as simulators give them: 4 x 4
+matrices, or a position and a quaternion."""
 
 from __future__ import annotations
 

@@ -34,10 +34,8 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 @dataclasses.dataclass(frozen=True)
 class Frames:
     """Frames of an input: displacements of a gel's nodes or height maps, one of the two.
-
     kind : in words; numbers : (T,) by which frames are known
-    displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m
-    """
+    displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m"""
 
     kind: str
     numbers: np.ndarray
@@ -62,10 +60,8 @@ def read_frames(
     path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
-
     gel : whose displacement is read, or solved
-    Raises TactileError for anything else, or what cannot be read.
-    """
+    Raises TactileError for anything else, or what cannot be read."""
     path = Path(path)
     if is_scene(path):
         return _of_scene(path, progress, gel)
@@ -131,11 +127,9 @@ def _of_scene(path: Path, progress: Progress, gel: str) -> Frames:
 
 
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
-    """Return the displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording.
-
-    Raises TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was
-    not kept or lies on another surface, and a frame that it does not hold.
-    """
+    """Return the displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording. Raises
+    TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was not kept
+    or lies on another surface, and a frame that it does not hold."""
     held = read_displacement(path, sensor)
     row = np.flatnonzero(held.numbers == frame)
     if held.displacement is None or len(row) != 1:

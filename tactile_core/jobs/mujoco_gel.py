@@ -55,11 +55,9 @@ class MujocoGel:
         self.gel: Gel | None = None  # the one that pressed last
 
     def __call__(self, data: mujoco.MjData) -> GelContact | None:
-        """The gel's contact at MuJoCo's state; None before anything touched.
-
-        Its force along +y is MuJoCo's; that along the surface follows MuJoCo's within a few frames.
-        Call it after ``mj_step`` or ``mj_forward``, 100 times a second or more often while something moves.
-        """
+        """The gel's contact at MuJoCo's state; None before anything touched. Its force along +y is MuJoCo's; that along
+        the surface follows MuJoCo's within a few frames. Call it after ``mj_step`` or ``mj_forward``, 100 times a
+        second or more often while something moves."""
         pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
         if not pressing:
             self._shift = np.zeros(3)
@@ -84,11 +82,9 @@ class MujocoGel:
         return contact
 
     def _shear(self, contact: GelContact, force: np.ndarray) -> None:
-        """Shift the next pose along the gel so that its force there comes to be MuJoCo's ``force`` (3,) N.
-
-        MuJoCo's contacts creep and have no shear stiffness of their own, so its poses say little about shear. A ball's
-        is Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, of that along the normal, which by Hertz is 3/2 of force over depth.
-        """
+        """Shift the next pose along the gel so that its force there comes to be MuJoCo's ``force`` (3,) N. MuJoCo's
+        contacts creep and have no shear stiffness of their own, so its poses say little about shear. A ball's is
+        Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, of that along the normal, which by Hertz is 3/2 of force over depth."""
         if contact.force[1] <= 0 or contact.depth <= 0:
             self._shift = np.zeros(3)
             return
@@ -134,11 +130,9 @@ class MujocoGel:
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
-    """Return the indenter that a geom is, and its frame (4, 4) in the geom's.
-
-    Spheres, capsules, boxes and cylinders are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids
-    go through a grid of their distance, built once. Raises TactileError for planes and height fields.
-    """
+    """Return the indenter that a geom is, and its frame (4, 4) in the geom's. Spheres, capsules, boxes and cylinders
+    are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids go through a grid of their distance,
+    built once. Raises TactileError for planes and height fields."""
     import mujoco
 
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), np.array(model.geom_size[geom])

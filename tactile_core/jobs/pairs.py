@@ -1,8 +1,6 @@
-"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data.
-
-Presses are numbered; press i draws all it needs from (seed, i), so any number of workers makes the same file, and
-an interrupted run goes on from the blocks of presses that are already on disk.
-"""
+"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data. Presses are
+numbered; press i draws all it needs from (seed, i), so any number of workers makes the same file, and an interrupted
+run goes on from the blocks of presses that are already on disk."""
 
 from __future__ import annotations
 

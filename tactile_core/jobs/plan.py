@@ -1,7 +1,5 @@
-"""Estimate what a command builds and costs before it runs, from measured tables.
-
-Times are of one thread of the machine that the tables were measured on (``scripts/benchmarks/measure_costs.py``).
-"""
+"""Estimate what a command builds and costs before it runs, from measured tables. Times are of one thread of the machine
+that the tables were measured on (``scripts/benchmarks/measure_costs.py``)."""
 
 from __future__ import annotations
 
@@ -68,9 +66,7 @@ def costs() -> dict[str, Any]:
 
 def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[str, TierChoice]) -> Plan:
     """Plan `tactile simulate`; keep : words of ``scene_recording.outputs``; choices : the tier of each of its sensors.
-
-    Raises TactileError for what cannot be read.
-    """
+    Raises TactileError for what cannot be read."""
     from ..simulation import scene_recording
     from ..simulation.scene import load_scene
 

@@ -78,10 +78,8 @@ def render(
     say: Callable[[str], None] = lambda words: None,
 ) -> Path:
     """Render an input into the folder `out`, which appears whole or not at all; returns it.
-
     progress : given a word, a context that yields a callback (done, in all); say : receives what was picked, and why
-    Raises TactileError for a bad input, calibration or option, and a disk that cannot be written.
-    """
+    Raises TactileError for a bad input, calibration or option, and a disk that cannot be written."""
     clock, out = Stopwatch(), Path(out)
     gel = load_calibration(options.calibration).camera.sensor
     preset = claimed(out, options)
@@ -147,10 +145,8 @@ def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tup
 @dataclasses.dataclass(frozen=True)
 class Pictures:
     """Writes frames as files.
-
     about : attributes of EXR files; heights : whether frames are height maps, not displacements
-    noise : whether PNG pictures have some; exr : whether to write OpenEXR too
-    """
+    noise : whether PNG pictures have some; exr : whether to write OpenEXR too"""
 
     renderer: Renderer
     clock: Stopwatch

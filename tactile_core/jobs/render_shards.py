@@ -38,10 +38,8 @@ def render_in_parts(
     progress: Callable[[int, int], None],
 ) -> Path:
     """Render like ``render.render``; the job is in ``<out>.parts`` until complete, and the same call resumes it.
-
     place : where frames are rendered, from the job's folder; progress : (tasks done, known so far)
-    Raises what ``render.render`` raises.
-    """
+    Raises what ``render.render`` raises."""
     out = Path(out)
     job = plan(path, out, options)
     with (

@@ -41,12 +41,9 @@ def parse_keep(text: str) -> tuple[str, ...]:
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
-    """Return the result folder of each recording, after all checks that need no work.
-
-    Clears what killed runs left in `out`. Raises TactileError: an empty `out`,
-    two recordings of the same name, a result that exists (unless `overwrite`), something that is no result in its
-    place, a folder that cannot be written.
-    """
+    """Return the result folder of each recording, after all checks that need no work. Clears what killed runs left in
+    `out`. Raises TactileError: an empty `out`, two recordings of the same name, a result that exists (unless
+    `overwrite`), something that is no result in its place, a folder that cannot be written."""
     if not os.fspath(out):
         raise TactileError("--out", "an empty name", "a folder to write", "Name one")
     out = Path(out)
@@ -69,10 +66,8 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
     """Raise TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
-
     maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
-        there are others
-    """
+        there are others"""
     if not os.path.lexists(folder):
         return
     if not is_result(folder, maker):

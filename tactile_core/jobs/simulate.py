@@ -154,10 +154,8 @@ def simulate_grid(
     place: Callable[[Path], Place] = InProcess,
 ) -> None:
     """Simulate all recordings of a `plan` into the folder ``out``.
-
     progress : (tasks done, known so far); place : where the work is done, from the job's folder
-    The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done.
-    """
+    The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done."""
     for sensor in PAIR:
         compliance_of(sensor)  # built once here, not by every worker at the same time
     with runs.completed(Path(out), job, place, progress) as folder:

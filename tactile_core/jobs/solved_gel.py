@@ -114,10 +114,8 @@ def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, 
 
 def describe_miss(total: np.ndarray, force: np.ndarray, solved: bool = False) -> str:
     """Say by how much tractions that add up to (T, 3) N miss the size of the force (T, 3) N that the networks estimate.
-
     Their directions are not compared: the force is the one on the finger, whose pad is curved.
-    solved : whether gels were solved under that force, rather than translated beside it
-    """
+    solved : whether gels were solved under that force, rather than translated beside it"""
     size, carried = accuracy.lengths(force), accuracy.lengths(total)
     pressed = size > 0
     if not pressed.any():

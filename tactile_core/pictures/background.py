@@ -1,8 +1,6 @@
 """The picture of an untouched DIGIT: its LEDs' light on the coating and ambient light, or the user's own photograph.
-
 About half of what a real unit shows at rest is light that gel and acrylic hold: it lights the coating from all sides.
-Each LED has its own share of it, a smooth polynomial, that goes with the LED's power and the coating's albedo.
-"""
+Each LED has its own share of it, a smooth polynomial, that goes with the LED's power and the coating's albedo."""
 
 from __future__ import annotations
 
@@ -26,12 +24,9 @@ MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3).
-
-    The calibration's photograph where it has one; it is scaled by the model where LEDs or albedo have changed since it
-    was taken. Raises TactileError for a photograph that cannot be read or has
-    another size than the camera's pictures.
-    """
+    """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3). The
+    calibration's photograph where it has one; it is scaled by the model where LEDs or albedo have changed since it was
+    taken. Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
     if not unit.photograph:
         return by_led(unit, radiance).sum(-1)
     photograph = read_photograph(unit.photograph, unit.camera).astype(np.float32)
@@ -86,9 +81,7 @@ def fit_ambient(
     picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
 ) -> tuple[tuple[float, ...], ...]:
     """Fit the ambient light (3, n) by least squares, so that the unit's picture at rest is nearest to one (H, W, 3).
-
-    radiance : (H, W, 3) of the coating at rest; degree : of its polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE
-    """
+    radiance : (H, W, 3) of the coating at rest; degree : of its polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE"""
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)
     left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)

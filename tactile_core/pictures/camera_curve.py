@@ -1,8 +1,6 @@
 """The camera's toe and shoulder: deep shadows and bright flanks keep a part of their light, and with it their hue.
-
 Linear light would take more from a shadow than the untouched gel shows there. Photographs never fall below a share of
-the picture at rest, and bright flanks approach white; between both ends the camera is linear (docs/calibration.md).
-"""
+the picture at rest, and bright flanks approach white; between both ends the camera is linear (docs/calibration.md)."""
 
 from __future__ import annotations
 
@@ -18,9 +16,7 @@ LEAST = 1.0  # level, over which an end bends at least
 
 def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the change (...), levels, that the camera shows of linear light's, and the slope between them.
-
-    rest : (...) levels of the untouched gel, which the camera shows as they are
-    """
+    rest : (...) levels of the untouched gel, which the camera shows as they are"""
     toe, fall, shoulder, rise = ends(rest)
     below, above = np.minimum(change - toe, 0), np.maximum(change - shoulder, 0)
     dark, bright = np.exp(below / fall), np.exp(-above / rise)

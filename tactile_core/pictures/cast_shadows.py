@@ -66,10 +66,8 @@ class ShadowCaster:
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
         """LED radii that a unit of slope of the mapped line of sight is at the LED, across that line, (rows, columns).
-
         A rise dw of the mapped line at the LED is a move of (1 - h / H)^2 (-right / H, -down / H, 1) dw in space, with
-        the mapped LED's right and down. Points lie at height zero here: that changes the angle by a few degrees.
-        """
+        the mapped LED's right and down. Points lie at height zero here: that changes the angle by a few degrees."""
         led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
         rise = (1 - led[2] * inverse) ** 2 * np.array([-self.foot[0] * inverse, -self.foot[1] * inverse, 1.0])
         to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)
@@ -78,10 +76,8 @@ class ShadowCaster:
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
         """Return the height of the LED's centre above the horizon, in LED radii, from -1 (hidden) to 1 (all seen).
-
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
-            sight (h, w) and the box of pixels it is for; it is 1 everywhere else.
-        """
+            sight (h, w) and the box of pixels it is for; it is 1 everywhere else."""
         reach = self.reach(float(height[box].max()), float(height.min()))
         rows = _span(self.row[box], self.polar_shape[0] - 1)
         columns = _span(self.column[box], self.polar_shape[1] - 1, reach)
@@ -163,11 +159,9 @@ def disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` below its centre.
-
-    Both over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi,
-    moment 2 (1 - t^2)^(3/2) / (3 pi).
-    """
+    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` below its centre. Both
+    over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi, moment 2 (1 - t^2)^(3/2)
+    / (3 pi)."""
     share, moment = disc_tables()
     place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
     return share.take(place), moment.take(place)

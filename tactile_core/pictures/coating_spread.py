@@ -1,8 +1,6 @@
-"""Light that goes sideways in the coating before it comes out: each place shows the mean of what falls round it.
-
-Paint scatters light some tenths of a millimetre far (docs/calibration.md says what photographs tell of it). A Gaussian
-over the picture stands for that, the same in every preset; it makes the rim of a print as soft as it is seen.
-"""
+"""Light that goes sideways in the coating before it comes out: each place shows the mean of what falls round it. Paint
+scatters light some tenths of a millimetre far (docs/calibration.md says what photographs tell of it). A Gaussian over
+the picture stands for that, the same in every preset; it makes the rim of a print as soft as it is seen."""
 
 from __future__ import annotations
 
@@ -51,9 +49,7 @@ def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
 
 def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
     """Length of the n runs of pixels along a side, and weights (count, n) of their sums at each pixel; deviation : px.
-
-    Runs first, then Gaussians on these, which interpolate as well: a fraction of the work.
-    """
+    Runs first, then Gaussians on these, which interpolate as well: a fraction of the work."""
     step = max(int(deviation / FINE), 1)
     starts = step * np.arange(-(-count // step))
     ends = np.minimum(starts + step, count)

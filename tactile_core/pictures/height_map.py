@@ -75,12 +75,9 @@ class HeightMapper:
         self.rest.flags.writeable = False
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """Heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
-
-        Twice differentiable where the surface does not fold; exactly ``rest`` where nothing moves.
-        A point from beyond the window counts as the window's edge.
-        Raises TactileError for another shape or a value that is not finite.
-        """
+        """Heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3). Twice
+        differentiable where the surface does not fold; exactly ``rest`` where nothing moves. A point from beyond the
+        window counts as the window's edge. Raises TactileError for another shape or a value that is not finite."""
         displacement = np.asarray(displacement)
         expected = (len(self.surface.rest), 3)
         if displacement.ndim not in (2, 3) or displacement.shape[-2:] != expected:
@@ -103,9 +100,7 @@ class HeightMapper:
         self, displacement: np.ndarray, x: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the displaced places x, z and heights (n,) m of gel points that rest at places x, z (n,) m.
-
-        displacement : (n_nodes, 3) m
-        """
+        displacement : (n_nodes, 3) m"""
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
         tables = np.stack([move[..., 0], move[..., 2], self.rest_y + move[..., 1]])
         coefficients = self.along.to_coefficients @ tables @ self.across.to_coefficients.T
@@ -133,10 +128,8 @@ class HeightMapper:
 
     def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
         """Heights (n,) m of the gel points that have moved to the refined grid's nodes, and how many were not found.
-
         move : (2, rows, columns) sideways displacement x, z at the window's nodes
-        coefficients : (3, rows + 2, columns + 2), of its splines and the height's
-        """
+        coefficients : (3, rows + 2, columns + 2), of its splines and the height's"""
         (down, right), (down_slope, right_slope) = self.to_fine
         to_x, to_z = _inverse(down_slope @ move @ right.T, down @ move @ right_slope.T)
         miss = (down @ move @ right.T).reshape(2, -1)
@@ -226,10 +219,8 @@ def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:
-    """Convert a spline's matrix to float32, without what rounding would drop.
-
-    Far from a node its weights fall below the smallest normal float32, and processors are ten times slower at those.
-    """
+    """Convert a spline's matrix to float32, without what rounding would drop. Far from a node its weights fall below
+    the smallest normal float32, and processors are ten times slower at those."""
     return np.where(np.abs(matrix) > NEGLIGIBLE, matrix, 0).astype(np.float32)
 
 
@@ -263,9 +254,7 @@ def rest_height_map(camera: Camera | None = None) -> np.ndarray:
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
     """Convert heights (H, W) or (T, H, W) m of a gel to float32, of a unit whose dome is higher or flatter at rest.
-
-    What a contact raises stays; the resting dome is that of the descriptor times the calibration's ``dome_scale``.
-    """
+    What a contact raises stays; the resting dome is that of the descriptor times the calibration's ``dome_scale``."""
     heights = np.asarray(heights, np.float32)
     if calibration.dome_scale == 1:
         return heights

@@ -1,8 +1,6 @@
 """Light of small LEDs on the gel that a camera sees: Lambert's cosine over the square of distance, and cast shadows.
-
 The one law of light for every picture: the fast one and calibrations see the gel in perspective, Mitsuba's rays without
-LLVM and the untouched gel at places in space. Any number of LEDs.
-"""
+LLVM and the untouched gel at places in space. Any number of LEDs."""
 
 from __future__ import annotations
 
@@ -115,9 +113,7 @@ class Lamps:
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
         """Return the light (L, H, W) float32, with shadows, on heights (H, W) m that pixels see; relative as ``Lit``'s.
-
-        An LED's shadows are soft: it is as wide as its radius.
-        """
+        An LED's shadows are soft: it is as wide as its radius."""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):

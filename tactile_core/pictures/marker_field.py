@@ -12,10 +12,8 @@ LEAST_AREA = 1e-3  # px^2, of a dot seen from its edge: none is drawn
 
 
 class MarkerField:
-    """Dots of one unit under its camera; numbered as the picture is read, row by row from the upper left.
-
-    Raises TactileError for a unit without dots, or whose grid reaches beyond the even part of the gel's surface.
-    """
+    """Dots of one unit under its camera; numbered as the picture is read, row by row from the upper left. Raises
+    TactileError for a unit without dots, or whose grid reaches beyond the even part of the gel's surface."""
 
     def __init__(self, unit: Calibration) -> None:
         if unit.markers is None:
@@ -64,9 +62,7 @@ class MarkerField:
 
     def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
         """Darken the pixels (H, W) of one dot's ellipse by the part of each that it covers.
-
-        place : (2,) px, its middle; axes : (2, 2), from a unit disc to px
-        """
+        place : (2,) px, its middle; axes : (2, 2), from a unit disc to px"""
         area = abs(np.linalg.det(axes))
         if area < LEAST_AREA:
             return

@@ -1,8 +1,6 @@
-"""Light that comes through the coating from the object that touches it.
-
-Photographs show it as even over the whole contact, in an LED's light and in its shadow: it goes sideways in the object
-before it comes back (docs/calibration.md). It goes with each LED's power.
-"""
+"""Light that comes through the coating from the object that touches it. Photographs show it as even over the whole
+contact, in an LED's light and in its shadow: it goes sideways in the object before it comes back (docs/calibration.md).
+It goes with each LED's power."""
 
 from __future__ import annotations
 

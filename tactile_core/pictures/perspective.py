@@ -44,10 +44,8 @@ class Perspective:
         self.start_nearest = _nearest(row, column, self.camera.width)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
-        """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels.
-
-        Raises TactileError where the gel reaches the camera.
-        """
+        """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels. Raises
+        TactileError where the gel reaches the camera."""
         if height.max() >= HIGHEST_GEL * self.camera.apparent_height:
             found = f"{height.max() * 1e3:.1f} mm high"
             raise TactileError("height map", found, f"below the camera at {self.camera.apparent_height * 1e3:.1f} mm")
@@ -180,9 +178,7 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
     """See ``Perspective.__call__``; height, steepness (H W,); rows (H,), columns (W,) from the map's middle.
-
-    inverse : 1/m, of the camera's apparent height
-    """
+    inverse : 1/m, of the camera's apparent height"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)
     last_row, last_column = np.float32(2) * middle_row, np.float32(2) * middle_column

@@ -19,10 +19,8 @@ SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, abou
 @dataclasses.dataclass(frozen=True)
 class Gather:
     """Resolution at which the gel's own light is gathered.
-
     step : pixels between places; azimuths : directions round each
-    growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more
-    """
+    growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more"""
 
     step: int
     azimuths: int
@@ -94,10 +92,8 @@ def measured() -> dict[str, Any]:
 
 
 def cheapest(error: float, variant: str) -> str:
-    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``.
-
-    Raises TactileError where none is.
-    """
+    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``. Raises
+    TactileError where none is."""
     table = measured()["presets"]
     rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name

@@ -96,18 +96,14 @@ class Renderer:
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
         """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
-
-        marks : (H, W) share of light that dots leave, of ``dots.marks``; of a unit with dots they must be given
-        """
+        marks : (H, W) share of light that dots leave, of ``dots.marks``; of a unit with dots they must be given"""
         if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
             return self._rest_picture.copy()
         return self.picture(self.radiance(height_map), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, ever less noisy; the last is that of a call.
-
-        The preset ``reference`` by LLVM has some, the others the last alone.
-        """
+        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, ever less noisy; the last is that of a call. The preset
+        ``reference`` by LLVM has some, the others the last alone."""
         heights = self._heights(height_map, "height map")
         if not isinstance(self._light, GelLight):
             yield self.picture(self._spread_radiance(heights))
@@ -118,10 +114,8 @@ class Renderer:
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
-
         displacement : of the DIGIT surface's 2,867 nodes, as ``translate`` and ``solve`` return it
-        Raises TactileError for another shape or values that are not finite.
-        """
+        Raises TactileError for another shape or values that are not finite."""
         if np.ndim(displacement) != 3:
             return self(gel_mapper(self.camera)(displacement), self.marks(displacement))
         pictures = np.empty((len(displacement), *self.camera.shape, 3), np.uint8)
@@ -146,10 +140,8 @@ class Renderer:
         return self._completed(light, seen)
 
     def _completed(self, light: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3).
-
-        With the light of the object that touches it.
-        """
+        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3). With the
+        light of the object that touches it."""
         spread = self._spread(light + raised_light(self.calibration, seen))
         if self.calibration.through:
             spread += object_light(self.calibration, seen - self.view.start)
@@ -240,9 +232,7 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 @Loop
 def _fill_levels(radiance, rest, response, background, ends, largest, picture):  # noqa: ANN001, ANN202
     """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W), bent.
-
-    ends : (4, H, 3 W) of the camera's curve
-    """
+    ends : (4, H, 3 W) of the camera's curve"""
     leds, height, width = radiance.shape
     lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)

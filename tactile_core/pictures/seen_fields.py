@@ -15,10 +15,8 @@ def seen_fields(
     renderer: Renderer, heights: np.ndarray, displacement: np.ndarray, touched: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return fields (H, W) or (H, W, 3) float32 of the gel points that a renderer's pixels see, in the shared frame.
-
     Height, m toward the camera; Normal, outward and of length 1; Contact, the share that is touched; Displacement, m.
-    heights : (H, W) m, as ``height_map`` gives them; displacement : (n, 3) m; touched : (n,) 0 to 1, of the nodes
-    """
+    heights : (H, W) m, as ``height_map`` gives them; displacement : (n, 3) m; touched : (n,) 0 to 1, of the nodes"""
     camera, surface = renderer.camera, renderer.camera.surface
     heights = of_unit(heights, renderer.calibration)
     seen = renderer.view(heights)

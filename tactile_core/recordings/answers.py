@@ -20,9 +20,7 @@ from .signals import EVERY, FRAMEWISE, PrepareOptions, Signals
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
-
-    frames : those whose signals are returned; all of the recording decide what they are
-    """
+    frames : those whose signals are returned; all of the recording decide what they are"""
     options = options or PrepareOptions()
     options.check()
     check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)

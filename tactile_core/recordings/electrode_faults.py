@@ -145,11 +145,9 @@ def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
 
 
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Mark the frames (T,) bool that repeat the row before them, and those of longer runs, which are held.
-
-    A packet was lost, or the driver stood still, where `STALE` rows and more are equal although noise should keep them
-    apart. electrodes : (T, e) counts; findings are added to the warnings
-    """
+    """Mark the frames (T,) bool that repeat the row before them, and those of longer runs, which are held. A packet was
+    lost, or the driver stood still, where `STALE` rows and more are equal although noise should keep them
+    apart. electrodes : (T, e) counts; findings are added to the warnings"""
     found, long = np.zeros((2, len(electrodes)), bool)
     same, noisy = repeats(electrodes)
     again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
@@ -231,11 +229,9 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
 
 
 def _still(readings: np.ndarray) -> np.ndarray:
-    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings.
-
-    Runs while no electrode changes are no fault unless they span the whole recording. For an electrode that is quiet
-    elsewhere too, missing noise shows nothing: only a run over the whole recording counts.
-    """
+    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings. Runs while no electrode changes
+    are no fault unless they span the whole recording. For an electrode that is quiet elsewhere too, missing noise shows
+    nothing: only a run over the whole recording counts."""
     still = np.zeros(readings.shape, bool)
     for j in range(readings.shape[1]):
         column = readings[:, j].copy()

@@ -60,10 +60,8 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
     """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
-
     topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
-    sensor : of the units, "biotac" or another, which has a rest and no gains
-    """
+    sensor : of the units, "biotac" or another, which has a rest and no gains"""
 
     format: str
     unit: ElectrodeGains | None = None

@@ -34,10 +34,8 @@ def describe(
     path: str | os.PathLike[str], options: PrepareOptions | None = None, unit: SensorFile | None = None
 ) -> str:
     """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
-
     By its readings alone where no unit of its sensor has been seen at rest. unit : rest and gains, of `tactile adapt`
-    Raises TactileError where the file is no recording, or of another sensor than the unit's.
-    """
+    Raises TactileError where the file is no recording, or of another sensor than the unit's."""
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
     recording = read(path, columns, sensor, lean=True)

@@ -47,10 +47,8 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all windows of n frames, by start frame: sums (19, W), calm, pdc or None, middle (s) (W,).
-
-    The sums are in single precision where that is exact, as it is of counts: in double they are twice the recording.
-    """
+    """Statistics of all windows of n frames, by start frame: sums (19, W), calm, pdc or None, middle (s) (W,). The sums
+    are in single precision where that is exact, as it is of counts: in double they are twice the recording."""
 
     n: int
     sums: np.ndarray
@@ -184,9 +182,7 @@ def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
     """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
-
-    The level moves at ``rate`` a second at most: drift over an hour can exceed a press.
-    """
+    The level moves at ``rate`` a second at most: drift over an hour can exceed a press."""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)
     near = level + rate * TRACKED

@@ -152,11 +152,9 @@ def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -
 
 
 def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> list[str]:
-    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one.
-
-    Of a bag of several topics, ``path#topic/finger0`` and so on. A map picks one finger itself.
-    Raises TactileError like `read` for a file that is no recording.
-    """
+    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one. Of a
+    bag of several topics, ``path#topic/finger0`` and so on. A map picks one finger itself. Raises TactileError like
+    `read` for a file that is no recording."""
     path = os.fspath(path)
     with opened(path) as (container, where, finger, file):
         if container == "bag":

@@ -21,10 +21,8 @@ MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothin
 
 def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
     """Interpolate linearly over the bad samples of each column; the nearest good one at the ends.
-
     values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0. Where none is bad, the values
-    themselves come back.
-    """
+    themselves come back."""
     if not bad.any():
         return values
     values = values.astype(float)
@@ -107,9 +105,7 @@ def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
 
 def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np.ndarray:
     """Return (N,) whether runs jump away, steeper than around them, stay on one level and return.
-
-    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after; neighbour_step : (N,)
-    """
+    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after; neighbour_step : (N,)"""
     jump = np.minimum(np.abs(samples[1] - samples[0]), np.abs(samples[-1] - samples[-2]))
     run = samples[1:-1]
     returns = np.abs(samples[-1] - samples[0]) <= np.maximum(LEVEL, FLATNESS * jump)
@@ -160,10 +156,8 @@ def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, int, float]]:
     """Return pairs of opposite jumps that may begin and end a stuck run, in order.
-
     edges : samples before large steps. Each pair has its two edges, and the calmer of the steps just outside. A noisy
-    electrode has millions of pairs: what a run's two ends show is looked at here, for all at once.
-    """
+    electrode has millions of pairs: what a run's two ends show is looked at here, for all at once."""
     steps = np.diff(column)
     beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
     pairs: list[tuple[int, int, float]] = []

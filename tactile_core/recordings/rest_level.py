@@ -46,9 +46,7 @@ class Baseline:
 
 class Changes:
     """Changes (T, e) counts, indexed like an array: of all frames of a long recording they take twice its memory.
-
-    count : T; of : frames (n,) -> their changes (n, e)
-    """
+    count : T; of : frames (n,) -> their changes (n, e)"""
 
     def __init__(self, count: int, of: Callable[[np.ndarray], np.ndarray]) -> None:
         self._count, self._of = count, of
@@ -76,11 +74,9 @@ Framewise = np.ndarray | Changes
 
 
 def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
-    """Estimate the readings (T, 19) counts without contact.
-
-    Level of each quiet part, linear between their middles, constant before the first and after the last: nothing is
-    known there, and contact is never taken for drift. Without drift: one level over all quiet frames.
-    """
+    """Estimate the readings (T, 19) counts without contact. Level of each quiet part, linear between their middles,
+    constant before the first and after the last: nothing is known there, and contact is never taken for drift. Without
+    drift: one level over all quiet frames."""
     if not drift or len(quiet.parts) < 2:
         return Baseline.constant(level(electrodes[quiet.mask]))
     middles = np.array([0.5 * (a + b - 1) for a, b in quiet.parts])

@@ -25,11 +25,9 @@ MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assu
 
 
 def counted(columns: np.ndarray) -> np.ndarray | None:
-    """Count how often each whole number from -32,768 on is in each column (T, e), finite; returns (e, 65536) int.
-
-    None where other numbers occur, and of short columns: sorting long ones takes twice their memory and most of the
-    time that a recording takes.
-    """
+    """Count how often each whole number from -32,768 on is in each column (T, e), finite; returns (e, 65536) int. None
+    where other numbers occur, and of short columns: sorting long ones takes twice their memory and most of the time
+    that a recording takes."""
     if len(columns) < len(WHOLE):
         return None
     counts = np.empty((columns.shape[1], len(WHOLE)), int)
@@ -57,9 +55,7 @@ def median(column: np.ndarray) -> float:
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
     """Return counts a unit, and the unit in words, of raw readings that are no counts; None for all others.
-
-    electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0
-    """
+    electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0"""
     beyond, within = (((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX))
     if beyond > 1 - MOST_OF and within < MOST_OF:  # counts, seen without sorting them
         return None

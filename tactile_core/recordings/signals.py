@@ -34,10 +34,8 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a quiet level (19,) counts is this unit at rest, judged by its PDC, counts.
-
-        Where either has no PDC, or PDC of another zero, the level must be near the unit's counts at rest.
-        """
+        """Return true if a quiet level (19,) counts is this unit at rest, judged by its PDC, counts. Where either has
+        no PDC, or PDC of another zero, the level must be near the unit's counts at rest."""
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
         return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())
@@ -130,11 +128,9 @@ class Signals:
 
     @property
     def typical(self) -> np.ndarray:
-        """Change (T, 19) counts, converted to a unit that rests at ``sensors.typical_rest``, the networks' input.
-
-        Only raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of
-        which no unit has been seen at rest: see `relative_to`.
-        """
+        """Change (T, 19) counts, converted to a unit that rests at ``sensors.typical_rest``, the networks' input. Only
+        raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of which
+        no unit has been seen at rest: see `relative_to`."""
         if self.kind != "raw" or typical_rest(self.sensor) is None:
             return self.change
         return Changes(len(self.change), self.typical_of)[EVERY]
@@ -145,9 +141,7 @@ class Signals:
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
         """Convert changes (T, e) counts of a typical unit at rest counts (e,) to those of raw readings of this one.
-
-        Gains and the fluid's drift stay taken off; other changes than raw ones are of no unit that is known.
-        """
+        Gains and the fluid's drift stay taken off; other changes than raw ones are of no unit that is known."""
         if self.kind != "raw" or at is None:
             return change
         own = divider.of_unit(change, self.rest, at)

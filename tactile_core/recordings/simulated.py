@@ -51,9 +51,7 @@ def write_simulated(
     start_time: float = 0.0,
 ) -> Path:
     """Write the file whole or not at all, and return its path; None is left out. Shapes and units: see the module.
-
-    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm.
-    """
+    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
     path = Path(path)
     frames = len(time)
     _check_shape(path, "time", time, (frames,))

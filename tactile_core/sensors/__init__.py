@@ -99,11 +99,9 @@ def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarr
 
 @functools.cache
 def thickness_at(sensor: str, node: int) -> float:
-    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal there.
-
-    To the flat back of a gel; through skin and fluid to the core, or to the finger's axis where the normal passes the
-    core by. Kept, for a path asks again at each step.
-    """
+    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal there. To the
+    flat back of a gel; through skin and fluid to the core, or to the finger's axis where the normal passes the core by.
+    Kept, for a path asks again at each step."""
     point = sensor_surface(sensor).rest[node]
     if is_gel(sensor):
         return shape_of(sensor).thickness_below(point)

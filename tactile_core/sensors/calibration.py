@@ -117,10 +117,8 @@ LARGEST_LEVEL = 255.0  # of 8 bits
 @dataclasses.dataclass(frozen=True)
 class Response:
     """Matrix (channel, led) from radiance to the camera's grey levels, linear over the picture.
-
     centre : (3, 3) levels a level in the picture's middle, a row a channel of the picture, a column an LED's colour
-    along_right, along_down : (3, 3) levels a level and metre of the plane of height zero
-    """
+    along_right, along_down : (3, 3) levels a level and metre of the plane of height zero"""
 
     centre: tuple[tuple[float, ...], ...] = number(length=3)
     along_right: tuple[tuple[float, ...], ...] = number("per_mm", length=3)
@@ -237,11 +235,9 @@ class Calibration:
 
     @property
     def facing(self) -> np.ndarray:
-        """Radiance (3,) of each LED's light on a coating that faces it, levels.
-
-        At the distance from the LED to the picture's centre: a matte coating of albedo a shows a radiance r^2 / d^2 of
-        a sphere of even brightness (Lambert's law).
-        """
+        """Radiance (3,) of each LED's light on a coating that faces it, levels. At the distance from the LED to the
+        picture's centre: a matte coating of albedo a shows a radiance r^2 / d^2 of a sphere of even brightness
+        (Lambert's law)."""
         return self._lit([float(np.square(led.position).sum()) for led in self.leds])
 
     @property

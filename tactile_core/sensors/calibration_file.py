@@ -1,7 +1,5 @@
-"""Calibrations as readable TOML: one file a unit, lengths in mm, what each number means beside it.
-
-Unknown and missing fields are refused.
-"""
+"""Calibrations as readable TOML: one file a unit, lengths in mm, what each number means beside it. Unknown and missing
+fields are refused."""
 
 from __future__ import annotations
 

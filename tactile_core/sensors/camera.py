@@ -89,9 +89,7 @@ class Camera:
 
     def at_size(self, width: int, height: int) -> Camera:
         """Return the same view in other pixels; raises TactileError for another aspect ratio or fewer than 3 pixels.
-
-        Width and height may each be a share's of this picture's less a part of a pixel: the view is then cut by it.
-        """
+        Width and height may each be a share's of this picture's less a part of a pixel: the view is then cut by it."""
         if not -self.height < width * self.height - height * self.width < self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)

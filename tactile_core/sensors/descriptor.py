@@ -53,10 +53,8 @@ def names() -> tuple[str, ...]:
 
 def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
     """Return the sensor that is read and the gel whose nodes a file's keys name; None where they name no two sensors.
-
     what : that is of them, in words. Raises TactileError for a sensor that is not known here, and for two that are not
-    one of each kind.
-    """
+    one of each kind."""
     of = sorted(key.removesuffix(NODES) for key in keys if key.endswith(NODES))
     if len(of) != 2:
         return None

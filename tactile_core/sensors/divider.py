@@ -34,11 +34,9 @@ def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray
 
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,).
-
-    A unit at 3,500 counts responds to a contact with seven tenths, one at 2,800 with one and a half times the change of
-    one at 3,300.
-    """
+    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,). A
+    unit at 3,500 counts responds to a contact with seven tenths, one at 2,800 with one and a half times the change of
+    one at 3,300."""
     return _converted(change, rest, to)
 
 

@@ -36,11 +36,9 @@ class Places:
 
 @functools.cache
 def places_of(name: str) -> Places:
-    """The electrodes of a sensor, from the table that its descriptor names.
-
-    The table lies beside the descriptor, or in ``$TACTILE_SENSORS/<name>/``.
-    Raises TactileError for a sensor without electrodes, and for a table that is missing or bad.
-    """
+    """The electrodes of a sensor, from the table that its descriptor names. The table lies beside the descriptor, or in
+    ``$TACTILE_SENSORS/<name>/``. Raises TactileError for a sensor without electrodes, and for a table that is missing
+    or bad."""
     found, path = of_kind(name, Fluid), table_of(name)
     table = found.electrodes.places
     if not path.is_file():
@@ -90,11 +88,9 @@ def _table(sensor: Fluid, file: str) -> np.ndarray | None:
 
 
 def read_places(path: Path) -> Places:
-    """Read a table of ``COLUMNS``; electrodes without counts at rest are those of the excitation.
-
-    Or bsadr/biotac's own table of a BioTac SP, ``SP_COLUMNS``, where those have numbers below zero. Raises TactileError
-    naming file and row.
-    """
+    """Read a table of ``COLUMNS``; electrodes without counts at rest are those of the excitation. Or bsadr/biotac's own
+    table of a BioTac SP, ``SP_COLUMNS``, where those have numbers below zero. Raises TactileError naming file and
+    row."""
     rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:
         return _read_sp(path, rows[1:])

@@ -15,10 +15,8 @@ FALLS, RISES = POLARITIES = ("falls", "rises")
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """The maker's frame in the shared one, in m.
-
-    x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign y_maker
-    """
+    """The maker's frame in the shared one, in m. x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign
+    y_maker"""
 
     shift_x: float = number("mm")
     shift_y: float = number("mm")

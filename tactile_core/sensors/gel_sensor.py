@@ -37,10 +37,8 @@ class Body:
 @dataclasses.dataclass(frozen=True)
 class Dome:
     """The height of a gel over its back. profile : table of heights
-
     degree_along, degree_across : of the polynomials through the table, in x, and in the square of z
-    margin : m, outer edge of the table that is left out
-    """
+    margin : m, outer edge of the table that is left out"""
 
     profile: str = file_beside()
     degree_along: int = number(above=-1, below=30)

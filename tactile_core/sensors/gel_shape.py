@@ -21,10 +21,8 @@ def shape_of(name: str) -> GelShape:
 
 class GelShape:
     """The resting gel of a descriptor: lengths in m, places (x, z) on its plane, outward is -y.
-
     half_width, tip_x, base_x : of the outline; arc_x : centre of a round tip
-    back_y : of the flat back; thickness : at the apex; spacing : of the lattice's window along x
-    """
+    back_y : of the flat back; thickness : at the apex; spacing : of the lattice's window along x"""
 
     def __init__(self, descriptor: GelSensor) -> None:
         self.descriptor = descriptor
@@ -45,11 +43,9 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth.
-
-        Least squares of the profile table by Chebyshev polynomials along and even powers across (a table of a faceted
-        mesh, hence the smoothing); the thickness everywhere where there is no [dome].
-        """
+        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth. Least squares
+        of the profile table by Chebyshev polynomials along and even powers across (a table of a faceted mesh, hence the
+        smoothing); the thickness everywhere where there is no [dome]."""
         x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
         edge = np.clip(1 - self.outline_distance(x, z) / self._body.edge_width, 0, 1)
         dome = self.descriptor.dome

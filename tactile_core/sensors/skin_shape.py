@@ -26,9 +26,7 @@ def skin_of(name: str) -> SkinShape:
 
 class SkinShape:
     """The resting skin and core of a descriptor, about the axis (y, z) = (``axis_y``, 0); lengths m, angles rad.
-
-    pad_angle : of the part that unrolls, to either side of the lowest line; thickness : of the skin
-    """
+    pad_angle : of the part that unrolls, to either side of the lowest line; thickness : of the skin"""
 
     def __init__(self, descriptor: Fluid) -> None:
         self.descriptor = descriptor
@@ -83,11 +81,9 @@ class SkinShape:
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
-        """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin.
-
-        Stations run from the tip pole to the base pole (both included, each one point repeated over the columns);
-        outer and inner points of one station and column face each other through the skin.
-        """
+        """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin. Stations run from the tip pole to the
+        base pole (both included, each one point repeated over the columns); outer and inner points of one station and
+        column face each other through the skin."""
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
@@ -135,10 +131,8 @@ class SkinShape:
 
     @functools.cache  # noqa: B019
     def skin_surface(self, layer: str = "outer") -> Lattice:
-        """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles.
-
-        The inner skin's triangles point away from the solid too, into the fluid.
-        """
+        """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles. The
+        inner skin's triangles point away from the solid too, into the fluid."""
         grid = self.skin_grid(layer)
         stations, columns = grid.shape[:2]
         rows = stations - 2

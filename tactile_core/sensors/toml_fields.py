@@ -1,8 +1,6 @@
 """Fields of a sensor's files: their units and ranges, and how TOML becomes dataclasses. For Blender, with numpy alone.
-
 A field's name ends in its unit; in Python it has the name without it, in SI units. Decimals are shifted to SI units
-before they are rounded to floats, so that 20.06 mm is the number 20.06e-3 exactly.
-"""
+before they are rounded to floats, so that 20.06 mm is the number 20.06e-3 exactly."""
 
 from __future__ import annotations
 
@@ -52,9 +50,8 @@ def number(
     length: int | None = None,
 ) -> Any:
     """Declare a number, or a list of them: its unit in the file, and the open interval in which it lies there.
-
-    default : in Python; may_miss : whether a file may leave it out for that; length : of lists whose type does not say
-    """
+    default : in Python; may_miss : whether a file may leave it out for that; length : of lists whose type does not
+        say"""
     meta = {"unit": unit, "above": above, "below": below, "may_miss": may_miss, "length": length}
     return dataclasses.field(default=default, metadata=meta)
 

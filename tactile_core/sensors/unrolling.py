@@ -54,11 +54,9 @@ def rolled_grid(sensor: str) -> np.ndarray:
 
 
 def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
-    """Positions (n_nodes, 2) = (x, z) m of the nodes of a fluid sensor's surface, unrolled onto the DIGIT's plane.
-
-    The finger rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md).
-    NaN for nodes on the back, beyond 90 degrees, and for the poles, which never touch the plane.
-    """
+    """Positions (n_nodes, 2) = (x, z) m of the nodes of a fluid sensor's surface, unrolled onto the DIGIT's plane. The
+    finger rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md). NaN for nodes
+    on the back, beyond 90 degrees, and for the poles, which never touch the plane."""
     skin = skin_of(sensor)
     on_pad = np.abs(skin.angles)[None, :, None] <= skin.pad_angle + 1e-9
     rolled = np.where(on_pad, rolled_grid(sensor), np.nan)
@@ -72,11 +70,9 @@ def _skin_axes(sensor: str) -> np.ndarray:
 
 
 def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.ndarray]:
-    """Find the place on a fluid sensor's resting skin that corresponds to an unrolled point (x, z) m.
-
-    Returns the surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad: unrolled x
-    between the poles, angle within 90 degrees.
-    """
+    """Find the place on a fluid sensor's resting skin that corresponds to an unrolled point (x, z) m. Returns the
+    surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad: unrolled x between the
+    poles, angle within 90 degrees."""
     skin = skin_of(sensor)
     stations, angles, radius = rolled_x(sensor), skin.angles, skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
@@ -89,9 +85,7 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nearest places on a surface to points (n, 3): face index (n,), barycentric weights (n, 3), place (n, 3) m.
-
-    Ericson, Real-Time Collision Detection, 5.1.5, by projection on the plane and on the three edges.
-    """
+    Ericson, Real-Time Collision Detection, 5.1.5, by projection on the plane and on the three edges."""
     faces, weights, places = [], [], []
     a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
     for point in points:

@@ -1,7 +1,5 @@
-"""The indenters that a scene can name: one struct a kind, millimetres in, metres out.
-
-Structs of shapes that their sizes describe come from the shapes' own files; meshes and groups stand here.
-"""
+"""The indenters that a scene can name: one struct a kind, millimetres in, metres out. Structs of shapes that their
+sizes describe come from the shapes' own files; meshes and groups stand here."""
 
 from __future__ import annotations
 
@@ -54,10 +52,8 @@ def _spec_of(form: SceneForm) -> type[SizedSpec]:
 
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):
     """A closed triangle mesh (STL, PLY, OBJ, OFF) in the scene's folder or below it.
-
     unit_mm : mm per unit of the file; up : the file's axis that points out of the sensor
-    spacing_mm : of the grid that holds its distance
-    """
+    spacing_mm : of the grid that holds its distance"""
 
     name: str
     file: str

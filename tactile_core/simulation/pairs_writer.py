@@ -1,7 +1,5 @@
-"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks, and the file's card.
-
-The card holds counts, hash and histograms, small enough to keep beside the code.
-"""
+"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks, and the file's card. The
+card holds counts, hash and histograms, small enough to keep beside the code."""
 
 from __future__ import annotations
 
@@ -81,11 +79,9 @@ def _plain(value: object) -> object:
 
 
 def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
-    """Return the unit of each dataset that is written; the leading axis counts contacts.
-
-    Datasets are named after the two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words
-    of ``KEEPABLE``, of what is written beside
-    """
+    """Return the unit of each dataset that is written; the leading axis counts contacts. Datasets are named after the
+    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, of what is
+    written beside"""
     fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
     return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",

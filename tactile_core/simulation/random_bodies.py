@@ -1,8 +1,6 @@
-"""Draw the bodies of presses at random: what a finger meets is seldom one of the indenters that a scene lists.
-
-Sizes are even in their logarithm, so that a small ball is as likely as a large one. All ranges are assumed: from what
-a fingertip can tell from a point to what it cannot tell from a plane.
-"""
+"""Draw the bodies of presses at random: what a finger meets is seldom one of the indenters that a scene lists. Sizes
+are even in their logarithm, so that a small ball is as likely as a large one. All ranges are assumed: from what a
+fingertip can tell from a point to what it cannot tell from a plane."""
 
 from __future__ import annotations
 

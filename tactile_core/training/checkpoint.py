@@ -50,10 +50,8 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
 
 
 def read(path: str | os.PathLike, identity: dict) -> State:
-    """Read the state in the file, or return the state of a start if there is none.
-
-    raises: TactileError if the file is damaged, or belongs to another training
-    """
+    """Read the state in the file, or return the state of a start if there is none. raises: TactileError if the file is
+    damaged, or belongs to another training"""
     if not os.path.exists(path):
         return State(identity)
     try:

@@ -40,10 +40,8 @@ class Batch:
 
 class Contacts:
     """Contacts with their split and both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
-
     electrodes : how many a signal has; rest : (e,) counts that their changes are those of
-    device : where batches go; the contacts themselves stay in the host's memory
-    """
+    device : where batches go; the contacts themselves stay in the host's memory"""
 
     def __init__(
         self, pairs: Pairs, split: Split, options: Options, frames: dict[str, ContactFrame], generator: torch.Generator,

@@ -121,9 +121,7 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
     """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified apart.
-
-    Rectified signals scatter more: quantiles of both together would hide what is strange among signed ones.
-    """
+    Rectified signals scatter more: quantiles of both together would hide what is strange among signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
         signal = contacts.read(

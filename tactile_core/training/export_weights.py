@@ -40,11 +40,8 @@ def export(
     model: Model, contacts: Contacts, parts: dict[str, np.ndarray], bodies: Bodies, seed: int, folder: Path
 ) -> dict:  # fmt: skip
     """Write one safetensors file a network and the card; returns the card.
-
     parts : tensors of the network that tells two contacts apart
-
-    The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights.
-    """
+    The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights."""
     model.cpu()
     with torch.no_grad():
         for parameter in model.parameters():
@@ -145,10 +142,8 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
 
 def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
     """Compute the fluid's pressure, (1,) Pa, for each count of the electrodes' summed changes read without their sign.
-
     It is the median over training contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) a law of
-    one number does better than networks, large and small (docs/train.md).
-    """
+    one number does better than networks, large and small (docs/train.md)."""
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
     signal = contacts.read(rows, np.random.default_rng([seed, 7]), rectified=1.0)

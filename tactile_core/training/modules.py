@@ -63,11 +63,9 @@ class Residual(nn.Module):
 
 
 class ContactPosterior(nn.Module):
-    """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known.
-
-    A mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that gives
-    the latent of the BioTac's dent from the signal and a state. A shape thus is never averaged over places and depths.
-    """
+    """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known. A
+    mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that gives the
+    latent of the BioTac's dent from the signal and a state. A shape thus is never averaged over places and depths."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
         super().__init__()
@@ -127,9 +125,7 @@ class Vae(nn.Module):
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """Draw a latent from the posterior of x (reparameterised); also its KL divergence from N(0, 1), mean over B.
-
-        Kingma and Welling 2014, appendix B.
-        """
+        Kingma and Welling 2014, appendix B."""
         mean, logvar = self.posterior(x)
         noise = torch.randn(mean.shape, generator=generator).to(mean.device)  # the same numbers on any device
         divergence = 0.5 * (mean**2 + logvar.exp() - 1.0 - logvar).sum(-1).mean()
@@ -184,10 +180,8 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
-    """Make SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks).
-
-    The twentieth input, the last, says whether the signals are rectified.
-    """
+    """Make SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks). The
+    twentieth input, the last, says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 
@@ -198,10 +192,8 @@ def compress(signal: Tensor) -> Tensor:
 
 
 def initialise(module: nn.Module, generator: torch.Generator) -> None:
-    """Draw all weights from the generator: uniform in +-1/sqrt(inputs), torch's own range for Linear.
-
-    The layers that end a branch start at zero, so that a residual MLP starts as its linear skip.
-    """
+    """Draw all weights from the generator: uniform in +-1/sqrt(inputs), torch's own range for Linear. The layers that
+    end a branch start at zero, so that a residual MLP starts as its linear skip."""
     for name, layer in module.named_modules():
         if isinstance(layer, nn.Linear):
             bound = 1.0 / math.sqrt(layer.in_features)

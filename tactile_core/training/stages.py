@@ -123,11 +123,9 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal.
-
-    By likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal
-    then what separates contacts.
-    """
+    """Compute the negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. By
+    likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal then
+    what separates contacts."""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
     found, surprise = model.given(batch.signal, batch.state)
@@ -183,10 +181,8 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Compute the loss of the fluid's pressure, on the head's scale, from the signal as read with its sign.
-
-    Relative errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still.
-    """
+    """Compute the loss of the fluid's pressure, on the head's scale, from the signal as read with its sign. Relative
+    errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still."""
     signed = batch.signal[:, -1:] == 0
     error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return (signed * error.square()).sum() / signed.sum().clamp(min=1)

@@ -110,9 +110,7 @@ def error_columns(
     rectified: bool = False,
 ) -> Columns:
     """Return the largest node errors, m, of signal to BioTac mesh and to DIGIT mesh, and what the error head expects.
-
-    ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m.
-    """
+    ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}

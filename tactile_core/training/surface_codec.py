@@ -18,10 +18,8 @@ SAME = 1e-4  # rad: angles closer than this are one
 
 
 def image_of_nodes(frame: ContactFrame) -> np.ndarray:
-    """Mirror image (n,) of each node; nodes behind the lattice (poles) are their own.
-
-    Raises ValueError for a lattice whose columns have no images.
-    """
+    """Mirror image (n,) of each node; nodes behind the lattice (poles) are their own. Raises ValueError for a lattice
+    whose columns have no images."""
     columns, angle = np.arange(frame.columns), frame.turn[: frame.columns].astype(float)
     image = columns[::-1]
     if angle.any():  # columns stand round an axis, where the first is its own image if it lies behind
@@ -220,11 +218,9 @@ def touching(rows: np.ndarray) -> Tensor:
 
 
 def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
-    """Return the orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size).
-
-    Not centred: no displacement has the coefficients zero. Rounded to float16, the dtype it is shipped in.
-    rows : contacts to use
-    """
+    """Return the orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size). Not centred:
+    no displacement has the coefficients zero. Rounded to float16, the dtype it is shipped in.
+    rows : contacts to use"""
     size = fields(rows[:1]).shape[1]
     modes = min(modes, len(rows), size)
     columns = min(modes + EXTRA, len(rows), size)

@@ -1,8 +1,6 @@
-"""Training from a pairs file to a weights folder, from top to bottom: data, model, stages, export, report.
-
-The same pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order,
-its noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread.
-"""
+"""Training from a pairs file to a weights folder, from top to bottom: data, model, stages, export, report. The same
+pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order, its noise
+and its posterior samples from generators seeded with (seed, stage, epoch), on one thread."""
 
 from __future__ import annotations
 
@@ -124,11 +122,9 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 
 @contextmanager
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
-    """Make the folder, for one training at a time; what ends with an error leaves none that is new and empty.
-
-    Raises TactileError if it cannot be made, is being written, or already holds weights: a checkpoint beside them is of
-    a training that was killed after it wrote them, and goes on.
-    """
+    """Make the folder, for one training at a time; what ends with an error leaves none that is new and empty. Raises
+    TactileError if it cannot be made, is being written, or already holds weights: a checkpoint beside them is of a
+    training that was killed after it wrote them, and goes on."""
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
         (out / "weights").mkdir(parents=True, exist_ok=True)
@@ -232,10 +228,8 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for one pass over the data; returns the mean loss.
-
-    The rate rises over the first steps, then falls as a cosine.
-    """
+    """Train for one pass over the data; returns the mean loss. The rate rises over the first steps, then falls as a
+    cosine."""
     total = 0.0
     for step, loss in enumerate(losses):
         share = (epoch * len(losses) + step + 1) / (epochs * len(losses))

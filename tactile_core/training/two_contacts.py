@@ -1,8 +1,6 @@
-"""Train the network that tells the signals of two contacts apart, on sums of two simulated ones.
-
-Contacts far apart bend the skin each for itself, so that the electrodes answer about as to the sum of both; the fluid,
-which both press, is left out. A sum has no first and second: the error is that of the better order.
-"""
+"""Train the network that tells the signals of two contacts apart, on sums of two simulated ones. Contacts far apart
+bend the skin each for itself, so that the electrodes answer about as to the sum of both; the fluid, which both press,
+is left out. A sum has no first and second: the error is that of the better order."""
 
 from __future__ import annotations
 
@@ -45,9 +43,7 @@ def train_parts(
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Train on the split's training presses; returns tensors as `networks.py` names them.
-
-    rest : (e,) counts that changes are those of, of a sensor. The same arguments give the same numbers.
-    """
+    rest : (e,) counts that changes are those of, of a sensor. The same arguments give the same numbers."""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)
     initialise(network, generator)
@@ -84,9 +80,7 @@ def network_input(change: Tensor) -> Tensor:
 
 def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -> Tensor:
     """Compute the squared error of the parts of those that have two, and the cross entropy of whether there are two.
-
-    read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero where there is one
-    """
+    read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero where there is one"""
     found, two = network(network_input(read)), second.abs().amax(-1) > 0
     half = found[:, :-1] * read.square().sum(-1, keepdim=True).sqrt() * PARTED
     parts = read / 2 + half, read / 2 - half

@@ -46,10 +46,8 @@ LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (a
 @dataclass(frozen=True)
 class Adapted:
     """Fitted sensor with warnings for the user.
-
     fitted : (19,) bool, the electrodes with a gain; uncertainty : relative error of a gain to be expected, rms over
-        electrodes, beside a factor common to all; NaN where none has a gain
-    """
+        electrodes, beside a factor common to all; NaN where none has a gain"""
 
     sensor: ElectrodeGains
     fitted: np.ndarray
@@ -61,12 +59,9 @@ def adapt(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     rest: UnitRest | None = None,
 ) -> Adapted:  # fmt: skip
-    """Fit one sensor from its recordings, all together.
-
-    Recordings without a calm part near the unit's rest, given or estimated from all together, use that.
-    Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
-    in contact.
-    """
+    """Fit one sensor from its recordings, all together. Recordings without a calm part near the unit's rest, given or
+    estimated from all together, use that. Raises TactileError: a recording that cannot be read or is scaled, signed and
+    rectified ones mixed, too few frames in contact."""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings) if rest is None else rest
@@ -97,10 +92,8 @@ def adapt_hand(
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
     """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; with warnings.
-
     untouched : recording of the unit's rest, where there is one unit of a sensor whose typical rest is known
-    Raises TactileError like `adapt`, and for files of hands and of single fingers together.
-    """
+    Raises TactileError like `adapt`, and for files of hands and of single fingers together."""
     columns = None if options is None else options.columns
     every = [one for path in paths for one in each_finger(path, columns)]
     found = {sensor_of(one, columns) for one in every}
@@ -221,10 +214,8 @@ def _contacts(signals: Signals) -> np.ndarray:
 
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
-    """Fit gains and offsets to frames in contact (n, 19) counts.
-
-    Raises TactileError for fewer than half a second of them, or of different contacts than FEWEST_CONTACTS.
-    """
+    """Fit gains and offsets to frames in contact (n, 19) counts. Raises TactileError for fewer than half a second of
+    them, or of different contacts than FEWEST_CONTACTS."""
     frames = len(change)
     if frames < FEWEST_FRAMES:
         advice = "Use recordings with more contact"

@@ -132,10 +132,8 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate.
-
-    Or return the card's own, under ``DOUBT``.
-    """
+    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate. Or return
+    the card's own, under ``DOUBT``."""
     if isinstance(card.get(DOUBT), str):
         return card[DOUBT]
     found = chain_error(card)
@@ -167,9 +165,7 @@ def region(x: np.ndarray) -> np.ndarray:
 
 def fit_bounds(error: np.ndarray, expected: np.ndarray, x: np.ndarray) -> list[float]:
     """Fit the REGIONS numbers that cover LEVEL of the contacts of each region, four digits: m, then factors.
-
-    error, expected : (C,) m, the largest node error and what was expected of it; x : (C,) m, as in `region`
-    """
+    error, expected : (C,) m, the largest node error and what was expected of it; x : (C,) m, as in `region`"""
     ratio, where = error / expected, region(x)
     scores = [error, *[ratio] * (REGIONS - 1)]
     parts = [score[where == each] for each, score in enumerate(scores)]

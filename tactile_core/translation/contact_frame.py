@@ -65,9 +65,7 @@ class ContactFrame:
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
         """Locate the dent of (T, n, 3): (T, 2) float32, in PLACE_UNIT cells from the lattice's middle, row and column.
-
-        The mean of the nodes that move more than `CORE` of the largest, weighted with their displacement.
-        """
+        The mean of the nodes that move more than `CORE` of the largest, weighted with their displacement."""
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
         peak = moved.max(-1, keepdims=True)

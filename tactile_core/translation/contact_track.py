@@ -75,9 +75,7 @@ Read = Callable[[int, int], tuple[np.ndarray, Evidence]]
 
 class _Course(NamedTuple):
     """Places on a path through the frames' components.
-
-    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true where the path starts again
-    """
+    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true where the path starts again"""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -241,9 +239,8 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
 
 def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the scores (C,) of paths to the last of frames after one that is scored (C,), and where they came from.
-
-    moves : (T, C, C); weight : (T, C), logarithms; the second, (T, C), is each component's best one in the frame before
-    """
+    moves : (T, C, C); weight : (T, C), logarithms; the second, (T, C), is each component's best one in the frame
+        before"""
     came = np.empty(weight.shape, int)
     for frame, move in enumerate(moves):
         total = score[:, None] + move
@@ -271,10 +268,8 @@ def _filtered(
     value: np.ndarray, noise: np.ndarray, steps: np.ndarray, mean: np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Filter a random walk forward (Kalman 1960): means, variances and, before each measurement, variances (T, k).
-
     value, noise, steps : (T, k) measurements, their variances, and those of the walk before each
-    mean, variance : (k,) of the walk before the first
-    """
+    mean, variance : (k,) of the walk before the first"""
     means, variances, expected = (np.empty_like(value) for _ in range(3))
     for frame, step in enumerate(steps):
         expected[frame] = variance + step

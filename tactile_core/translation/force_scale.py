@@ -1,7 +1,6 @@
 """Find how stiff a unit is from a measured force: one scale of force and pressure, judged on what it was not fitted to.
-
-A stiffer skin gives the same electrodes for the same dent at a larger force and pressure, so that no signal shows it.
-"""
+A stiffer skin gives the same electrodes for the same dent at a larger force and pressure, so that no signal shows
+it."""
 
 from __future__ import annotations
 

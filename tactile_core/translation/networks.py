@@ -124,9 +124,7 @@ class Networks:
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
         """Return the expected largest node errors (T, 2) m of BioTac and DIGIT, of change (T, 19) counts.
-
-        rectified : (T,) bool, or one for all
-        """
+        rectified : (T,) bool, or one for all"""
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_source(self, displacement: np.ndarray) -> np.ndarray:
@@ -157,11 +155,9 @@ class Networks:
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one.
-
-        Rectified ones' is proportional to the sum of their changes: where the gains are not known and a real finger
-        shares its changes out among the electrodes otherwise than a simulated one, their pattern misleads.
-        """
+        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one. Rectified
+        ones' is proportional to the sum of their changes: where the gains are not known and a real finger shares its
+        changes out among the electrodes otherwise than a simulated one, their pattern misleads."""
         return in_blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
@@ -278,10 +274,8 @@ def shipped_folder(source: str | None = None) -> Path:
 
 
 def load(folder: str | os.PathLike | None = None, source: str | None = None) -> Networks:
-    """Read and verify a weights folder; None: the weights that ship for recordings of a sensor, ``source``.
-
-    raises: TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)
-    """
+    """Read and verify a weights folder; None: the weights that ship for recordings of a sensor, ``source``. raises:
+    TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)"""
     shipped, folder = folder is None, Path(folder or shipped_folder(source))
     card, digest = read_card(folder)
     if shipped and folder == WEIGHTS_FOLDER and digest != SHIPPED_CARD_SHA256:

@@ -32,11 +32,9 @@ class Posterior:
 
     @property
     def likely(self) -> np.ndarray:
-        """State (T, STATE) float32 of the most plausible contact, not the average of all.
-
-        From the place of the heaviest component the mean shifts (Cheng 1995) over the components that share it: several
-        often describe one contact, and each alone is less certain.
-        """
+        """State (T, STATE) float32 of the most plausible contact, not the average of all. From the place of the
+        heaviest component the mean shifts (Cheng 1995) over the components that share it: several often describe one
+        contact, and each alone is less certain."""
         state = self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
         touched = touches(state)
         for _ in range(MEAN_SHIFTS):
@@ -45,10 +43,8 @@ class Posterior:
 
     def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
         """Return the mean (T, STATE) over components, weighted by their density at places (T, PLACE).
-
         touched : (T,) bool, whether those in contact count or those without: the latter's place is zero, where contacts
-            lie too
-        """
+            lie too"""
         spread = self.spread[..., :PLACE].astype(np.float64)
         far = (place[:, None] - self.mean[..., :PLACE]) / spread
         share = np.log(np.maximum(self.weight, np.finfo(np.float32).tiny)) - np.log(spread).sum(-1)

@@ -1,7 +1,5 @@
-"""Store a few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match.
-
-They ship with the weights as ``signals.safetensors``, whose hash is in the card under "signals".
-"""
+"""Store a few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match. They ship
+with the weights as ``signals.safetensors``, whose hash is in the card under "signals"."""
 
 from __future__ import annotations
 
@@ -31,10 +29,8 @@ TRIES = 2_000  # readings made up to find the match's own bias
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
-    """Typical signals (P, 19) counts, signed; bias : log gain (19,) by which simulated signals match themselves.
-
-    There is a bias for signed and for rectified readings: a typical signal is a mean of signals, so it is smaller.
-    """
+    """Typical signals (P, 19) counts, signed; bias : log gain (19,) by which simulated signals match themselves. There
+    is a bias for signed and for rectified readings: a typical signal is a mean of signals, so it is smaller."""
 
     typical: np.ndarray
     bias_signed: np.ndarray
@@ -51,10 +47,8 @@ def touching(change: np.ndarray) -> np.ndarray:
 
 
 def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
-    """Compute typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale.
-
-    Raises TactileError where too few of them are contacts.
-    """
+    """Compute typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale. Raises
+    TactileError where too few of them are contacts."""
     random = np.random.default_rng(seed)
     signal = np.asarray(signal, np.float64)
     signal = signal[touching(signal)]
@@ -96,10 +90,8 @@ def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
 
 
 def read(folder: str | os.PathLike) -> ReferenceSignals:
-    """Read the typical signals of a weights folder.
-
-    Raises TactileError: a card without them, or a file that is missing, changed or of another shape.
-    """
+    """Read the typical signals of a weights folder. Raises TactileError: a card without them, or a file that is
+    missing, changed or of another shape."""
     card, _ = weights.read_card(folder)
     entry: Any = card.get("signals")
     whole = isinstance(entry, dict) and isinstance(entry.get("sha256"), str)

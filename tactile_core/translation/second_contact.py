@@ -1,7 +1,5 @@
-"""Tell two contacts at once apart, and translate the weaker one.
-
-A network divides the signals into those of each contact; the networks for one contact then read each part.
-"""
+"""Tell two contacts at once apart, and translate the weaker one. A network divides the signals into those of each
+contact; the networks for one contact then read each part."""
 
 from __future__ import annotations
 
@@ -23,9 +21,7 @@ PARTED = 0.25  # of the signal's length, the unit of half the difference between
 
 class SecondContact(NamedTuple):
     """Second contacts of some rows (n,), and what all frames have of them.
-
-    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e); center : (T, 2) m; force : (T, 3) N
-    """
+    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e); center : (T, 2) m; force : (T, 3) N"""
 
     rows: np.ndarray
     skin: np.ndarray
@@ -37,9 +33,7 @@ class SecondContact(NamedTuple):
 
 def told_apart(nets: Networks, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the changes (T, e) counts by the stronger contact and by the weaker, NaN where there is one.
-
-    unsigned : (T,) bool, frames whose signs are lost, which are left whole
-    """
+    unsigned : (T,) bool, frames whose signs are lost, which are left whole"""
     tensors, blocks = nets.tensors[PARTS], nets.sizes[PARTS]["blocks"]
     change = np.asarray(change, np.float32)
     seen = np.concatenate([compress(change), compress(np.float32(FINE) * change)], -1)
@@ -57,10 +51,8 @@ def second_contact(
     stiffness: float,
 ) -> SecondContact:  # fmt: skip
     """Translate the weaker of two contacts by its changes (T, e), NaN where there is none, each frame alone.
-
     silent : (T,) bool, frames without a first contact, which have no second; mounted : moves gels (n, M, 3) m by the
-    mount's shift; least : m, what a gel's deepest node moves by at least; stiffness : of `Signals`
-    """
+    mount's shift; least : m, what a gel's deepest node moves by at least; stiffness : of `Signals`"""
     center, force = np.full((len(change), 2), np.nan, np.float32), np.zeros((len(change), 3), np.float32)
     rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
     if not len(rows):

@@ -56,9 +56,7 @@ FIRST = 64  # patterns, the most similar to the signal, that one of the two is l
 @dataclass(frozen=True)
 class Patterns:
     """Simulated contacts: signals (P, e) float64 counts; units (P, e), of length one; alike (P, P), their cosines.
-
-    drift : (e,), of length one: the change where the fluid's conductivity changes
-    """
+    drift : (e,), of length one: the change where the fluid's conductivity changes"""
 
     signals: np.ndarray
     units: np.ndarray
@@ -81,10 +79,8 @@ def shipped_patterns(sensor: str = SOURCE) -> Patterns:
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
     """Return the shares (T, 3) of changes (T, 19) counts that the best pattern, the best two, and drift do not explain.
-
     change : of a typical unit; patterns : of the sensor, None for a BioTac's
-    rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN
-    """
+    rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN"""
     patterns = patterns or shipped_patterns()
     found = np.full((len(change), 3), np.nan)
     length = np.sqrt(np.square(change, dtype=np.float64).sum(axis=1))
@@ -103,9 +99,7 @@ def two_contacts(shares: np.ndarray) -> np.ndarray:
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Mark (T,) bool the frames that resemble no simulated contact, or drift more, by ``residual_shares`` (T, 3).
-
-    change : (T, 19) counts; of a faint one, noise leaves a larger share
-    """
+    change : (T, 19) counts; of a faint one, noise leaves a larger share"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)
     return one > np.minimum(np.sqrt(UNLIKE**2 + change.shape[1] * NOISE**2 / square), by_drift)
@@ -118,10 +112,8 @@ def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
 
 
 def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarray, np.ndarray]:
-    """Return the residual lengths (T,) of unit signals (T, 19) after fitting the best pattern, and the best two.
-
-    Two are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal.
-    """
+    """Return the residual lengths (T,) of unit signals (T, 19) after fitting the best pattern, and the best two. Two
+    are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal."""
     alike, near = patterns.alike, signals @ patterns.units.T
     one = np.sqrt(np.maximum(1 - np.square(near.max(axis=1, initial=0)), 0))
     two = one.copy()
@@ -140,9 +132,7 @@ def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Restore the signs of changes (T, 19) counts where they are certain; also return the frames (T,) left rectified.
-
-    rectified : (T,) bool, those that have lost their signs; patterns : of the sensor, None for a BioTac's
-    """
+    rectified : (T,) bool, those that have lost their signs; patterns : of the sensor, None for a BioTac's"""
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)
     if not len(rows):

@@ -31,9 +31,7 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 
 class Decoded(NamedTuple):
     """Translated frames (T,) of a recording, with their times (T,) s, signals and evidence.
-
-    state : (T, STATE) of the tracked contact; None where each frame is estimated alone
-    """
+    state : (T, STATE) of the tracked contact; None where each frame is estimated alone"""
 
     frames: np.ndarray
     time: np.ndarray
@@ -44,10 +42,8 @@ class Decoded(NamedTuple):
 
 
 class RecordingPass:
-    """Takes prepared frames of a recording, some at a time, through tracking and decoding.
-
-    What it returns of a frame does not depend on which others are asked for.
-    """
+    """Takes prepared frames of a recording, some at a time, through tracking and decoding. What it returns of a frame
+    does not depend on which others are asked for."""
 
     def __init__(self, translator: Translator, read: Read, count: int) -> None:
         """Take read(frames), which gives their times and signals; count : frames of the whole recording."""
@@ -75,9 +71,7 @@ def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> Rec
 
 class PreparedRows:
     """Rows of a recording in memory, prepared: of a long one only those that some frames need.
-
-    recording, signals : of the rows alone, prepared by all of the recording; count : frames of the whole recording
-    """
+    recording, signals : of the rows alone, prepared by all of the recording; count : frames of the whole recording"""
 
     def __init__(
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,

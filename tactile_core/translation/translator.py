@@ -93,9 +93,7 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 class Translator:
     """Verified networks that encode signals and decode contacts.
-
-    card : their model card; sha256 : of the card, which names all weights
-    """
+    card : their model card; sha256 : of the card, which names all weights"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
         """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
@@ -110,10 +108,8 @@ class Translator:
         self._unrolled = surface.unrolled_nodes(self.source)
 
     def encode(self, signals: Signals) -> Evidence:
-        """Return each frame's own posterior of its contact, and what tracking and decoding need beside it.
-
-        Raises TactileError for another sensor's signals.
-        """
+        """Return each frame's own posterior of its contact, and what tracking and decoding need beside it. Raises
+        TactileError for another sensor's signals."""
         change, unsigned = self.changes(signals)
         whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
         if self.answer.contacts > 1:
@@ -126,10 +122,8 @@ class Translator:
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
-
         frames : (T,) in the recording, whose numbers are the only seeds; stiffness : of `Signals`
-        sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N
-        """
+        sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
         states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
         center = gel_place.on_gel(self.nets.frames["MVD"], flat[:, :PLACE]) + self.answer.mount_shift
@@ -140,10 +134,7 @@ class Translator:
 
     def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
         """Return what the networks see: changes (T, e) counts, with signs where they are known, and the frames (T,)
-        that are left rectified.
-
-        Raises TactileError for another sensor's signals.
-        """
+        that are left rectified. Raises TactileError for another sensor's signals."""
         return recovered(self._typical(signals), _rectified(signals), self._patterns)
 
     def _typical(self, signals: Signals) -> np.ndarray:
@@ -160,10 +151,8 @@ class Translator:
 
     def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:
         """Translate frames with their own evidence; a frame's numbers do not depend on its neighbours.
-
         state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
-            says
-        """
+            says"""
         nets, rectified, alone = self.nets, evidence.rectified, state is None
         change = np.asarray(self._typical(signals), np.float32)
         latent_signal, unsigned = evidence.latent, evidence.unsigned
@@ -211,10 +200,8 @@ class Translator:
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
-
         displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts, changes against
-        rest. All are zero where no node of the gel moves as far as noise alone makes the networks move one.
-        """
+        rest. All are zero where no node of the gel moves as far as noise alone makes the networks move one."""
         nets = self.nets
         skin = nets.m2m_back(nets.encode_target(displacement))
         found = {
@@ -230,9 +217,7 @@ class Translator:
         self, signals: Signals, change: np.ndarray, predicted: np.ndarray, rectified: np.ndarray
     ) -> np.ndarray:
         """Share (T,) of typical changes (T, e) that predicted ones (T, e) explain as the unit's own; see `Translation`.
-
-        Rectified ones (T,) bool are compared without signs.
-        """
+        Rectified ones (T,) bool are compared without signs."""
         at = self.card.get(REST, sensors.typical_rest(self.source))
         own, told = (signals.of_typical(each, at) for each in (change, predicted))
         own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
@@ -263,10 +248,8 @@ class Translator:
     def _confidence(
         self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray, explained: np.ndarray
     ) -> np.ndarray:
-        """Confidence (T,); see `Translation`. explained : (T,), NaN without contact.
-
-        Each distance to the training's signals takes off nothing up to its 95 % quantile, all at the outermost.
-        """
+        """Confidence (T,); see `Translation`. explained : (T,), NaN without contact. Each distance to the training's
+        signals takes off nothing up to its 95 % quantile, all at the outermost."""
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         near = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))

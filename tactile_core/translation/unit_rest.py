@@ -82,10 +82,8 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
 
 
 def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
-    """Read the rest of a unit from a recording of it untouched.
-
-    Raises TactileError for a recording that is not raw, or in which an electrode moves as no drift moves it.
-    """
+    """Read the rest of a unit from a recording of it untouched. Raises TactileError for a recording that is not raw, or
+    in which an electrode moves as no drift moves it."""
     recording = read(path, columns)
     readings = _raw(recording)
     spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)

@@ -1,8 +1,5 @@
-"""Read and write network weights: safetensors files, without the safetensors library, and their model card.
-
-Format: https://github.com/huggingface/safetensors#format. Nothing in it is executed:
-a hostile file can only be refused.
-"""
+"""Read and write network weights: safetensors files, without the safetensors library, and their model card. Format:
+https://github.com/huggingface/safetensors#format. Nothing in it is executed: a hostile file can only be refused."""
 
 from __future__ import annotations
 
@@ -58,10 +55,8 @@ def to_safetensors(tensors: dict[str, np.ndarray]) -> bytes:
 
 def from_safetensors(data: bytes, where: str | os.PathLike) -> dict[str, np.ndarray]:
     """Decode arrays by name, in the dtype of the file, from the bytes of a safetensors file.
-
     where : name of the file for the message
-    raises: TactileError if anything about the file is not as the format says
-    """
+    raises: TactileError if anything about the file is not as the format says"""
     header, body = _split(data, where)
     arrays: dict[str, np.ndarray] = {}
     spans = []
@@ -147,10 +142,7 @@ def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.P
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """Read the bytes of a weights file.
-
-    raises: TactileError if it is not there, cannot be read or is far too large
-    """
+    """Read the bytes of a weights file. raises: TactileError if it is not there, cannot be read or is far too large"""
     try:
         path = outside.inside(Path(path).parent, Path(path).name, "a weights file")
         return outside.read(path, MAX_FILE_BYTES, "a weights file")
@@ -161,11 +153,9 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def read_verified(
     path: str | os.PathLike, expected_sha256: str, shapes: dict[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Read arrays of a safetensors file whose hash and tensor shapes are known.
-
-    For an intact file of other shapes the error names the shapes, which says more than the hash. raises: TactileError
-    naming the file or tensor, what was found and what was expected
-    """
+    """Read arrays of a safetensors file whose hash and tensor shapes are known. For an intact file of other shapes the
+    error names the shapes, which says more than the hash. raises: TactileError naming the file or tensor, what was
+    found and what was expected"""
     data = read_bytes(path)
     found = sha256(data)
     if found == expected_sha256:
@@ -198,9 +188,7 @@ def card_bytes(card: dict) -> bytes:
 
 def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
     """Read a weights folder's model card and the SHA-256 of its bytes, which pins every file and so names the weights.
-
-    raises: TactileError if it is missing, not JSON, or of another format
-    """
+    raises: TactileError if it is missing, not JSON, or of another format"""
     path = Path(folder) / CARD_NAME
     data = read_bytes(path)
     try:

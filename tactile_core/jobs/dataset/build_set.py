@@ -43,9 +43,7 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 @dataclass(frozen=True)
 class Asked:
     """Options of a data set. layouts : names of ``export.layouts``; place : executor of a job's tasks in its folder
-
-    say : told sentences; bar : (name, unit) -> context of a callback (done, in all)
-    """
+    say : told sentences; bar : (name, unit) -> context of a callback (done, in all)"""
 
     layouts: Sequence[str]
     place: Callable[[Path], runs.Place]
@@ -58,11 +56,9 @@ class Asked:
 
 
 def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> dict[str, str]:
-    """Make the data set `out` of the recordings in a folder; what is there already is kept.
-
-    Returns what was set aside, and why. Raises TactileError for another set's folder, for files of others in `out`,
-    where no recording can be translated, and for a disk that cannot be written.
-    """
+    """Make the data set `out` of the recordings in a folder; what is there already is kept. Returns what was set aside,
+    and why. Raises TactileError for another set's folder, for files of others in `out`, where no recording can be
+    translated, and for a disk that cannot be written."""
     found = collect(recipe, folder, out)
     _check_out(out)
     for line in _counted(recipe, found):

@@ -45,9 +45,7 @@ class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Division into train and test, by a label whose values stay together.
-
-    test : values that are held out; apart : label of frames by which the card's classifiers hold out, `by` if empty
-    """
+    test : values that are held out; apart : label of frames by which the card's classifiers hold out, `by` if empty"""
 
     by: str = ""
     test: list[str] = []

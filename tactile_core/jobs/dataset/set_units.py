@@ -55,10 +55,8 @@ def calibrated(
     recipe: Recipe, files: list[File], folder: Path, out: Path, weights: str | None, say: Callable[[str], None]
 ) -> SensorFile | None:
     """Return the unit's calibration, found as the recipe says; None where each recording is read by itself.
-
     out : file that keeps it; one of the same recordings, rest and recipe is taken as it is
-    Raises TactileError for a rest that is missing or not the same for all files, and where nothing is found.
-    """
+    Raises TactileError for a rest that is missing or not the same for all files, and where nothing is found."""
     how = recipe.unit
     if how.found == "none":
         return None

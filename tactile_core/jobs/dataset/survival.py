@@ -44,10 +44,8 @@ def installed() -> bool:
 
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
     """Tell a label by each kind of numbers, with whole groups of recordings left out.
-
     apart : label whose values are left out together; without it single recordings (of snapshots, tenths of each)
-    Needs scikit-learn. Returns no row where the label has one value or too few examples.
-    """
+    Needs scikit-learn. Returns no row where the label has one value or too few examples."""
     told = [(one, one.told[task]) for one in summaries if task in one.told]
     labels = np.concatenate([texts for _, texts in told]) if told else np.array([])
     groups = np.concatenate([_groups(one, len(texts), apart) for one, texts in told]) if told else labels

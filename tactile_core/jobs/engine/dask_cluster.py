@@ -220,11 +220,9 @@ def wait() -> float:
 
 @functools.cache
 def loop() -> Any:
-    """Start a tornado loop that runs in a thread as long as this process.
-
-    Dask starts one by itself, but gives up after 10 s whatever its settings are: too little on a machine that is very
-    busy (seen). Raises TactileError where it does not start.
-    """
+    """Start a tornado loop that runs in a thread as long as this process. Dask starts one by itself, but gives up after
+    10 s whatever its settings are: too little on a machine that is very busy (seen). Raises TactileError where it does
+    not start."""
     from tornado.ioloop import IOLoop
 
     began, found = threading.Event(), []

@@ -42,10 +42,8 @@ class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def find(words: Sequence[str], out: Path) -> list[Path]:
-    """Return the recordings that `words` name, in that order, each once; files in the folder `out` are ignored.
-
-    Raises TactileError for a word that names nothing, and for a glob that would go through a folder again and again.
-    """
+    """Return the recordings that `words` name, in that order, each once; files in the folder `out` are ignored. Raises
+    TactileError for a word that names nothing, and for a glob that would go through a folder again and again."""
     own = out.resolve()
     within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
     found: dict[Path, None] = {}

@@ -28,9 +28,7 @@ Start = Callable[[], "subprocess.Popen[str]"]
 
 class Local:
     """Pool of `workers` processes for the job in `folder`, each with one thread.
-
-    restart : tasks that one does before it is replaced; command : starts one, the folder's name is added
-    """
+    restart : tasks that one does before it is replaced; command : starts one, the folder's name is added"""
 
     def __init__(
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None

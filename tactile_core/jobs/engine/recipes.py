@@ -95,10 +95,8 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to one recording for each input, which has its own values; see ``jobs.simulate``.
-
     seed : of the first; each has one more than that before it; values : name -> value, an input each
-    keep : words of ``scene_recording.outputs``
-    """
+    keep : words of ``scene_recording.outputs``"""
 
     seed: int
     values: list[dict[str, float | str]]
@@ -133,10 +131,8 @@ MODULES: dict[Any, str] = {
 @dataclasses.dataclass(frozen=True)
 class InputFacts:
     """Facts known of an input. shards : their number; frames : of a recording
-
     warnings : reads those to report, which takes longer than the rest; TactileError where the input is damaged
-    bytes : about, of all its shards; 0 where that is not known before they are there
-    """
+    bytes : about, of all its shards; 0 where that is not known before they are there"""
 
     shards: int
     frames: int = 0

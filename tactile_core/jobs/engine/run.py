@@ -88,10 +88,8 @@ def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
 
 def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
     """Do the tasks of a job that are not done yet, or part i of n of them; call inside `opened`.
-
     progress : called with (tasks done, tasks known so far)
-    Raises TactileError when the disk cannot be written.
-    """
+    Raises TactileError when the disk cannot be written."""
     try:
         return _run(folder, job, place, part, progress)
     except OSError as error:
@@ -201,10 +199,8 @@ def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
     """Do a whole job, yield its folder to be put together into `out`, and remove it once that is done.
-
     place : where the tasks are done, from the folder. Raises TactileError for the first task that could not be done,
-    and what `begun` and `run` raise.
-    """
+    and what `begun` and `run` raise."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)
         for name, why in sorted(done.aside.items()):

@@ -44,10 +44,8 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Outcome of a task.
-
     made : False where it was there already; shards : that follow, of an input's first task
-    failure : why it cannot be done; stop : no other task can be done either
-    """
+    failure : why it cannot be done; stop : no other task can be done either"""
 
     made: bool = False
     shards: int = 0
@@ -62,11 +60,9 @@ def name(job: jobs.Job, task: Task) -> str:
 
 
 def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
-    """Do a task of the job in `folder`; both sides plain data, so that JSON and Dask carry them alike.
-
-    Never raises what the task's input or the disk brings about: the reply says it. From here on this process, which
-    may be anybody's, keeps linear algebra in one thread, as the bytes would else depend on who does the task.
-    """
+    """Do a task of the job in `folder`; both sides plain data, so that JSON and Dask carry them alike. Never raises
+    what the task's input or the disk brings about: the reply says it. From here on this process, which may be
+    anybody's, keeps linear algebra in one thread, as the bytes would else depend on who does the task."""
     _one_thread_once()
     reply = _run(Path(folder), msgspec.convert(task, Task))
     return msgspec.to_builtins(reply)

@@ -24,10 +24,8 @@ def export(
     job: str | os.PathLike, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None]
 ) -> finished_job.Finished:
     """Write the finished job in a folder as `layout` into the new folder `out`, whole or not at all.
-
     progress : called with (frames done, frames in all)
-    Raises TactileError: a job that is not finished, an unknown layout, an existing folder, a full disk.
-    """
+    Raises TactileError: a job that is not finished, an unknown layout, an existing folder, a full disk."""
     if layout not in layouts():
         raise TactileError("--to", repr(layout), " or ".join(layouts()))
     source = finished_job.load(Path(job))

@@ -92,12 +92,9 @@ class FrameServer:
 
 
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
-    """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
-
-    Of the header: frame, its index; force_n and confidence 0..1, null where they are not known; flags, bits of
-    ``recordings.flags``; trust, what they say in words; latency_s, from the newest row to the picture; arrays, a name,
-    a type of numpy's and a shape each.
-    """
+    """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row. Of the header: frame, its index;
+    force_n and confidence 0..1, null where they are not known; flags, bits of ``recordings.flags``; trust, what they
+    say in words; latency_s, from the newest row to the picture; arrays, a name, a type of numpy's and a shape each."""
     known = math.isfinite(shown.newtons + shown.confidence)  # JSON has no NaN
     header = {
         "format": FORMAT,

@@ -51,9 +51,7 @@ class Shown:
 
 class View:
     """Translation of arriving rows to pictures: always of the newest; older ones that came meanwhile are skipped.
-
-    signals : what is known of rest and polarity; frames, passed : that came, and of them passed over
-    """
+    signals : what is known of rest and polarity; frames, passed : that came, and of them passed over"""
 
     def __init__(
         self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None

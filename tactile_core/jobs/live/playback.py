@@ -43,11 +43,9 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """Return the rows that came since the last call; None where none did, or where too many are bad.
-
-        Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row that
-        names another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN.
-        """
+        """Return the rows that came since the last call; None where none did, or where too many are bad. Raises
+        TactileError for a file that became shorter or another one, for one that is no recording, for a row that names
+        another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN."""
         data = self._new_bytes()
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
         if len(self._rest) > MAX_LINE:
@@ -138,9 +136,7 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
 
 def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield new rows of a growing file and their arrival time, s; None now and then while no row comes.
-
-    idle : s without a row after which it ends; None: never. Raises what `Growing.poll` raises.
-    """
+    idle : s without a row after which it ends; None: never. Raises what `Growing.poll` raises."""
     growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()

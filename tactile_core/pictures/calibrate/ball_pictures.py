@@ -29,10 +29,8 @@ WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors d
 
 
 class BallPictures(abc.ABC):
-    """Gel and camera of one calibration under a ball; what makes the light is the subclass's.
-
-    Raises TactileError for a camera that sees past the gel's window.
-    """
+    """Gel and camera of one calibration under a ball; what makes the light is the subclass's. Raises TactileError for a
+    camera that sees past the gel's window."""
 
     def __init__(self, calibration: Calibration) -> None:
         check_covered(calibration.camera.surface, calibration.camera)
@@ -50,9 +48,7 @@ class BallPictures(abc.ABC):
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the change (3, H, W) of each LED's light by a press, relative to its light on a coating that faces it.
-
-        ball : right, down, depth, radius, m
-        """
+        ball : right, down, depth, radius, m"""
         heights = self.heights(ball)
         seen = self._view(heights)
         light = self.spread(self._changed(heights, seen))

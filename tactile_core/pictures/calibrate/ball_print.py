@@ -24,9 +24,8 @@ SPHERE_TO = 0.9  # of the radius: beyond, the ball's profile goes on as a cone, 
 @dataclasses.dataclass(frozen=True)
 class _Table:
     """Prints of one ball.
-
-    radius : m; depths : (n,) m; coefficients : (n, k) of the spline of rise / depth by distance / sqrt(2 radius depth)
-    """
+    radius : m; depths : (n,) m; coefficients : (n, k) of the spline of rise / depth by distance / sqrt(2 radius
+        depth)"""
 
     radius: float
     depths: np.ndarray

@@ -152,10 +152,8 @@ def fit_unit(
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
     """Fit a unit, as ``fit.calibrate``, and evaluate what fits of the other thirds make of each press.
-
     reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
-    Raises TactileError for photographs that lie another way, and what ``fit.calibrate`` raises.
-    """
+    Raises TactileError for photographs that lie another way, and what ``fit.calibrate`` raises."""
 
     def part(first: int, last: int) -> Progress:
         return lambda done, total: progress(first + (last - first) * done // total, 100)

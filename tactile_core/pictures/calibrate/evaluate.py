@@ -1,7 +1,5 @@
 """Evaluate a calibration on photographs: fit place and depth of each press, compare the picture with the photograph.
-
-The baseline stands beside each metric: the background alone, as if nothing had touched the gel.
-"""
+The baseline stands beside each metric: the background alone, as if nothing had touched the gel."""
 
 from __future__ import annotations
 
@@ -61,10 +59,8 @@ def evaluate_unit(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate a calibration on each press of the photographs; radius : m, of the balls that name none.
-
     pictures : what makes a unit's; places and depths are found by the fast ones
-    Raises TactileError for photographs of another shape than the calibration's pictures.
-    """
+    Raises TactileError for photographs of another shape than the calibration's pictures."""
     unit = fitted_size(calibration, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
     working = FastPictures(unit.at_size(unit.camera.width // factor, unit.camera.height // factor))
@@ -156,9 +152,7 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
     """Make a row a metric, means over presses, and a row a metric and press, with where each ball was found.
-
-    name : of the set of photographs
-    """
+    name : of the set of photographs"""
     ours, baseline = mean_metrics(tried)
     means, by_press = [], []
     for metric, (unit, target, better) in TARGETS.items():

@@ -1,7 +1,5 @@
-"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method.
-
-On the fast picture first, then on Mitsuba's own, which has the light of one bounce too.
-"""
+"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method. On the fast picture first,
+then on Mitsuba's own, which has the light of one bounce too."""
 
 from __future__ import annotations
 
@@ -37,9 +35,7 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
     """Result of a calibration.
-
-    calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences
-    """
+    calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
 
     calibration: Calibration
     tried: list[Evaluation]
@@ -215,10 +211,8 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Standard errors by name, and the names of parameters that the photographs do not determine.
-
-        The errors count what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR.
-        """
+        """Standard errors by name, and the names of parameters that the photographs do not determine. The errors count
+        what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR."""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]

@@ -57,10 +57,8 @@ class Press:
 @dataclasses.dataclass(frozen=True)
 class Photographs:
     """Photographs of one unit, prepared.
-
     background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
-    untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel
-    """
+    untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel"""
 
     folder: Path
     presses: tuple[Press, ...]
@@ -136,11 +134,9 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half.
-
-    The median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third
-    of the pictures pull the plain median by up to that much.
-    """
+    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half. The
+    median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third of
+    the pictures pull the plain median by up to that much."""
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
     rest = np.where(touched, np.nan, pictures.astype(np.float32))
@@ -151,9 +147,7 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
     """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses and less its means.
-
-    Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own.
-    """
+    Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own."""
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:
@@ -234,11 +228,9 @@ SOFTNESS = 3.0  # grey levels: what lies farther from the drift than twice that 
 
 
 def lighting_drift(change: np.ndarray) -> np.ndarray:
-    """Return the drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
-
-    By iteratively reweighted least squares with Geman and McClure's weights, from the median; a press that covers less
-    than half of the picture counts for next to nothing.
-    """
+    """Return the drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3). By
+    iteratively reweighted least squares with Geman and McClure's weights, from the median; a press that covers less
+    than half of the picture counts for next to nothing."""
     height, width = change.shape[:2]
     step = max(COARSE * width // 240, 1)
     rows, columns = height // step, width // step

@@ -68,10 +68,8 @@ class Ball(NamedTuple):
 
 class Sight:
     """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w).
-
     shown : (n, 3) levels of change of those that count; untouched : (n, 3) of the gel at rest, in that day's light
-    factor : by which the photograph is made smaller; None for that of fits
-    """
+    factor : by which the photograph is made smaller; None for that of fits"""
 
     def __init__(self, press: Press, factor: int | None = None) -> None:
         factor = factor or working_factor(press.picture.shape[1], press.picture.shape[0])
@@ -106,10 +104,8 @@ def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
     """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, levels squared.
-
     bench : in working pixels; radius : m, the ball's, or where its search starts
-    lit : whether light of the object through the coating is fitted as well (``missing_light``); else the unit's
-    """
+    lit : whether light of the object through the coating is fitted as well (``missing_light``); else the unit's"""
     problem = _PressProblem(bench, sight, radius, lit)
     starts = [
         np.array([*place, share * bench.deepest(radius), radius][: 4 if free_radius else 3])
@@ -168,11 +164,9 @@ def contact_radius(depth: float, radius: float) -> float:
 def missing_light(
     bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
 ) -> tuple[np.ndarray, float]:
-    """Fit how much more light comes through the coating of a photograph than of a ball's picture.
-
-    Returns what the picture with it misses (n, 3), grey levels, of the pixels that count; and that light, by least
-    squares, as a share of a coating's own that faces the LEDs
-    """
+    """Fit how much more light comes through the coating of a photograph than of a ball's picture. Returns what the
+    picture with it misses (n, 3), grey levels, of the pixels that count; and that light, by least squares, as a share
+    of a coating's own that faces the LEDs"""
     missed, slope = sight.missed(bench.change(ball)[sight.counts])
     white = slope * bench.white(ball)[sight.counts]
     more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)

@@ -21,10 +21,8 @@ SHALLOW = 0.3  # of the deepest press's change: a weaker one is the edge of anot
 
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:
-    """Return frames of a video, (H, W, 3) uint8 by name: of each press the deepest, and the untouched gel.
-
-    Raises TactileError for what OpenCV cannot read as a video, is too long or large, ModuleNotFoundError without it.
-    """
+    """Return frames of a video, (H, W, 3) uint8 by name: of each press the deepest, and the untouched gel. Raises
+    TactileError for what OpenCV cannot read as a video, is too long or large, ModuleNotFoundError without it."""
     installed.require("camera", "cv2")
     small = np.stack([_small(frame) for frame in _read(path)])
     change = np.abs(small - np.median(small, axis=0).astype(np.float32)).max(-1) > CHANGE

@@ -25,12 +25,9 @@ PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
 
 
 class GelLight:
-    """Radiance by one preset; scenes are made once, only the gel's vertices change.
-
-    Without the light that the coating spreads, which ``Renderer`` lays over (``coating_spread``).
-
-    surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers
-    """
+    """Radiance by one preset; scenes are made once, only the gel's vertices change. Without the light that the coating
+    spreads, which ``Renderer`` lays over (``coating_spread``).
+    surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers"""
 
     def __init__(
         self,
@@ -59,11 +56,9 @@ class GelLight:
         self._look(mi)
 
     def change_unit(self, unit: Calibration) -> None:
-        """Change to another unit with as many pixels: takes 10 ms, as the scene is not compiled again.
-
-        Its LEDs, camera, coating and index may differ in numbers, not in kind (a material's name; a sphere so small
-        that it is a point). Not for a preset of paths, nor with more lamps. Raises TactileError where it must not.
-        """
+        """Change to another unit with as many pixels: takes 10 ms, as the scene is not compiled again. Its LEDs,
+        camera, coating and index may differ in numbers, not in kind (a material's name; a sphere so small that it is a
+        point). Not for a preset of paths, nor with more lamps. Raises TactileError where it must not."""
         mi = activate(LLVM)
         mesh = GelMesh(unit.camera, self.preset.spacing)
         same = plugin_names(unit) == plugin_names(self.unit) and unit.camera.shape == self.unit.camera.shape

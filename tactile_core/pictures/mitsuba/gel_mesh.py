@@ -20,11 +20,9 @@ MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
 class GelMesh:
-    """Vertices and faces of height maps under one camera.
-
-    Mesh coordinates: right, up and toward the camera, mm. Where pixels are made square, up is scaled: straight lines
-    stay straight, so visibility is that of the real gel; lengths and angles along the picture are not.
-    """
+    """Vertices and faces of height maps under one camera. Mesh coordinates: right, up and toward the camera, mm. Where
+    pixels are made square, up is scaled: straight lines stay straight, so visibility is that of the real gel; lengths
+    and angles along the picture are not."""
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
         """Take spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
@@ -92,9 +90,7 @@ def triangle_mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, *
 
 def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
     """Give pixels whose rays have missed (H, W) bool the gel what their neighbours have in maps (H, W, ...), in place.
-
-    A ray in a million slips between two triangles. Raises TactileError where more have missed.
-    """
+    A ray in a million slips between two triangles. Raises TactileError where more have missed."""
     if missed.mean() > MOST_MISSED:
         found = f"{missed.sum()} of {missed.size} rays miss it"
         raise TactileError("gel mesh", found, "a gel that fills the picture", "Check heights and camera")
@@ -104,11 +100,9 @@ def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
-    """Refuse a mesh on which Mitsuba would crash or leave holes.
-
-    vertices (n, 3), faces (m, 3) ; count : how many vertices the scene was made with
-    Raises TactileError for another number of vertices, values that are not finite, or a face of a missing vertex.
-    """
+    """Refuse a mesh on which Mitsuba would crash or leave holes. vertices (n, 3), faces (m, 3) ; count : how many
+    vertices the scene was made with Raises TactileError for another number of vertices, values that are not finite, or
+    a face of a missing vertex."""
     if vertices.shape != (count, 3):
         raise TactileError("gel mesh, vertices", f"shape {vertices.shape}", f"({count}, 3)")
     if not np.isfinite(vertices).all():

@@ -1,8 +1,6 @@
 """A unit as a scene of Mitsuba's: coated gel, LEDs that shine, housing walls; in mm, right, up and toward the camera.
-
 Each LED shines in a band of its own: R, G and B of Mitsuba's spectra are the light of the red, green and blue LED. What
-the camera makes of them is the calibration's response. LEDs and coating lie in one medium, gel and acrylic.
-"""
+the camera makes of them is the calibration's response. LEDs and coating lie in one medium, gel and acrylic."""
 
 from __future__ import annotations
 
@@ -82,10 +80,8 @@ def plugin_names(unit: Calibration) -> list[str]:
 
 
 def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
-    """Give loaded LEDs and gel another unit's numbers; lights, gel : what ``traverse`` finds in their scenes.
-
-    Same plugins as before: nothing is compiled again.
-    """
+    """Give loaded LEDs and gel another unit's numbers; lights, gel : what ``traverse`` finds in their scenes. Same
+    plugins as before: nothing is compiled again."""
     for name, lamp in lamps(unit).items():
         if lamp["type"] == "point":
             lights[f"{name}.position"] = lamp["position"]
@@ -110,11 +106,9 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
 
 
 def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
-    """Return four black walls round gel and LEDs, from the gel's height up, that keep light from outside away.
-
-    Their places are matrices (4, 4). What the housing throws back near an LED is in that LED's fitted radius, which is
-    several times a chip's.
-    """
+    """Return four black walls round gel and LEDs, from the gel's height up, that keep light from outside away. Their
+    places are matrices (4, 4). What the housing throws back near an LED is in that LED's fitted radius, which is
+    several times a chip's."""
     lowest, highest = mesh.bounds()
     for led in unit.leds:
         place, reach = np.array(to_scene(led.position)), led.radius * MM + WALL_GAP
@@ -140,10 +134,8 @@ def to_scene(place: Sequence[float]) -> list[float]:
 @dataclasses.dataclass(frozen=True)
 class Lamp:
     """A sphere that shines evenly; 0 of radius is a point.
-
     position : (right, down, toward the camera), m, image frame; radius : m
-    brightness : radiance times squared radius in the bands of the red, green and blue LED, levels m^2
-    """
+    brightness : radiance times squared radius in the bands of the red, green and blue LED, levels m^2"""
 
     position: tuple[float, float, float]
     radius: float

@@ -35,10 +35,8 @@ def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[EmitterLight]:
     """Compute the light of each emitter at surface interactions, by a number of points on the emitter.
-
     scene : what stands in the way; phase : 0..1, turns the points, in shares of their distance
-    lobe : cosine of the half vector from which on light is left out, near the mirror's direction; None for none
-    """
+    lobe : cosine of the half vector from which on light is left out, near the mirror's direction; None for none"""
     import drjit as dr
 
     material, found = hit.bsdf(), []
@@ -64,10 +62,8 @@ def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
     """Radiance (n, 3) that n surface interactions show of light that came by one other place.
-
     meet : what rays meet; hit : each of them DIRECTIONS times, one behind the other
-    phase : 0..1 of each, turns its directions; lobe : as ``direct`` has it, of the other place
-    """
+    phase : 0..1 of each, turns its directions; lobe : as ``direct`` has it, of the other place"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS
@@ -152,10 +148,8 @@ def mirrored(
 
 
 def _deposited(cell: np.ndarray, light: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Light (3, n) summed over (h, w, 3), each shared among the four cells round its (column, row) of cell (2, n).
-
-    In numpy, where sums have one order: Mitsuba's threads would add in another each time.
-    """
+    """Light (3, n) summed over (h, w, 3), each shared among the four cells round its (column, row) of cell (2, n). In
+    numpy, where sums have one order: Mitsuba's threads would add in another each time."""
     some = light.any(0)
     light, (column, row) = light[:, some], cell[:, some]
     left, upper = np.floor(column).astype(int), np.floor(row).astype(int)

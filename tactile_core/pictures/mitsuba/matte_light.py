@@ -79,10 +79,8 @@ def direct_light(
     hits: Surface, seen: np.ndarray, points: Sequence[np.ndarray], unit: Calibration, *, soften: bool
 ) -> np.ndarray:
     """Return the radiance (H, W, L) float32, levels, of L LEDs on a matte coating.
-
     seen : (H, W) uint32, a bit a point; points : (n, 3) m of each LED, n <= 8, in the order of the bits
-    soften : even out the steps that few points leave in a shadow's edge, over 3 x 3 pixels
-    """
+    soften : even out the steps that few points leave in a shadow's edge, over 3 x 3 pixels"""
     positions, bit = np.array([led.position for led in unit.leds]), 0
     lit, radiance = lambert(hits, positions), np.empty((*hits.height.shape, len(positions)), np.float32)
     for k, (facing, cloud) in enumerate(zip(lit.facing, points, strict=True)):
@@ -96,9 +94,7 @@ def direct_light(
 
 def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
     """Cosine times distance of a light's middle becomes, in place, the mean over its points of those that are seen.
-
-    They are so close together that they differ in direction alone: n . (l + d), d from the middle to the point.
-    """
+    They are so close together that they differ in direction alone: n . (l + d), d from the middle to the point."""
     every = 2 ** len(cloud) - 1
     box = bounding_box(seen != every, margin=1)
     if box is None:
@@ -115,9 +111,7 @@ def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray,
 
 def light_points(led: Led, count: int) -> np.ndarray:
     """Return points (count, 3) m, image frame, round the light's middle, in the plane that faces the picture's middle.
-
-    A ring with the second moments of an even disc, the best of a few points: radius sqrt(1/2).
-    """
+    A ring with the second moments of an even disc, the best of a few points: radius sqrt(1/2)."""
     angle = 2 * np.pi * np.arange(count) / count
     return led.position + led.radius * np.sqrt(0.5) * _across(led, np.cos(angle), np.sin(angle))
 
@@ -154,9 +148,7 @@ def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
     """Return the radiance (H, W, 3) float32 that the gel's own light adds to what pixels see.
-
-    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : what they see
-    """
+    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : what they see"""
     camera, step = unit.camera, gather.step
     spacing = camera.pixel_size[0] * step, camera.pixel_size[1] * step
     first = step // 2
@@ -202,10 +194,8 @@ def irradiance(
     height: np.ndarray, radiance: np.ndarray, margin: int, spacing: tuple[float, float], gather: Gather
 ) -> np.ndarray:
     """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
-
     height : (h, w) m; radiance : (h, w, 3); margin : places on each side that only give light, as far as is looked
-    spacing : (right, down) m
-    """
+    spacing : (right, down) m"""
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)
     inside = slice(margin, -margin), slice(margin, -margin)
     slopes = [slope[inside] for slope in np.gradient(height, spacing[1], spacing[0])]
@@ -231,10 +221,8 @@ def irradiance(
 
 
 def _weight(tangent: np.ndarray, aside: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Cosine-weighted solid angle below an elevation, a radian of azimuth: integral of (n . w) cos(e) de from -90.
-
-    With w = (cos e, sin e) in the plane of the azimuth and n = (aside, level) there; up to a constant.
-    """
+    """Cosine-weighted solid angle below an elevation, a radian of azimuth: integral of (n . w) cos(e) de from -90. With
+    w = (cos e, sin e) in the plane of the azimuth and n = (aside, level) there; up to a constant."""
     share = tangent / (1 + tangent * tangent)
     return 0.5 * (aside * (np.arctan(tangent) + share) + level * (tangent * share))
 

@@ -44,10 +44,8 @@ _TAGS = {
 
 
 def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
-    """Return the files of a scene: itself, the gel's shape and what the camera does beside it.
-
-    Raises TactileError for another ending than .xml.
-    """
+    """Return the files of a scene: itself, the gel's shape and what the camera does beside it. Raises TactileError for
+    another ending than .xml."""
     path = Path(path)
     if path.suffix != ".xml":
         raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
@@ -55,10 +53,8 @@ def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
 
 
 def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarray) -> None:
-    """Write the scene of heights (H, W) m of the unit's own gel; each file appears whole or not at all.
-
-    Raises TactileError for another ending than .xml and for heights that are not finite.
-    """
+    """Write the scene of heights (H, W) m of the unit's own gel; each file appears whole or not at all. Raises
+    TactileError for another ending than .xml and for heights that are not finite."""
     path, shape, eye = scene_files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
     check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)

@@ -1,8 +1,6 @@
-"""Mitsuba's part: where pixels' rays meet the gel, and which light points are seen from there.
-
-One persistent scene a tracer; only the gel's vertices change. Both variants trace the same mesh with the same rays, so
-they agree but for rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md).
-"""
+"""Mitsuba's part: where pixels' rays meet the gel, and which light points are seen from there. One persistent scene a
+tracer; only the gel's vertices change. Both variants trace the same mesh with the same rays, so they agree but for
+rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
 
 from __future__ import annotations
 
@@ -44,10 +42,8 @@ class Tracer(abc.ABC):
     @abc.abstractmethod
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         """Return the places (H, W, 3) float32 m that pixels see, and what these see of points (n, 3) m, 1 <= n <= 32.
-
         shift : pixels to the right and down from each pixel's middle
-        Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front.
-        """
+        Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front."""
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
@@ -128,9 +124,7 @@ class _ScalarTracer(Tracer):
 
 
 def _mended(place: np.ndarray, seen: np.ndarray, mesh: GelMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Places (H, W, 3) in the image frame, m, and what is seen from them, without holes.
-
-    Where a ray misses the gel its place is the origin, where no ray leads. Raises TactileError as ``mend`` does.
-    """
+    """Places (H, W, 3) in the image frame, m, and what is seen from them, without holes. Where a ray misses the gel its
+    place is the origin, where no ray leads. Raises TactileError as ``mend`` does."""
     mend(np.logical_not(place.any(-1)), place, seen)
     return place * np.array([1 / MM, -1 / (MM * mesh.up_scale), 1 / MM], np.float32), seen

@@ -33,9 +33,7 @@ def air_over_window(camera: Camera, index: float) -> float:
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
     """Return the pinhole's apparent height, m above height zero, for pixels that look a distance, m, off its axis.
-
-    Snell's law through a flat window. A camera too near for its window to fit in keeps its height.
-    """
+    Snell's law through a flat window. A camera too near for its window to fit in keeps its height."""
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
@@ -51,9 +49,7 @@ def tangent(sine: np.ndarray) -> np.ndarray:
 
 def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -> np.ndarray:
     """Return the picture (H, W, k) of a pinhole as it looks through the window, float32.
-
-    height : (H, W) m of the gel that each pixel of the picture sees
-    """
+    height : (H, W) m of the gel that each pixel of the picture sees"""
     camera = unit.camera
     right, down = np.meshgrid(camera.right, camera.down)
     nearer = 1 - height / apparent_height(np.hypot(right, down), camera, unit.gel_index)
@@ -73,10 +69,8 @@ def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarra
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return starts and directions (3, n) float32 of rays, right, up, toward the camera, mm, looking at places (n,) m.
-
     right, down : on the plane of height zero. Rays start under the window. A camera too near for its window to fit in
-    has none.
-    """
+    has none."""
     camera, index = unit.camera, unit.gel_index
     air, window = air_over_window(camera, index), window_height(camera)
     if air <= 0:

@@ -57,10 +57,8 @@ class Stream:
 
 def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
     """Return the fingers with signals of the chosen topic, or of all; of a topic without any, the first.
-
     chosen : `split` of a path; its finger is returned alone, signals or not
-    Raises TactileError for a topic or finger that the bag has not.
-    """
+    Raises TactileError for a topic or finger that the bag has not."""
     topics, finger = _topics(bag, chosen)
     found: list[Stream] = []
     fingers = 0
@@ -117,10 +115,8 @@ def read_bag(
     bag: Bag, chosen: Chosen, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
     """Yield recordings of `frames` frames, each with the number of first frames that it repeats from the one before.
-
     Reads the chosen topic and finger, or the first with signals; a warning names the others. Raises TactileError for
-    messages that do not fit their type.
-    """
+    messages that do not fit their type."""
     first, *others = streams_of(bag, chosen)
     warnings = _warnings(bag, chosen, first, others)
     not_taken = _not_taken(bag, first)

@@ -1,7 +1,5 @@
-"""Decode ROS messages by their definitions, which are parsed and never compiled.
-
-The decoding library generates code from definitions; those of bags come from strangers.
-"""
+"""Decode ROS messages by their definitions, which are parsed and never compiled. The decoding library generates code
+from definitions; those of bags come from strangers."""
 
 from __future__ import annotations
 

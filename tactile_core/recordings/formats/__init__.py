@@ -31,10 +31,8 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
     """Build the recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
-
     Channels that the table leaves out are None, electrodes that it has not are dead channels. Raises TactileError for
-    another missing column, and the errors of ``assemble``.
-    """
+    another missing column, and the errors of ``assemble``."""
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)
         for channel, names in channels.items()

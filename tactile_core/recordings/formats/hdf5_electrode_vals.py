@@ -1,8 +1,5 @@
 """HDF5 with electrode_vals/data (T, 19) and, if present, contact_loc/data, force_vec/data (T, 3), indenter_type/data
-(T, ...).
-
-Such files hold no time stamps; 100 Hz is assumed, with a warning.
-"""
+(T, ...). Such files hold no time stamps; 100 Hz is assumed, with a warning."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
-"""MATLAB 5 of the Penn Haptic Adjective Corpus 2: F0Electrodes, F1Electrodes (19, T) of two fingers, 100 Hz.
-
-Also F0pac (22, T), F0pdc, F0tac, F0tdc (1, T), likewise F1; the gripper's channels are ignored.
-"""
+"""MATLAB 5 of the Penn Haptic Adjective Corpus 2: F0Electrodes, F1Electrodes (19, T) of two fingers, 100 Hz. Also F0pac
+(22, T), F0pdc, F0tac, F0tdc (1, T), likewise F1; the gripper's channels are ignored."""
 
 from __future__ import annotations
 

@@ -47,10 +47,8 @@ def _is_turned(shape: tuple[int, ...]) -> bool:
 
 def table_of(store: Store, wanted: Iterable[str]) -> Table:
     """Read the wanted columns, and the file's labels, to a table.
-
     wanted : names as of `names_of`; an array's name stands for all its columns. Raises TactileError for one that is
-    missing, and for arrays of other lengths than the first.
-    """
+    missing, and for arrays of other lengths than the first."""
     called = {name.lower(): name for name in store.shapes}
     columns: dict[str, np.ndarray] = {}
     held: dict[str, np.ndarray] = {}

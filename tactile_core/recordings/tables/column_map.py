@@ -1,8 +1,6 @@
-"""Map of a recording's columns whose names no layout knows: a TOML file that says which column is what.
-
-A column is one of a text table, a field of JSON records, or one of an array's. ``map_guess`` proposes a map, ``mapped``
-reads by it; ``write`` and ``read`` keep it in a file.
-"""
+"""Map of a recording's columns whose names no layout knows: a TOML file that says which column is what. A column is one
+of a text table, a field of JSON records, or one of an array's. ``map_guess`` proposes a map, ``mapped`` reads by it;
+``write`` and ``read`` keep it in a file."""
 
 from __future__ import annotations
 

@@ -31,10 +31,8 @@ DRIVER = {"17": {"pdc": "1", "tac": "2", "tdc": "3"}}
 
 def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]:
     """Guess the maps of a file's fingers, of which the first is to be read; without electrodes where none are found.
-
     names : of the columns, in lower case; of arrays with their lengths, of which those of the electrodes' are taken
-    table : some of the columns' rows
-    """
+    table : some of the columns' rows"""
     found = []
     for each in _series(names):
         near = _as_long(names, each)

@@ -139,9 +139,7 @@ def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
 
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
     """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns.
-
-    left_out : whether a column of that name is parsed but not held; of a file of more than WHOLE
-    """
+    left_out : whether a column of that name is parsed but not held; of a file of more than WHOLE"""
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
@@ -205,9 +203,7 @@ def _check_problems(path: str, problems: list[Problem], line: int) -> None:
 
 def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
     """Read the file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
-
-    Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`.
-    """
+    Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`."""
     file.seek(0)
     data = _whole_lines(path, file, file.read(part_bytes))
     lines = text_lines(path, data)

@@ -30,12 +30,9 @@ class Header:
 
     @classmethod
     def parse(cls, path: str, lines: Sequence[str]) -> Header:
-        """Parse the header of a text that starts with these lines.
-
-        Lines that begin with a comment's mark are passed over, but the last, where it names as many columns as follow,
-        as of ``np.savetxt`` and ``rostopic echo -p``. Raises TactileError for a text without a line, and for two
-        columns of one name.
-        """
+        """Parse the header of a text that starts with these lines. Lines that begin with a comment's mark are passed
+        over, but the last, where it names as many columns as follow, as of ``np.savetxt`` and ``rostopic echo -p``.
+        Raises TactileError for a text without a line, and for two columns of one name."""
         first, comment = _first_row(lines)
         if first is None:
             raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")

@@ -90,9 +90,7 @@ def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float
 
 def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tuple[int, int]]:
     """Return by how much exchanging two electrodes reduces the unexplained share of changes (n, 19) most, and which.
-
-    Where two are exchanged, what is left over of each goes with the other's simulated change and against its own.
-    """
+    Where two are exchanged, what is left over of each goes with the other's simulated change and against its own."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     chosen = unit(change)
     product = chosen.T @ _rebuilt(chosen, chosen @ patterns(sensor).T, sensor)
@@ -121,10 +119,8 @@ def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
 
 def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
     """Return measured over simulated pressure, the median of different contacts, and how many there are.
-
     change : (n, 19) counts in contact; pressure : (n,) Pa over rest, NaN where it was not measured
-    That of simulated contacts of nearly the size that are most alike, scaled to the size. (NaN, 0) where none is.
-    """
+    That of simulated contacts of nearly the size that are most alike, scaled to the size. (NaN, 0) where none is."""
     simulated, size = contact_pressures_of(sensor), np.linalg.norm(change, axis=1)
     judged = np.flatnonzero((size > PRESSED) & np.isfinite(pressure))
     if simulated is None or not len(judged):
@@ -153,9 +149,7 @@ def limit(contacts: int) -> float:
 
 def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = SOURCE) -> Doubt | None:
     """Return the doubt of changes in contact (n, 19) counts, of a typical unit; None where there is none.
-
-    pressure : (n,) Pa, of the fluid over its level at rest, NaN where it was not measured; None without
-    """
+    pressure : (n,) Pa, of the fluid over its level at rest, NaN where it was not measured; None without"""
     left, contacts = unexplained_share(change, sensor)
     enough, most = contacts >= FEWEST, limit(max(contacts, 1))
     if contacts and apart(change, sensor) >= FEWEST_APART:
@@ -201,11 +195,9 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
 
 
 def as_contact(level: np.ndarray, sensor: str) -> float | None:
-    """Return the share (0..1) of how a level differs from a typical unit at rest that one contact explains.
-
-    None where that is too little for a contact, and for a sensor without simulated contacts. The unit's conductivity is
-    free. level : (e,) counts
-    """
+    """Return the share (0..1) of how a level differs from a typical unit at rest that one contact explains. None where
+    that is too little for a contact, and for a sensor without simulated contacts. The unit's conductivity is
+    free. level : (e,) counts"""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None

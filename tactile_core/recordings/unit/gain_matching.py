@@ -25,10 +25,8 @@ PRIOR = 5.0
 @dataclass(frozen=True, eq=False)
 class Match:
     """Fitted gains and offsets.
-
     log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
-    alike : number of different typical signals matched; settled : true if the last iteration changed nothing
-    """
+    alike : number of different typical signals matched; settled : true if the last iteration changed nothing"""
 
     log_gain: np.ndarray
     offset: np.ndarray
@@ -39,10 +37,8 @@ class Match:
 
 def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float = PRIOR) -> Match:
     """Match frames in contact to typical signals.
-
     change : (n, 19) counts, absolute where `rectified`; typical : (P, 19) counts, signed
-    Rectified signals give no offset: it is folded away with the sign.
-    """
+    Rectified signals give no offset: it is folded away with the sign."""
     typical = np.abs(typical) if rectified else np.asarray(typical, np.float64)
     compressed = np.arcsinh(typical / SCALE)
     log_gain, offset = np.zeros(change.shape[1]), np.zeros(change.shape[1])
@@ -87,11 +83,9 @@ def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: fl
 def _over_contacts(
     values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted means (19,) of (n, 19), shrunk towards 0 by `prior`, and the weights' sums.
-
-    All frames with the same match count as one contact: a finger that rests on a table for a minute counts as much as
-    one that does so for a second.
-    """
+    """Weighted means (19,) of (n, 19), shrunk towards 0 by `prior`, and the weights' sums. All frames with the same
+    match count as one contact: a finger that rests on a table for a minute counts as much as one that does so for a
+    second."""
     groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
     weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))
     np.add.at(weights, index, weight)

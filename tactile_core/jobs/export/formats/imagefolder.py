@@ -1,7 +1,5 @@
-"""``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``: pictures as Hugging Face's ``datasets`` loads them.
-
-A row of metadata.csv is a picture: its file, recording, frame and time, the labels, and the numbers of the contact.
-"""
+"""``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``: pictures as Hugging Face's ``datasets`` loads them. A
+row of metadata.csv is a picture: its file, recording, frame and time, the labels, and the numbers of the contact."""
 
 from __future__ import annotations
 
