@@ -32,10 +32,9 @@ class Stopped(KeyboardInterrupt):
 def stopping() -> Iterator[None]:
     """Make stop signals raise Stopped inside the block; restore the former handlers after it.
 
-    A signal that is ignored (nohup) or handled by the program around us stays so. After the first signal the others
-    are ignored up to the block's end: `timeout` and terminals send two, and the second would cut the clean-up short.
-    Outside of the main thread, where Python allows no handlers, nothing changes.
-    """
+    A signal that is ignored (nohup) or handled by the program around us stays so. After the first signal the others are
+    ignored up to the block's end: `timeout` and terminals send two, and the second would interrupt the clean-up.
+    Outside the main thread, where Python allows no handlers, nothing changes."""
     numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
     ours = [number for number in numbers if signal.getsignal(number) is signal.SIG_DFL]
     if threading.current_thread() is not threading.main_thread():
@@ -125,7 +124,7 @@ def _stopped(stop: KeyboardInterrupt, left: str) -> int:
 
 
 def _check_out(options: argparse.Namespace) -> None:
-    """Refuse an empty --out, as a script's unset variable gives it: it would mean the current folder."""
+    """Refuse an empty --out, as from a script's unset variable: it would mean the current folder."""
     if getattr(options, "out", None) == "":
         raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
     for name in PATHS:

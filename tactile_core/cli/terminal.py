@@ -1,4 +1,4 @@
-"""Print a verb's output: results on stdout, everything else in single lines on stderr, and progress."""
+"""Print a verb's output: results on stdout; all else, with progress, in single lines on stderr."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ def tell(text: str) -> None:
 
 
 def flush() -> None:
-    """Write what was printed on stdout. Raises TactileError where it cannot be."""
+    """Flush stdout. Raises TactileError where it cannot be written."""
     with _written():
         sys.stdout.flush()
 
 
 def discard_output() -> None:
-    """Lose what was printed on stdout and not yet written, which the exit would try to write again."""
+    """Discard what is buffered for stdout, which Python would try to write again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -46,7 +46,7 @@ def say(text: str) -> None:
 
 
 def printable(text: str) -> str:
-    """Return the text with control characters as escapes, which in a file's name could move the cursor."""
+    """Return the text with control characters escaped: in a file's name they could move the cursor."""
     return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in text)
 
 
@@ -72,7 +72,7 @@ LONG = 60.0  # s from which on a job is asked about
 
 
 def duration(seconds: float) -> str:
-    """Write a time in the unit in which it is read best: 40 s, 12 min, 3.5 h."""
+    """Write a time in its most readable unit: 40 s, 12 min, 3.5 h."""
     if seconds < 2 * LONG:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
@@ -112,7 +112,7 @@ def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], Non
 
 
 def _lines(name: str, unit: str) -> Callable[[int, int], None]:
-    """Return a callback (done, in all) that prints a line of progress when EVERY seconds have passed since the last."""
+    """Return a callback (done, in all) that prints a line of progress at most every EVERY seconds."""
     last = time.monotonic()
 
     def show(done: int, total: int) -> None:

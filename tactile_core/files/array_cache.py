@@ -1,4 +1,4 @@
-"""Arrays kept between runs in a folder of the cache, with the hash of each, which is checked when they are read."""
+"""Arrays kept between runs in a folder of the cache, each with its hash, which is checked when it is read."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def cache_folder() -> Path:
 
 
 def entries() -> list[Path]:
-    """List the cache's folders that hold our arrays, which are computed again where they are missing."""
+    """List the cache's folders that hold this package's arrays; missing ones are computed again."""
     return sorted(file.parent for file in cache_folder().glob(f"*/{HASHES}"))
 
 
@@ -37,7 +37,7 @@ class DamagedError(Exception):
 
 
 def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Map arrays that `store` wrote, read-only, once hashed (0.6 ms CPU a MB). Raises DamagedError for others."""
+    """Map arrays that `store` wrote, read-only, their hashes checked (0.6 ms CPU a MB). Raises DamagedError."""
     try:
         stated = json.loads(outside.read(folder / HASHES, _MOST))
         return {name: _checked(folder / f"{name}.npy", stated[name]) for name in names}
@@ -47,14 +47,14 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
 
 def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> None:
     """Write named arrays as they come, each whole or not at all, and their hashes last.
-    room : what it takes, in words, such as "350 MB". Raises TactileError for a folder that cannot be written."""
+    room : space needed, in words, such as "350 MB". Raises TactileError for a folder that cannot be written."""
     with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
         hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays}
         atomic.write_json(folder / HASHES, hashes)
 
 
 def claim(folder: Path, room: str) -> None:
-    """Make the folder before the work, to find out whether its result can be kept. Raises TactileError like `store`."""
+    """Make an entry's folder and try to write in it before its arrays are computed; room and errors as `store`."""
     with atomic.writing(folder, f"a folder for {room}", "Name one in TACTILE_CACHE"):
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "probe").touch()

@@ -117,7 +117,7 @@ def _beside(path: Path, role: str) -> Path:
 
 
 def _short(name: str) -> str:
-    """The name, or its beginning and hash where hidden names made from it would be longer than file systems take."""
+    """Return the name; a long one as its beginning and hash, so that hidden names made from it fit the file system."""
     encoded = os.fsencode(name)
     if len(encoded) <= _LONGEST:
         return name

@@ -1,5 +1,5 @@
-"""HDF5 files with their own checksum: the first 512 bytes hold the hash of all that follows, and how many rows it has.
-HDF5 lets a file begin with a block for other uses (its "user block"), which every HDF5 reader skips."""
+"""HDF5 files with their own checksum: the first 512 bytes hold the hash of what follows, and the number of rows. HDF5
+lets a file begin with a block for other uses (its "user block"), which every HDF5 reader skips."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def stated_checksum(path: Path) -> str | None:
 
 
 def stated_rows(path: Path) -> int | None:
-    """Return the number of rows stored beside the hash, unchecked as it; None where there is none."""
+    """Return the number of rows stored beside the hash, unchecked; None where there is none."""
     return _stated(path)[1]
 
 

@@ -1,9 +1,8 @@
 """Compile loops by numba, which the extras [fem] and [fast] bring.
 
-A loop is written once, as plain Python over arrays. numba is imported at its first call; what it compiles is kept on
-disk, beside the source or in the user's cache, and read from there by the next process. Without numba the same lines
-run uncompiled and give the same numbers: contacts then take five to twenty-five times as long.
-"""
+A loop is written once, as plain Python over arrays. numba is imported at its first call; compiled code is kept on disk,
+beside the source or in the user's cache, for the next process. Without numba the same lines run uncompiled and give the
+same numbers: contacts then take five to twenty-five times as long."""
 
 from __future__ import annotations
 
@@ -30,7 +29,7 @@ def add_scaled(total: Any, factor: Any, line: Any) -> None:
 
 @functools.cache
 def _teach_numba() -> None:
-    """Give loops an ``add_scaled`` of their own: of numba's own making it takes twice as long."""
+    """Give numba an ``add_scaled`` of our own: the one it compiles by itself takes twice as long."""
     import numba.extending
 
     @numba.extending.overload(add_scaled)
@@ -43,7 +42,7 @@ def _teach_numba() -> None:
 
 
 class Loop:
-    """A function that is compiled at its first call; other threads may run while it does."""
+    """A function that is compiled at its first call; other threads may run during the compilation."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)

@@ -1,4 +1,4 @@
-"""The example scenes: in a checkout and in Blender's extension beside the package, of a wheel under its ``share/``."""
+"""Find the example scenes: beside the package in a checkout and in Blender's extension, under ``share/`` of a wheel."""
 
 from __future__ import annotations
 

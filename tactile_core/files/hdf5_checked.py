@@ -35,9 +35,9 @@ MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enou
 
 @contextmanager
 def bounded_memory(more: int) -> Iterator[None]:
-    """Let the process take at most ``more`` bytes beyond its present data; allocations beyond fail. On Linux alone:
-    macOS and Windows have no such bound within a process. In the main thread alone: beside other work, as in a Dask
-    worker, whose own limit holds, the work of other threads would fail of the bound."""
+    """Limit the process to ``more`` bytes beyond its present data; larger allocations fail. Linux only: macOS and
+    Windows have no such limit within a process. Main thread only: in a Dask worker, which has its own limit, the work
+    of other threads would fail too."""
     if not sys.platform.startswith("linux") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -72,13 +72,13 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
 
 @contextmanager
 def open_plain(path: str | os.PathLike, look: Callable = lambda *_: None) -> Iterator[h5py.File]:
-    """Open for reading, with values unchecked. Raises h5py's errors; TactileError for what `open_checked` refuses else.
+    """Open a file of plain numbers for reading (see ``check_plain``), with values unchecked.
 
-    Meant for files of plain numbers, see ``check_plain``. Every object is opened once under `bounded_memory`: on two
-    kinds of file, found by fuzzing, the HDF5 library (up to 2.0) would use up all memory. One begins with a driver's
-    information of up to 4 GB; in the other, one changed byte makes a list of free places circular.
+    Every object is opened once under `bounded_memory`: fuzzing found two kinds of file with which the HDF5 library (up
+    to 2.0) uses up all memory, one with driver information of up to 4 GB, one whose list of free places one changed
+    byte makes circular.
     look : called with path, name and object, of every group and dataset
-    """
+    Raises h5py's errors; TactileError for what `open_checked` refuses besides."""
     import h5py
 
     outside.check(path, "an HDF5 file")
@@ -125,7 +125,7 @@ def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
 
 
 def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
-    """Raise TactileError unless a dataset is plain numbers of this file, uncompressed, which need no further check."""
+    """Raise TactileError unless a dataset is plain, uncompressed numbers of this file, which need no further check."""
     layout, name = data.id.get_create_plist(), data.name
     if layout.get_external_count() or data.is_virtual or data.dtype.kind not in "fiub":
         raise _refused(path, name, "no plain numbers", "numbers in this file")
@@ -136,7 +136,7 @@ def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
 
 
 def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
-    """Return what is wrong with a link, before the library follows it, which ends the walk; None for a good one."""
+    """Return what is wrong with a link, before the library follows it; None for a good one."""
     import h5py
 
     if name.count(b"/") >= MAX_DEPTH:
@@ -147,8 +147,8 @@ def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -
 
 
 def _check(path: str | os.PathLike, name: str, data: h5py.Dataset | h5py.Group) -> list:
-    """Refuse a dataset with values elsewhere, large chunks or strange filters; return it where it is to be unpacked.
-    That is a list of no or one name, dataset, size of a chunk in bytes and list of filters."""
+    """Refuse a dataset with values elsewhere, large chunks or unknown filters. Returns [(name, dataset, bytes of a
+    chunk, filters)] where its chunks are to be unpacked, else []."""
     if not hasattr(data, "chunks"):
         return []
     layout = data.id.get_create_plist()
@@ -177,7 +177,7 @@ def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None
 
 
 def _unpacked(packed: bytes, limit: int) -> int:
-    """Count the bytes that a deflate stream unpacks to, no further than just beyond `limit`."""
+    """Count the bytes that a deflate stream unpacks to, stopping just beyond `limit`."""
     unpacker, count = zlib.decompressobj(), 0
     try:
         while packed and not unpacker.eof and count <= limit:

@@ -9,8 +9,8 @@ from typing import Any
 
 class Disk(io.FileIO):
     """File object for HDF5 that hides a full disk from the library; `check` reports it. HDF5 cannot close a file whose
-    writing failed: it keeps the place on the disk and crashes at the process's end (seen with HDF5 1.14 and packed
-    datasets). Here it always closes, into a file that is thrown away then."""
+    writing failed: it keeps the space on the disk and crashes at exit (seen with HDF5 1.14 and packed datasets). With
+    this object it always closes; the file is thrown away."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path, "w+")

@@ -29,7 +29,7 @@ def checkout() -> Path | None:
 
 @contextmanager
 def needing(extra: str) -> Iterator[None]:
-    """Add to a ModuleNotFoundError that leaves the block how to install the extra, for who calls from Python."""
+    """Add to a ModuleNotFoundError in the block how to install the extra, for callers from Python."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -38,7 +38,7 @@ def needing(extra: str) -> Iterator[None]:
 
 
 def require(extra: str, library: str) -> None:
-    """Raise the same error at once where a library of the extra is missing, before any work is done."""
+    """Raise that error before any work where a library of the extra is missing."""
     with needing(extra):
         if find_spec(library) is None:
             raise ModuleNotFoundError(f"No module named {library!r}", name=library)

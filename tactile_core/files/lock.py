@@ -29,7 +29,7 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def awaited(file: Path) -> Iterator[None]:
-    """Wait for the lock on ``file``, which stays, and hold it; without locks in the file system all get it at once."""
+    """Wait for the lock on ``file``, which stays, and hold it; on a file system without locks nobody waits."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         with contextlib.suppress(OSError):

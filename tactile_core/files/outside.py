@@ -1,5 +1,5 @@
-"""Open files that come from outside: regular files alone, up to a size, so that no pipe, socket or device hangs a verb.
-Whatever opens a user's or a stranger's file goes through here; a library that opens by name is asked after `check`."""
+"""Open files from outside: regular files only, up to a size, so that no pipe, socket or device hangs a verb. Every file
+of a user or stranger is opened here; `check` goes before a library that opens files by name."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ MOST_DOTS = 100  # in a TOML key; tomllib's time grows with the square of them (
 
 
 def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
-    """Raise TactileError for a pipe, socket or device, OSError for nothing or a folder; links are followed."""
+    """Raise TactileError for a pipe, socket or device, OSError for a missing file or a folder; links are followed."""
     return _regular(path, os.stat(path), expected)
 
 
 def open_file(path: str | os.PathLike, expected: str = "a regular file") -> BufferedReader:
-    """Open a regular file to read its bytes. Raises what `check` raises; waits for nothing."""
+    """Open a regular file to read its bytes, without waiting. Raises as `check` does."""
     check(path, expected)  # before opening: some devices act when they are opened
     file = open(path, "rb", opener=_open)  # noqa: SIM115 - the caller closes it
     try:
@@ -48,7 +48,8 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
-    """Read UTF-8 text of at most `most` bytes, without its mark. Raises OSError, UnicodeDecodeError, TactileError."""
+    """Read UTF-8 text of at most `most` bytes, without its byte mark. Raises OSError, UnicodeDecodeError,
+    TactileError."""
     return read(path, most, "a text file").decode("utf-8-sig")
 
 
@@ -67,7 +68,7 @@ def toml_value(value: Any, scale: float = 1.0) -> str:
 
 
 def read_toml_text(path: str | os.PathLike) -> str:
-    """Read a TOML file by `read_small`. Raises TactileError for a key of over a hundred parts, too."""
+    """Read a TOML file by `read_small`. Raises TactileError, also for a key of over a hundred parts."""
     text = read_small(path)
     if any(piece.count(".") > MOST_DOTS for piece in re.split(r"[=,#{}\[\]\n]", text)):
         raise TactileError(path, f"a key of over {MOST_DOTS} parts", "short keys")
@@ -75,7 +76,7 @@ def read_toml_text(path: str | os.PathLike) -> str:
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
-    """Return the path of a file in a third-party folder, there or not. Raises TactileError for a link out of it."""
+    """Return the path of a file, existing or not, in a third-party folder. Raises TactileError for a link out of it."""
     path = Path(folder) / name
     try:
         within = path.resolve().is_relative_to(Path(folder).resolve())

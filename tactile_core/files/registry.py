@@ -1,4 +1,4 @@
-"""Find what a folder holds: a format, layout, job or indenter is one file, known as soon as it lies there."""
+"""Find what a folder holds: a format, layout, job or indenter is one file there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Limit linear algebra to one thread: the sums of several differ by rounding, and on small matrices they only wait."""
+"""Limit linear algebra to one thread: several threads' sums differ by rounding, and small matrices gain nothing."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ ONE = dict.fromkeys(VARIABLES, "1")
 
 
 def one_thread() -> threadpoolctl.threadpool_limits:
-    """Keep linear algebra in one thread: libraries loaded later, by the environment, and those loaded already.
+    """Keep linear algebra in one thread: libraries loaded already, and by the environment those loaded later.
 
-    For good, or, as the context manager that is returned, for a block; the environment stays. The same input then gives
-    the same bytes in every process of a machine. A single frame or contact gains nothing by several threads: on a busy
-    machine a live picture took four times the processor time, pairs of contacts five times, a conversion 2.6 times.
-    """
+    It stays so for good, or for a block with the returned context manager (the environment stays). The same input then
+    gives the same bytes in every process of a machine. A single frame or contact gains nothing by several threads: on a
+    busy machine a live picture took four times the processor time, pairs of contacts five times, a conversion 2.6
+    times."""
     import threadpoolctl
 
     os.environ.update(ONE)

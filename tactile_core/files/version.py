@@ -1,3 +1,3 @@
-"""Hold the package's version, below every room that writes it into a file."""
+"""The package's version, in a module that every room may import."""
 
 __version__ = "0.2.0"

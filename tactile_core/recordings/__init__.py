@@ -1,6 +1,7 @@
 """Recordings of a BioTac: read any known file layout, find what is wrong with it, and convert its signals to one form.
+
 ``read(path)`` gives a :class:`Recording`, the file as it is; ``prepare(recording, options)`` gives :class:`Signals`,
-the change against rest that the networks take. A new file layout is one new file in ``formats/``; see there."""
+the changes against rest that the networks take. A new file layout is one new file in ``formats/``."""
 
 from .answers import prepare
 from .readers import layouts, read

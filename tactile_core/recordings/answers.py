@@ -1,4 +1,4 @@
-"""Prepare a recording's signals, of the frames in which its finger answers; in the others it touches nothing."""
+"""Prepare the signals of frames in which the finger responds; frames without response get no change and a flag."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .signals import EVERY, FRAMEWISE, PrepareOptions, Signals
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
-    frames : those whose signals are returned; all of the recording decide what they are"""
+    frames : those whose signals are returned; all frames of the recording decide the result"""
     options = options or PrepareOptions()
     options.check()
     check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)
@@ -31,7 +31,8 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
 
 
 def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> Signals:
-    """Prepare the frames in which a finger answers; others get no change and a flag. Raises for a tare among those."""
+    """Prepare frames with a response; silent ones get no change and a flag. Raises TactileError for a tare among
+    those."""
     heard = np.flatnonzero(~silent)
     first = np.flatnonzero(silent)[0]
     where = f"{recording.row_word} {recording.rows[first]}"
@@ -61,12 +62,12 @@ def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.n
 
 
 def unanswered(signals: Signals) -> np.ndarray:
-    """Return which frames (T,) bool of prepared signals are those in which the finger did not answer."""
+    """Mark (T,) bool the frames of prepared signals in which the finger did not respond."""
     return (signals.flags & Flag.DEAD_CHANNEL > 0) & ~signals.change.any(axis=1)
 
 
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:
-    """Return the options with the tare's frames numbered among those in which the finger answers."""
+    """Return the options with the tare's frames renumbered among the frames with a response."""
     if options.tare in (None, "none"):
         return options
     frames = tare_frames(options.tare, len(silent))

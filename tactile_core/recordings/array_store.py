@@ -26,7 +26,7 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file. shapes : as declared; attributes : of its root; taken : names read, or others'"""
+    """Named arrays of an open file; shapes : as declared; attributes : of its root; taken : names already used"""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
@@ -43,7 +43,7 @@ class Store:
         return short or (kind.metadata is not None and kind.metadata.get("vlen") in (str, bytes))
 
     def texts(self, name: str) -> list[str]:
-        """Read an array of texts; of texts of any length one at a time, and not beyond `LONGEST` characters."""
+        """Read an array of texts; texts of variable length one at a time, each up to `LONGEST` characters."""
         self.taken.add(name)
         shape, kind = self.shapes[name]
         if prod(shape) > MAX_FRAMES:
@@ -56,7 +56,7 @@ class Store:
         return [_plain(each)[:LONGEST] for part in parts for each in np.ravel(part).tolist()]
 
     def rows(self, rows: slice, count: int) -> Store:
-        """Return the same store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
+        """Return the store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
         long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
         cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
 
@@ -199,7 +199,7 @@ def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
 
 
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    """Read shape and type; a header that declares itself long is refused, as numpy would load it before checking."""
+    """Read shape and type from the header; refuse one that declares itself long, which numpy would load unchecked."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
     if not start.startswith(NPY) or length > MAX_HEADER:

@@ -1,4 +1,4 @@
-"""Build a Recording from columns: checks that all layouts share (bad cells, time stamps, sizes)."""
+"""Build a Recording from columns, with the checks that all layouts share (bad cells, time stamps, sizes)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHOWN = 8  # problems spelled out one by one; more are counted
 
 @dataclass(frozen=True)
 class Problem:
-    """Unreadable place in a file: frame index, line in the file, column; essential: an electrode or time is lost."""
+    """Unreadable place in a file: frame index, line, column; essential : true for an electrode or the time."""
 
     frame: int
     row: int
@@ -38,17 +38,17 @@ class Problem:
 
 
 class BadRows(TactileError):
-    """Error for more bad rows than a recording may have."""
+    """Error for a recording with too many bad rows."""
 
 
 def sensor_with(count: int) -> str:
-    """Return the name of the sensor that has so many electrodes; empty where none has."""
+    """Return the name of the sensor that has this number of electrodes; empty for none."""
     fluid = ((each, found) for each in known_sensors() if isinstance(found := describe(each), Fluid))
     return next((name for name, found in fluid if found.electrodes.count == count), "")
 
 
 def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -> None:
-    """Raise for another number of electrodes than a sensor has. source says where the count was seen."""
+    """Raise TactileError unless the sensor has this number of electrodes; source : where it was counted, in words."""
     wanted = electrode_count(sensor)
     if count == wanted:
         return
@@ -59,7 +59,7 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -
 
 
 def _advice(sensor: str) -> str:
-    """Say how recordings of another sensor than the networks' are translated: by those that ship, or that are made."""
+    """Advise how to translate recordings of a sensor that the networks are not for: shipped weights, or new ones."""
     return (
         "Translate it by itself: the first recording, or --weights, says whose networks are taken. A sensor for which "
         f"none ship gets them in half an hour: `tactile pairs scenes/training --count 12000 --from {sensor} --out "
@@ -90,11 +90,10 @@ def assemble(
     """Check the columns and make a Recording of them.
 
     electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
-    names : the electrode columns' names in the file, empty where it has none, which is a dead channel
-    snapshots : whether frames do not follow each other
+    names : of the electrodes' columns in the file; an empty one is a missing column, a dead channel
+    snapshots : true where frames do not follow each other in time
     channels : pdc, tac, tdc, pac, position, force
-    Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad.
-    """
+    Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad."""
     frames = len(electrodes)
     _check_size(path, electrodes, sensor)
     rows = np.arange(frames) if rows is None else rows
@@ -140,7 +139,7 @@ def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> n
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    """The values, NaN for infinity; no copy where there is none."""
+    """Return the values with NaN for infinity; without a copy where nothing is infinite."""
     finite = np.isfinite(values)
     return values if finite.all() else np.where(finite, values, np.nan)
 

@@ -1,4 +1,4 @@
-"""Read a recording in parts that fit into memory; short ones are a single part, equal to the result of `read`."""
+"""Read a recording in parts that fit into memory; a short one is a single part, equal to the result of `read`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CONTEXT = 200  # frames that a part shares with the one before: glitches are loo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Part of a recording; repeated : number of frames at its start that the part before also held."""
+    """Part of a recording; repeated : number of frames at its start that the part before holds too."""
 
     recording: Recording
     repeated: int
@@ -82,7 +82,7 @@ def _of_store(store: Store) -> Iterator[Part]:
 
 
 def _frames(store: Store, name: str) -> int:
-    """Length of the electrodes' array; 0 where it is missing or a single number, which the layout then reports."""
+    """Return the length of the electrodes' array; 0 if it is missing or a scalar, which the layout reports."""
     shape = store.shapes.get(name, ((), None))[0]
     return shape[0] if shape else 0
 

@@ -1,4 +1,4 @@
-"""Doubts of prepared signals as data: a reason and its facts. Their sentences for users are made here alone."""
+"""Doubts about prepared signals as data, a reason and its facts; their sentences are made here alone."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ LAW = frozenset({Reason.LAW_LEFT_OVER, Reason.LAW_PRESSURE, Reason.LAW_EXCHANGED
 
 
 class Doubt(str):
-    """A doubt among the warnings of signals: its sentence, and behind it the reason and the facts by name."""
+    """Warning that carries its reason and facts; the text is the sentence for users."""
 
     reason: Reason
     facts: dict[str, Any]

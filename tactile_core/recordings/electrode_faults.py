@@ -1,4 +1,4 @@
-"""Find faulty electrodes and rows, and interpolate: glitches, rows that came twice, dead channels, strange rests."""
+"""Find and interpolate faulty electrodes and rows: glitches, repeated rows, dead channels, unlikely rest counts."""
 
 from __future__ import annotations
 
@@ -35,12 +35,11 @@ MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 def without_absent(
     path: str, electrodes: np.ndarray, names: Sequence[str], sensor: str
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Let electrodes of which a file has no reading stand still, where a typical unit rests.
+    """Fill electrodes that a file lacks with a typical unit's rest, as if they never changed.
 
     electrodes : (T, e) float, in the file's unit, with NaN; names : of their columns, empty where there is none
-    Returns the electrodes, which of them are absent (e,) bool, and a sentence on them. Raises TactileError where half
-    of them are.
-    """
+    Returns the electrodes, a mask (e,) of the filled ones, and a sentence on them. Raises TactileError where half of
+    them are missing."""
     unread = ~np.isfinite(electrodes)
     absent = np.array([not name for name in names]) | (unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES))
     if not absent.any():
@@ -56,13 +55,12 @@ def without_absent(
 
 
 def silent(electrodes: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) bool in which a finger does not answer: its electrodes read one end, or none ever changes.
+    """Mark the frames (T,) bool without a response of the finger; up to a few are a glitch, which is interpolated.
 
-    A few such frames are a glitch, which is interpolated.
-    electrodes : (T, e) float, in the file's unit. Real electrodes rest hundreds of counts apart; changes against rest
-    may all be 0, so that equal readings are no answer only beside raw ones. A raw recording whose noise stops in all
-    electrodes for `FROZEN` frames repeats an old answer.
-    """
+    electrodes : (T, e) float, in the file's unit. A frame has no response if most electrodes read the same end of the
+        range, or if nothing changes in a whole recording. (Raw electrodes rest hundreds of counts apart; changes
+        against rest may all be 0, so equal readings count only beside raw ones.) Where the noise of a raw recording
+        stops in all electrodes for `FROZEN` frames, it repeats an old response."""
     same = _lasting(alike(electrodes))
     change = electrodes[1:] != electrodes[:-1]
     if same.all() or (len(electrodes) >= FROZEN and not change.any()):
@@ -96,13 +94,13 @@ def _lasting(same: np.ndarray) -> np.ndarray:
 
 
 def runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Return the first frame of each run of a mask (T,), and the one after its last."""
+    """Return first frame and one past the last, of each run of true values in a mask (T,)."""
     bounds = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int))).tolist()
     return list(zip(bounds[::2], bounds[1::2], strict=True))
 
 
 def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) of long runs without a change (T - 1, e) in any electrode, where noise makes some else."""
+    """Mark the frames (T,) of long runs without any change (T - 1, e), in a recording that is noisy elsewhere."""
     still = np.r_[False, ~change.any(axis=1)]
     found = np.zeros(len(still), bool)
     for first, last in runs(still):
@@ -111,7 +109,7 @@ def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def _noisy(electrodes: np.ndarray) -> bool:
-    """Return whether readings (T, e), none of them like the one before, rise and fall as noise does."""
+    """Return true if no reading (T, e) equals the one before, and readings rise and fall as noise does."""
     moves = np.diff(electrodes, axis=0)
     return len(moves) > 1 and bool(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0)) >= TURNS)
 
@@ -119,7 +117,7 @@ def _noisy(electrodes: np.ndarray) -> bool:
 def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Interpolate what was not read, with `repair` glitches and twins, too; return readings, flags (T,), a report."""
+    """Interpolate what was not read and, with `repair`, glitches and repeats; return readings, flags (T,), a report."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
@@ -139,15 +137,16 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark rows (T,) of electrodes (T, e) counts equal to the one before; tell whether noise should keep rows apart."""
+    """Mark rows (T,) of electrodes (T, e) equal to the one before; also return whether noise should prevent that."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and _noisy(electrodes[~same])
 
 
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Mark the frames (T,) bool that repeat the row before them, and those of longer runs, which are held. A packet was
-    lost, or the driver stood still, where `STALE` rows and more are equal although noise should keep them
-    apart. electrodes : (T, e) counts; findings are added to the warnings"""
+    """Mark the frames (T,) bool that repeat the row before, and those of longer runs of repeats, which are held.
+
+    Runs of `STALE` and more equal rows, in electrodes (T, e) counts whose noise should differ, are lost packets or a
+    driver that stood still. Findings are added to the warnings."""
     found, long = np.zeros((2, len(electrodes)), bool)
     same, noisy = repeats(electrodes)
     again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
@@ -185,7 +184,7 @@ def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -
 
 
 def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
-    """Return whether no unit of a sensor rests at counts (e,), which is then added to the warnings."""
+    """Return true, and add a warning, if no unit of the sensor rests at counts (e,)."""
     typical = typical_rest(sensor)
     if typical is None:
         return False
@@ -229,9 +228,9 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
 
 
 def _still(readings: np.ndarray) -> np.ndarray:
-    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings. Runs while no electrode changes
-    are no fault unless they span the whole recording. For an electrode that is quiet elsewhere too, missing noise shows
-    nothing: only a run over the whole recording counts."""
+    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings. Runs in which no electrode
+    changes are no fault, nor is a run of an electrode that is quiet elsewhere too, unless they span the whole
+    recording."""
     still = np.zeros(readings.shape, bool)
     for j in range(readings.shape[1]):
         column = readings[:, j].copy()

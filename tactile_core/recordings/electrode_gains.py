@@ -37,9 +37,8 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
         single recordings; rest_pdc : counts
     film : thickness of its fluid film over a typical unit's, where known
-    stiffness : of its skin over a typical unit's, where a measured force showed it: force and pressure are that much
-        larger under the same signals; stiffness_error : relative
-    """
+    stiffness : of its skin over a typical unit's, where a measured force showed it: scales force and pressure under the
+        same signals; stiffness_error : relative"""
 
     note: str
     gain: Row
@@ -61,7 +60,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
     """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
     topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
-    sensor : of the units, "biotac" or another, which has a rest and no gains"""
+    sensor : of the units: "biotac", or another, whose units have a rest and no gains"""
 
     format: str
     unit: ElectrodeGains | None = None
@@ -101,7 +100,7 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Convert signals to the simulated sensor's, (change - offset) / gain; rectified ones have no offset left."""
+    """Convert signals to the simulated sensor's: (change - offset) / gain; rectified ones without offset."""
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     stiffness = 1.0 if sensor.stiffness is None else sensor.stiffness

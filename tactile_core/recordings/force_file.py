@@ -25,11 +25,11 @@ ADVICE = "Leave in it what is measured beside the recording, in newtons"
 def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     """Read the force beside a recording: from a file, or from columns of the recording's own, ``"fx,fy,fz"``.
 
-    A file of as many rows as the recording has frames needs no time. Where both know unix time, it places them beside
-    each other; else both begin at once.
-    Returns rising times (n,) s from the recording's first frame, and the force's size (n,) N.
-    Raises TactileError: no such file or column, other rows, a clock that does not overlap, and what cannot be newtons.
-    """
+    A file with as many rows as the recording has frames needs no time. Otherwise unix time aligns the two if both have
+    it; else both begin at the same moment.
+    Returns rising times (n,) s from the recording's first frame, and the magnitude (n,) N of the force.
+    Raises TactileError: no such file or column, other rows, a clock that does not overlap, values that cannot be
+    newtons."""
     own = not os.path.exists(named)
     path, where = (split(recording.path).file, f"{recording.path}, {named}") if own else (named, named)
     names = [name.strip().lower() for name in named.split(",")] if own else None
@@ -71,7 +71,7 @@ def _table(path: str, names: list[str] | None) -> Table:
 
 
 def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Return the length (n,) N of the force in one column or three (n, c)."""
+    """Return the magnitude (n,) N of a force in one column or three (n, c)."""
     if columns.shape[1] not in (1, 3):
         raise TactileError(where, f"{columns.shape[1]} columns", COLUMNS, ADVICE)
     size = np.linalg.norm(columns, axis=1)
@@ -85,7 +85,7 @@ def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 
 def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:
-    """Return times (n,) s from the recording's first frame of stamps (n,) of another clock."""
+    """Convert stamps (n,) of another clock to times (n,) s from the recording's first frame."""
     time, start, _ = seconds_of(stamps)
     if not np.isfinite(stamps).all() or not (np.diff(time) > 0).all():
         raise TactileError(f"{where}, column 1", "numbers that do not rise", "the time", ADVICE)

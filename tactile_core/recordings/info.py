@@ -34,7 +34,7 @@ def describe(
     path: str | os.PathLike[str], options: PrepareOptions | None = None, unit: SensorFile | None = None
 ) -> str:
     """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
-    By its readings alone where no unit of its sensor has been seen at rest. unit : rest and gains, of `tactile adapt`
+    A sensor without a typical rest is described by its readings alone. unit : rest and gains, of `tactile adapt`
     Raises TactileError where the file is no recording, or of another sensor than the unit's."""
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
@@ -172,7 +172,7 @@ def _flags(flags: np.ndarray) -> str:
 
 
 def _of_counts(recording: Recording, unit: ElectrodeGains | None, pac: int) -> list[tuple[str, str]]:
-    """Return the rows on a recording whose changes are not known without its unit's rest."""
+    """Return the rows for a recording whose changes are unknown, because its unit's rest is."""
     electrodes = recording.electrodes
     finger = recording.about.get("finger")
     name = f", {HAND[finger]} ({finger})" if finger else ""
@@ -200,7 +200,7 @@ def _time_of_sp(recording: Recording) -> str:
 
 
 def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
-    """Return each electrode's median or its unit's rest, and the least and largest count, against it if known."""
+    """Return each electrode's median (or its unit's rest), least and largest count; against rest if known."""
     if unit is None:
         counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
     else:

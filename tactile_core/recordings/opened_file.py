@@ -106,7 +106,7 @@ def _container(start: bytes) -> str:
 
 
 def refuse_finger(path: str, finger: int | None) -> None:
-    """Raise TactileError where a finger is asked of a file of one."""
+    """Raise TactileError where the path names a finger of a file with only one."""
     if finger is not None:
         raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
 

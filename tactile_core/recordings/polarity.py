@@ -1,9 +1,8 @@
 """Detect whether a recording's counts fall, as raw ones do, or rise where the fluid film over an electrode thins.
 
 Raw BioTac counts fall (``sensors.COUNT_SIGN``). Some files hold rest minus reading without saying so. Two changes show
-a file's polarity: the change that correlates with the fluid's pressure, and the change against rest. Each resembles
-that of simulated contacts under one sign and not under the other.
-"""
+the polarity: the change that correlates with the fluid's pressure, and the change against rest. With the right sign
+each resembles that of simulated contacts."""
 
 from __future__ import annotations
 
@@ -43,7 +42,7 @@ SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
 
 
 class Basis(enum.Enum):
-    """How far a polarity is borne out: shown by the recording or known, assumed, or stated against what is shown."""
+    """Basis of a polarity: shown by the recording or known, assumed, or stated against what the recording shows."""
 
     SURE = enum.auto()
     ASSUMED = enum.auto()
@@ -52,7 +51,7 @@ class Basis(enum.Enum):
 
 @dataclass(frozen=True)
 class Polarity:
-    """Polarity of a recording: name "falls" or "rises"; found : what says so, in words; basis : how far it does."""
+    """Polarity of a recording: name "falls" or "rises"; found : evidence in words; basis : its kind."""
 
     name: str
     found: str
@@ -65,7 +64,7 @@ class Polarity:
 
     @property
     def evidence(self) -> str:
-        """Return what says so, for reports."""
+        """Return the evidence in words, for reports."""
         return f"assumed: {self.found}" if self.basis is Basis.ASSUMED else self.found
 
     @property
@@ -88,7 +87,7 @@ class Polarity:
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
-    """Return the polarity by user, file or recording, in this order; one that the recording contradicts is not sure."""
+    """Choose the polarity by user, file or recording, in this order; one that the recording contradicts is not sure."""
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
             against = shown.sure and shown.name != stated
@@ -98,7 +97,7 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
 
 
 def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """Return the polarity of a sensor's raw readings, as its descriptor has it; of other kinds assumed."""
+    """Return the polarity of a sensor's raw readings, from its descriptor; for other kinds it is assumed."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
     return Polarity(reading, raw) if kind == "raw" else Polarity(reading, f"as {raw}", Basis.ASSUMED)
@@ -150,7 +149,7 @@ def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
 
 
 def _as_drift(change: np.ndarray, electrodes: np.ndarray) -> bool:
-    """Return true if another conductivity of the fluid makes all but `DRIFT_LEFT` of changes (n, 19) of counts."""
+    """Return true if a change of the fluid's conductivity explains changes (n, 19) of counts but for `DRIFT_LEFT`."""
     rest = np.median(electrodes - change, axis=0)
     drift = divider.of_films(1.1, rest) - rest
     drift /= np.linalg.norm(drift)

@@ -97,7 +97,7 @@ def _film(
     recording: Recording, change: Changes, rest: Baseline, pressure: np.ndarray, options: PrepareOptions, *,
     own_rest: bool,
 ) -> film.Film | None:  # fmt: skip
-    """Return the film of a raw recording whose rest is known; of a sensor without simulated contacts only as given."""
+    """Estimate the film of a raw recording whose rest is known; without simulated contacts, take the given one."""
     if contacts_of(recording.sensor) is None:
         return None if options.film is None else film.Film.given(options.film)
     return film.find(
@@ -108,7 +108,7 @@ def _film(
 
 
 def doubt_law(signals: Signals) -> Signals:
-    """Flag, and warn of, frames in contact that together resemble no simulated ones of the sensor's descriptor."""
+    """Flag frames in contact, and add a warning, where together they resemble no simulated contacts of the sensor."""
     changes = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(changes, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
     return replace(signals, flags=flags, warnings=(*without(signals.warnings, LAW), *filter(None, [doubt])))
@@ -130,7 +130,7 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
 def _unit_rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Rest | None:
-    """Return the unit's rest if it is known and no calm level lies near it: a steady grip is calm, too."""
+    """Return the unit's known rest unless a calm level lies near it: a steady grip is calm, too."""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
     reason = "no quiet part"
@@ -155,7 +155,7 @@ def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: R
 
 
 def _is_tared(pdc: np.ndarray, rest: float) -> bool:
-    """Return true if PDC has another zero than the unit's: far below its rest, where pressure cannot be."""
+    """Return true if PDC was tared: it lies further below the unit's rest than any pressure."""
     finite = pdc[np.isfinite(pdc)]
     return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
 
@@ -175,7 +175,7 @@ def _polarity(
 def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
-    """Return the factor to counts: 1, the user's, or one that gives scaled recordings a usual press (assumed)."""
+    """Return the factor to counts: 1, the user's, or for a scaled recording one that gives a usual press (assumed)."""
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
     if kind == "raw" and (found := full_scale(readings)):
@@ -219,7 +219,7 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Baseline:
-    """Rest to subtract."""
+    """Return the rest to subtract."""
     if quiet.parts:
         return baseline(
             readings, quiet, options.drift and kind != "rectified"
@@ -239,7 +239,7 @@ def _rest(
 def _is_loaded(
     recording: Recording, rest: Baseline, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> bool:
-    """Return whether the calm level of a raw recording looks like a grip's, which is then added to the warnings."""
+    """Return true, and add a warning, if the calm level of a raw recording looks like that of a grip."""
     if kind != "raw" or options.tare is not None or options.rest is not None:
         return False
     share = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)

@@ -1,4 +1,4 @@
-"""Prepare a recording's signals, whole or fed a part after another, with its unit's rest and gains."""
+"""Prepare a recording's signals with its unit's rest and gains, whole or part after part."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 
 
 class Preparer:
-    """Prepares a recording's parts in order, by what earlier ones showed; a single part is as `prepare` has it."""
+    """Prepare a recording's parts in order, each with what earlier parts showed; a single part is as from `prepare`."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Preparer:
         unit: ElectrodeGains | None = None,
         parts: Callable[[], Iterable[Recording]] = tuple,
     ) -> None:
-        """Take the options, the unit (None: a typical one), and what gives all parts, looked through for polarity."""
+        """Store options and unit (None: a typical one); parts : returns all parts, searched for the polarity."""
         options = options or PrepareOptions()
         self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest(), film=unit.film)
         self._unit, self._parts = unit, parts
@@ -70,7 +70,7 @@ class Preparer:
         return electrode_gains.apply(signals, self._unit).at(frames)
 
     def _look_for_polarity(self) -> bool:
-        """Take the polarity of the first part that shows it; returns whether one does."""
+        """Take the polarity of the first part that shows one; returns false if none does."""
         for part in self._parts():
             signals = prepare(part, self._options)
             if not signals.flags[0] & DOUBTS:
@@ -113,7 +113,7 @@ class Preparer:
     def _of_typical_film(
         self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str
     ) -> tuple[np.ndarray, float]:
-        """Return changes (T, 19) counts from rest (19,) at times (T,) s as of a typical unit, and the film."""
+        """Return changes (T, 19) counts from rest (19,) at times (T,) s, converted to a typical film, and the film."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
@@ -123,7 +123,7 @@ class Preparer:
         return found.changes(whole, level)[EVERY], found.thickness
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
-        """Keep the rest at the part's end: what is calm in the next is rest where it lies near it, as a grip may be."""
+        """Keep the rest at the part's end: a calm level of the next part is rest only near it; a grip is calm, too."""
         rest = self._rest = signals.rest + signals.drift * part.duration
         self._rest_pdc = _rest_pdc(part, signals, rows)
         pdc = self._rest_pdc if np.isfinite(self._rest_pdc) else None
@@ -131,5 +131,5 @@ class Preparer:
 
 
 def _rest_pdc(part: Recording, signals: Signals, rows: slice | np.ndarray) -> float:
-    """PDC, counts, that a part's pressure was measured from; NaN where there is none."""
+    """Return the PDC, counts, of zero pressure in a part; NaN where there is none."""
     return np.nan if part.pdc is None else float(part.pdc[rows][0] - signals.pdc[0])

@@ -47,8 +47,9 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all windows of n frames, by start frame: sums (19, W), calm, pdc or None, middle (s) (W,). The sums
-    are in single precision where that is exact, as it is of counts: in double they are twice the recording."""
+    """Statistics of all windows of n frames, by first frame: sums (19, W) of counts, calm (W,), pdc (W,) or None,
+    middle (W,) s. Sums are in single precision where that is exact, as for counts: in double they take twice the
+    recording."""
 
     n: int
     sums: np.ndarray
@@ -57,7 +58,7 @@ class _Windows:
     middle: np.ndarray
 
     def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return the largest (W,) of what the electrodes' means (W,) are changed to."""
+        """Return the largest (W,) over electrodes of a function of each one's window means (W,)."""
         found = change(self.sums[0].astype(float) / self.n)
         for sums in self.sums[1:]:
             np.maximum(found, change(sums.astype(float) / self.n), out=found)
@@ -72,12 +73,10 @@ def window_frames(rate: float) -> int:
 def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
     """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
 
-    electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz.
-    A held press is calm too. PDC separates it from rest: the fluid pressure is lowest without contact. Without PDC,
-    calm parts near the start or end are taken for rest, and others must agree with them. In tared recordings rest is
-    near zero.
-    Known limit: a raw recording of one steady contact from its first frame to its last looks like rest.
-    """
+    electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz
+    A held press is calm too, but its PDC is higher than without contact. Without PDC, calm parts near the start or end
+    are taken for rest, and others must agree with them. In tared recordings rest is near zero.
+    Known limit: a raw recording of one steady contact from its first frame to its last looks like rest."""
     n = window_frames(rate)
     if len(electrodes) < n:
         return Quiet(
@@ -96,7 +95,7 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
-    """Return the window for rest where nothing is quiet: of lowest PDC if there is one, else of least movement."""
+    """Return the window for rest where nothing is quiet: that of lowest PDC or, without PDC, of least movement."""
     n = min(window_frames(rate), len(electrodes))
     if pdc is not None and np.isfinite(pdc).all():
         start = int(np.argmin(_sums(pdc, n)))
@@ -119,7 +118,7 @@ def _spread(centred: np.ndarray, n: int) -> np.ndarray:
 
 
 def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
-    """Noise (19,) counts by what frames APART apart differ by in the calmer windows of n."""
+    """Estimate the noise (19,) counts from differences of frames APART apart, in the calmer windows of n frames."""
     starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
     windows = (electrodes[start : start + n].astype(float) for start in starts)
     steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])
@@ -149,7 +148,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
 
 
 def _rest_rectified(windows: _Windows) -> np.ndarray:
-    """Mark windows (W,) bool at rest. Rectified readings are zero at the tare, so rest is small and calm."""
+    """Mark windows (W,) bool at rest in rectified readings: small and calm, as the tare is zero."""
     largest = windows.largest(lambda mean: mean)
     if windows.pdc is None:
         return windows.calm & (largest <= RECTIFIED_LEVEL)
@@ -157,7 +156,7 @@ def _rest_rectified(windows: _Windows) -> np.ndarray:
 
 
 def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
-    """Mark windows (W,) bool at rest: one calm window is chosen, with all calm ones that agree with it."""
+    """Mark windows (W,) bool at rest: one chosen calm window, and all calm ones that agree with it."""
     possible = windows.calm
     if kind != "raw":
         possible = possible & (windows.largest(np.abs) <= TARED_LEVEL)
@@ -182,7 +181,7 @@ def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
     """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
-    The level moves at ``rate`` a second at most: drift over an hour can exceed a press."""
+    The level moves by at most ``rate`` a second: drift over an hour can exceed a press."""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)
     near = level + rate * TRACKED
@@ -217,7 +216,7 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
 
 
 def tare_frames(asked: slice | str, count: int) -> slice:
-    """Convert the tare frames to a plain slice. Raises TactileError where they are not inside these `count` frames."""
+    """Convert the tare frames to a plain slice. Raises TactileError where they are not among these `count` frames."""
     if isinstance(asked, slice):
         tare = asked
     else:

@@ -92,7 +92,7 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
 
 
 def _noted(recording: Recording, store: Store) -> Recording:
-    """Note the labels of the file, and the arrays that the recording has not; a simulated one has its own about it."""
+    """Add the file's labels, and the names of arrays that the recording leaves out, unless it is a simulated one."""
     labels = {} if recording.simulated else labels_in(store, len(recording))
     return replace(recording, labels=labels, not_taken=tuple(name for name in store.shapes if name not in store.taken))
 
@@ -105,7 +105,7 @@ def _unneeded(columns: ColumnMap | None, name: str) -> bool:
 
 
 def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> int:
-    """Count the PAC columns of a CSV file, which a lean reading leaves out; 0 for other files and with a map."""
+    """Count the PAC columns of a CSV file, which lean reading leaves out; 0 for other files and with a map."""
     with opened(os.fspath(path)) as (container, where, _, file):
         if columns is not None or container != "csv":
             return 0
@@ -137,7 +137,7 @@ def _sensor(layout: ModuleType) -> str:
 
 
 def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -> Recording:
-    """Read one finger of a hand: the requested one, or the first; a warning names the others."""
+    """Read the requested finger of a hand, or the first with a warning that names the others."""
     known = layout.fingers(store.header if isinstance(store, Table) else store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:

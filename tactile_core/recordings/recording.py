@@ -25,7 +25,7 @@ LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its invers
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth(Summary):
-    """True values of a simulated recording; real ones have none. None marks arrays that its file was made without.
+    """True values of a simulated recording; real ones have none. None marks arrays that its file leaves out.
 
     displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
     displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
@@ -33,8 +33,7 @@ class Truth(Summary):
     contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
     traction_biotac : (T, N, 3) float32, Pa, of the object on the resting skin's nodes
     traction_digit : (T, M, 3) float32, Pa, of the object on the resting gel's nodes
-    displacement, traction : the same of further sensors, by their names
-    """
+    displacement, traction : the same of further sensors, by their names"""
 
     displacement_biotac: np.ndarray | None
     displacement_digit: np.ndarray | None
@@ -142,7 +141,7 @@ class Recording(Summary):
 
 
 class Chosen(NamedTuple):
-    """One of a file's recordings. finger, topic : None and empty where the path names none; no / around the topic"""
+    """One of a file's recordings; finger, topic : None and empty where the path names none"""
 
     file: str
     finger: int | None
@@ -182,5 +181,5 @@ def short_of(path: str | os.PathLike) -> str:
 
 
 def named(recording: Recording, chosen: Chosen) -> Recording:
-    """Name a recording and its unit by its topic and finger, as `Chosen` does."""
+    """Add the topic and finger to the names of a recording and its unit, as `Chosen` does."""
     return replace(recording, name=chosen.name, section=chosen.section)

@@ -37,17 +37,16 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     """Mark (T, C) bool samples that left the signal's level for a moment and came back.
 
     values : (T, C) float, counts, finite.
-    A run of samples is a glitch when all of these hold:
-    it begins with a jump of more than 30 counts in one sample and ends with one in the opposite direction; the level
-    after it is the one before it, and its own samples lie on one level, both within a third of the jump; the jumps are
-    three times as steep as the calmer of the two steps just outside; it is not itself the return, between two glitches,
-    to the level of the second around it. It lasts at most 5 samples, or at most 50
-    where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of the slide set). A
-    press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
-    is not flat; a contact that comes and goes within one single sample (10 ms) looks like a glitch. At the
-    start and end of a recording only one jump can be seen; there it must exceed 100 counts, within 3 samples.
-    The search ends where the rows are found to be no time series, see `is_time_series`.
-    """
+    A run of samples is a glitch when all of these hold. It begins with a jump of more than 30 counts in one sample and
+    ends with one in the opposite direction. The level after it is the one before it, and its own samples lie on one
+    level, both within a third of the jump. The jumps are three times as steep as the calmer of the two steps just
+    outside. It is not itself the return, between two glitches, to the level of the second around it. It lasts at most 5
+    samples, or at most 50 where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of
+    the slide set).
+    A press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
+    is not flat; a contact within one single sample (10 ms) looks like a glitch. At the start and end of a recording
+    only one jump can be seen; there it must exceed 100 counts, within 3 samples. The search ends where the rows are
+    found to be no time series, see `is_time_series`."""
     found = np.zeros(values.shape, bool)
     for _ in range(ROUNDS):
         if not is_time_series(found):
@@ -64,12 +63,12 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
 
 
 def is_time_series(glitches: np.ndarray) -> bool:
-    """Return false where so many frames look like glitches that neighbouring rows cannot belong together."""
+    """Return false where so many frames look like glitches that the rows can be no time series."""
     return not glitches.any() or float(glitches.any(axis=1).mean()) <= MAX_SHARE
 
 
 def _jumping(values: np.ndarray) -> np.ndarray:
-    """Return the electrodes of values (T, C) that jump anywhere; in parts, which bounds the memory."""
+    """Mark the electrodes of values (T, C) that jump anywhere; computed in parts, which bounds the memory."""
     most = np.zeros(values.shape[1])
     for start in range(0, len(values) - 1, BLOCK):
         steps = np.diff(values[start : start + BLOCK + 1].astype(float), axis=0)
@@ -90,7 +89,7 @@ def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 
 def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
-    """Mark in ``found`` (T,) the glitches of so many samples in a column (T,), beside those that are marked."""
+    """Mark in ``found`` (T,) the glitches of `length` samples in a column (T,), beside those already marked."""
     steps = np.diff(column)  # steps[i] leads from sample i to i + 1
     large = np.abs(steps) > LIMIT
     calm = np.abs(np.pad(steps, 1, mode="edge"))  # calm[i] = |step| into sample i
@@ -104,7 +103,7 @@ def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
 
 
 def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np.ndarray:
-    """Return (N,) whether runs jump away, steeper than around them, stay on one level and return.
+    """Mark (N,) runs that jump away, steeper than their neighbourhood, stay on one level and return.
     samples : (n + 2, N) counts, the level before, the n samples of each run, the level after; neighbour_step : (N,)"""
     jump = np.minimum(np.abs(samples[1] - samples[0]), np.abs(samples[-1] - samples[-2]))
     run = samples[1:-1]
@@ -116,7 +115,7 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if a run leaves the level of its samples around; a gap between two glitches does not."""
+    """Return true if a run leaves the level of the second around it; a gap between two glitches does not."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])
@@ -155,9 +154,9 @@ def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 
 def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, int, float]]:
-    """Return pairs of opposite jumps that may begin and end a stuck run, in order.
-    edges : samples before large steps. Each pair has its two edges, and the calmer of the steps just outside. A noisy
-    electrode has millions of pairs: what a run's two ends show is looked at here, for all at once."""
+    """Return pairs of opposite jumps that may begin and end a stuck run, in order, with the calmer of the steps just
+    outside. edges : samples before large steps. (A noisy electrode has millions of pairs, so all are checked at
+    once.)"""
     steps = np.diff(column)
     beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
     pairs: list[tuple[int, int, float]] = []

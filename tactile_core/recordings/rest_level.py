@@ -1,4 +1,4 @@
-"""Estimate the rest level from the quiet parts of a recording, and the changes from it."""
+"""Estimate the rest level from the quiet parts of a recording, and the changes against it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Baseline:
 
     @functools.cached_property
     def _slopes(self) -> np.ndarray:
-        """Counts a frame (P, 19) after each of the frames, none after the last."""
+        """Slope (P, 19), counts a frame, after each of the frames; 0 after the last."""
         return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the readings (n, 19) counts, not to be written to, in frames (n,)."""
+        """Return the readings (n, 19) counts at frames (n,); read-only."""
         if len(self.levels) == 1:
             return np.broadcast_to(self.levels[0], (len(frames), self.levels.shape[1]))
         before = np.maximum(np.searchsorted(self.frames, frames, "right") - 1, 0)
@@ -45,8 +45,8 @@ class Baseline:
 
 
 class Changes:
-    """Changes (T, e) counts, indexed like an array: of all frames of a long recording they take twice its memory.
-    count : T; of : frames (n,) -> their changes (n, e)"""
+    """Changes (T, e) counts, indexed like an array and computed on demand: a long recording's take twice its memory.
+    count : T; of : function from frames (n,) to their changes (n, e)"""
 
     def __init__(self, count: int, of: Callable[[np.ndarray], np.ndarray]) -> None:
         self._count, self._of = count, of
@@ -66,7 +66,7 @@ class Changes:
         return found
 
     def then(self, function: Callable[[np.ndarray], np.ndarray]) -> Changes:
-        """Return these changes (n, e) converted by a function that takes each frame by itself."""
+        """Return these changes after a function (n, e) -> (n, e) that treats each frame by itself."""
         return Changes(self._count, lambda frames: function(self._of(frames)))
 
 
@@ -84,7 +84,8 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """Return PDC at rest, counts: 0 for a tared file; else the quiet frames', or the lowest where there are none."""
+    """Return PDC at rest, counts: 0 for a tared file; else that of the quiet frames, or the lowest where none is
+    quiet."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0
@@ -93,7 +94,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """Return the mean (19,) of the middle half of (n, 19) samples: robust like the median, but not whole counts."""
+    """Return the mean (19,) of the middle half of (n, 19) samples: robust as the median, but not whole counts."""
     cut = len(samples) // 4
     counts = counted(samples)
     if counts is None:

@@ -1,4 +1,4 @@
-"""Detect the processing of counts before they were written: none (raw), tared, tared and scaled, or rectified."""
+"""Detect how counts were processed before they were written: raw, tared, tared and scaled, or rectified."""
 
 from __future__ import annotations
 
@@ -25,9 +25,8 @@ MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assu
 
 
 def counted(columns: np.ndarray) -> np.ndarray | None:
-    """Count how often each whole number from -32,768 on is in each column (T, e), finite; returns (e, 65536) int. None
-    where other numbers occur, and of short columns: sorting long ones takes twice their memory and most of the time
-    that a recording takes."""
+    """Histogram (e, 65536) int of columns (T, e) of whole numbers from -32,768 on; None for other numbers and short
+    columns. (Sorting long columns takes twice their memory and most of the time of reading.)"""
     if len(columns) < len(WHOLE):
         return None
     counts = np.empty((columns.shape[1], len(WHOLE)), int)
@@ -40,7 +39,7 @@ def counted(columns: np.ndarray) -> np.ndarray | None:
 
 
 def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Return the percentiles of numbers of which so many (65536,) are equal to each of `WHOLE`, as numpy's."""
+    """Return percentiles as numpy's, of numbers given as their histogram (65536,) over `WHOLE`."""
     place = np.array(shares) / 100 * (counts.sum() - 1)
     below = np.floor(place)
     low, high = (WHOLE[np.searchsorted(np.cumsum(counts), rank, "right")] for rank in (below, np.ceil(place)))
@@ -54,8 +53,8 @@ def median(column: np.ndarray) -> float:
 
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
-    """Return counts a unit, and the unit in words, of raw readings that are no counts; None for all others.
-    electrodes : (T, e) float, finite. All of them rest at two thirds of the range and more, and come nowhere near 0"""
+    """Return counts a unit, and the unit in words, of raw readings in another unit than counts; None for all others.
+    electrodes : (T, e) float, finite; such readings all rest above two thirds of the range and stay far from 0"""
     beyond, within = (((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX))
     if beyond > 1 - MOST_OF and within < MOST_OF:  # counts, seen without sorting them
         return None

@@ -34,8 +34,8 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a quiet level (19,) counts is this unit at rest, judged by its PDC, counts. Where either has
-        no PDC, or PDC of another zero, the level must be near the unit's counts at rest."""
+        """Return true if a quiet level (19,) counts is this unit at rest, judged by PDC, counts. Without PDC on both
+        sides, or with another zero of PDC, the level must be near the unit's counts at rest."""
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
         return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())
@@ -86,9 +86,9 @@ class PrepareOptions:
 class Signals:
     """Signals ready for the networks.
 
-    change : (T, 19) float, counts, plain reading minus rest, drift removed, smoothed as reported, as over a typical
-        unit's films where ``film`` found others; with the sign of a raw reading, which falls where a film thins,
-        whatever the file's own polarity is. Rectified: |change| minus its quiet level
+    change : (T, 19) float, counts: reading minus rest, drift removed, smoothed as reported, converted to a typical
+        unit's film where ``film`` is another. Its sign is that of a raw reading, which falls where a film thins,
+        whatever the file's own polarity. Rectified: |change| minus its quiet level
     rest : (19,) float, counts, readings without contact at the first frame
     drift : (19,) float, counts/s, mean slope of the rest level over the recording
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
@@ -98,10 +98,9 @@ class Signals:
     pdc : (T,) float, counts, the fluid's pressure over its level at rest; NaN where the recording has none
     warnings : the recording's and those found here; doubts among them carry their reason, see `doubt`
     report : what was found and done, fit for JSON
-    sensor : whose they are; 19 is of a BioTac
-    film : thickness of the unit's, over a typical unit's, that the changes were converted from
-    stiffness : of the unit's skin over a typical one's, by which its force and pressure are larger
-    """
+    sensor : whose signals; shapes above say 19, as of a BioTac
+    film : thickness of the unit's film over a typical unit's, which the changes were converted from
+    stiffness : of the unit's skin over a typical one's; force and pressure are larger by it"""
 
     change: np.ndarray
     rest: np.ndarray
@@ -123,25 +122,25 @@ class Signals:
 
     @property
     def pressure_measured(self) -> np.ndarray:
-        """Rise (T,) Pa of the fluid's pressure over that at rest, by PDC; NaN where it was not recorded."""
+        """Rise (T,) Pa of the fluid's pressure over rest, measured by PDC; NaN where it was not recorded."""
         return of_kind(self.sensor, Fluid).readout.pressure * self.pdc
 
     @property
     def typical(self) -> np.ndarray:
         """Change (T, 19) counts, converted to a unit that rests at ``sensors.typical_rest``, the networks' input. Only
-        raw readings show their unit's rest counts; other changes are not converted, nor are those of a sensor of which
-        no unit has been seen at rest: see `relative_to`."""
+        raw readings are converted, as others do not show their unit's rest, and only of a sensor with a typical
+        rest."""
         if self.kind != "raw" or typical_rest(self.sensor) is None:
             return self.change
         return Changes(len(self.change), self.typical_of)[EVERY]
 
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
-        """Change (T, e) counts, converted to a unit that rests at counts (e,); of raw readings alone."""
+        """Change (T, e) counts, of raw readings converted to a unit that rests at counts (e,)."""
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
-        """Convert changes (T, e) counts of a typical unit at rest counts (e,) to those of raw readings of this one.
-        Gains and the fluid's drift stay taken off; other changes than raw ones are of no unit that is known."""
+        """Convert changes (T, e) counts of a typical unit at rest counts (e,) to this unit's raw readings. The unit's
+        gains and the fluid's drift are not put back; changes that are not raw stay as they are."""
         if self.kind != "raw" or at is None:
             return change
         own = divider.of_unit(change, self.rest, at)
@@ -153,6 +152,6 @@ class Signals:
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Convert changes (n, 19) counts of a unit at rest counts (19,) to a typical one's, where they are raw."""
+    """Convert raw changes (n, 19) counts of a unit at rest counts (19,) to a typical unit's; others stay."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

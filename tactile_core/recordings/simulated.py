@@ -1,16 +1,14 @@
-"""The project's own simulated recording: one HDF5 file that says that it is simulated and carries its truth.
+"""The project's own simulated recording: one HDF5 file that says that it is simulated and holds its true values.
 
 Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sensor``, ``scene`` (TOML text), ``seed``,
-``made_by``, ``note``, ``polarity`` ("falls"; files without it are older, their counts rise), ``start_time`` (unix s,
-0 if unknown). Datasets, T first: ``time`` (T,) float64 s; ``electrodes``
-(T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit counts; ``truth/displacement_biotac`` (T, N, 3) and
-``truth/displacement_digit`` (T, M, 3) int16 with attribute ``scale`` (m a unit); ``truth/force`` (T, 3) float32 N;
-``truth/contact_center`` (T, 2) float32 m; where asked for ``truth/traction_biotac`` (T, N, 3) and
-``truth/traction_digit`` (T, M, 3) float32 Pa; so of further sensors,
-by their names. The same arrays give the same bytes. `tactile simulate --keep` leaves out
-the rest but ``time`` and ``truth/force``; without ``electrodes`` (and the counts) the file is no recording to
-translate.
-"""
+``made_by``, ``note``, ``polarity`` ("falls"; older files without it have counts that rise), ``start_time`` (unix s, 0
+if unknown).
+Datasets, T first: ``time`` (T,) float64 s; ``electrodes`` (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit
+counts; ``truth/displacement_biotac`` (T, N, 3) and ``truth/displacement_digit`` (T, M, 3) int16 with attribute
+``scale`` (m a unit); ``truth/force`` (T, 3) float32 N; ``truth/contact_center`` (T, 2) float32 m; where asked for
+``truth/traction_biotac`` (T, N, 3) and ``truth/traction_digit`` (T, M, 3) float32 Pa; likewise those of further
+sensors. The same arrays give the same bytes. `tactile simulate --keep` writes only some of them besides ``time`` and
+``truth/force``; a file without ``electrodes`` is no recording to translate."""
 
 from __future__ import annotations
 
@@ -93,7 +91,8 @@ def _write_whole(
     forces: dict[str, np.ndarray],
     tractions: dict[str, np.ndarray],
 ) -> None:
-    """Write the file whole or not at all, equal arrays to equal bytes; in memory, as HDF5 crashes on a full disk."""
+    """Write the file whole or not at all, equal arrays to equal bytes; built in memory, as HDF5 crashes on a full
+    disk."""
     import h5py
 
     memory = io.BytesIO()
@@ -117,7 +116,7 @@ def _write_whole(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Read an opened file, its truth float32 in m. Raises TactileError for misfits, and without electrodes."""
+    """Read an opened file, true values as float32 m. Raises TactileError for misfits, and without electrodes."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")
@@ -133,7 +132,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
 
 
 def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
-    """Read stamps (T,) s and truth of a file of this format, with electrodes or without. Raises TactileError."""
+    """Read stamps (T,) s and true values of such a file, with electrodes or without. Raises TactileError."""
     with open_hdf5(os.fspath(path)) as store:
         if store.attributes.get("format") != FORMAT:
             raise TactileError(path, f"format {store.attributes.get('format')!r}", repr(FORMAT))

@@ -1,4 +1,4 @@
-"""Time stamps: their unit, those that are missing, coarse or out of order, and the rate that they show."""
+"""Time stamps: their unit, missing, coarse or disordered ones, and the rate that they show."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
 
 
 def unit_of(stamps: np.ndarray) -> Unit:
-    """Return the unit of stamps (T,): the one of a likely rate, else by their size, where they are of unix time."""
+    """Return the unit of stamps (T,): that which gives a likely rate, else that which makes them unix time."""
     steps = np.diff(stamps)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     likely = [unit for unit, length in SECONDS.items() if LIKELY[0] <= 1 / max(step * length, 1e-12) <= LIKELY[1]]
@@ -70,7 +70,8 @@ def is_likely(values: np.ndarray) -> bool:
 
 
 def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Spread frames (T,) of one stamp evenly up to the next, at the ends by the usual step; and say so."""
+    """Spread frames (T,) that share a stamp evenly up to the next, at the ends by the usual step; also return
+    sentences."""
     steps = np.diff(seconds)
     if len(steps) < FEWEST or not (steps >= 0).all() or (steps == 0).mean() < SHARED:
         return seconds, []
@@ -88,7 +89,7 @@ def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def tell_rate(seconds: np.ndarray) -> list[str]:
-    """Write a sentence on frames that come much faster or slower than those that the filters were made for."""
+    """Return a sentence on frames much faster or slower than those that the filters were made for."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     if not len(forward):
@@ -119,7 +120,7 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
 
 
 def time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Find frames before which the stamp went back, stood still or left a gap; and write sentences about them."""
+    """Find frames before which the stamp went back, stood still or left a gap; also return sentences on them."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE

@@ -46,8 +46,9 @@ LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (a
 @dataclass(frozen=True)
 class Adapted:
     """Fitted sensor with warnings for the user.
-    fitted : (19,) bool, the electrodes with a gain; uncertainty : relative error of a gain to be expected, rms over
-        electrodes, beside a factor common to all; NaN where none has a gain"""
+    fitted : (19,) bool, the electrodes that have a gain
+    uncertainty : expected relative error of a gain, rms over electrodes, apart from a factor common to all; NaN where
+        no electrode has a gain"""
 
     sensor: ElectrodeGains
     fitted: np.ndarray
@@ -59,9 +60,11 @@ def adapt(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     rest: UnitRest | None = None,
 ) -> Adapted:  # fmt: skip
-    """Fit one sensor from its recordings, all together. Recordings without a calm part near the unit's rest, given or
-    estimated from all together, use that. Raises TactileError: a recording that cannot be read or is scaled, signed and
-    rectified ones mixed, too few frames in contact."""
+    """Fit one sensor from all of its recordings together.
+
+    A recording that is never calm near the unit's rest uses the given rest, or the one estimated from all recordings.
+    Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
+    in contact."""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings) if rest is None else rest
@@ -91,9 +94,9 @@ def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
-    """Fit each unit of a set of recordings: one, or one a finger where the files hold hands; with warnings.
-    untouched : recording of the unit's rest, where there is one unit of a sensor whose typical rest is known
-    Raises TactileError like `adapt`, and for files of hands and of single fingers together."""
+    """Fit the unit of a set of single-finger recordings, or one unit for each finger of a hand; also returns warnings.
+    untouched : recording of the unit's rest, for a single unit of a sensor whose typical rest is known
+    Raises TactileError like `adapt`, and for a mixture of hands and single fingers."""
     columns = None if options is None else options.columns
     every = [one for path in paths for one in each_finger(path, columns)]
     found = {sensor_of(one, columns) for one in every}
@@ -116,7 +119,7 @@ def adapt_hand(
 
 
 def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | None) -> UnitRest:
-    """Read the rest of a unit; raises TactileError for several units, and where it is no use to the sensor."""
+    """Read a unit's rest. Raises TactileError for several units, and for a sensor without a typical rest."""
     if units > 1:
         raise TactileError("--rest", f"given for {units} units", "one", "Adapt to each finger by itself: FILE#0")
     if typical_rest(sensor) is None:
@@ -130,7 +133,7 @@ def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | No
 
 
 def _units(every: Sequence[str]) -> dict[str, list[str]]:
-    """Sort recordings by the sections of their units. Raises TactileError for files of one unit and of several."""
+    """Group recordings by the section of their unit. Raises TactileError for a mixture of hands and single fingers."""
     units: dict[str, list[str]] = {}
     for one in every:
         chosen = split(one)
@@ -144,7 +147,7 @@ def _units(every: Sequence[str]) -> dict[str, list[str]]:
 
 
 def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
-    """Rest and film of a unit of a sensor that has no gains."""
+    """Estimate rest and film of a unit whose sensor has no gains."""
     folder = networks.shipped_folder(sensor)
     simulated = Simulated(reference_signals.read(folder).typical, np.array(read_card(folder)[0][REST]))
     rest = find_rest_sp([read(path, sensor=sensor) for path in files], simulated)
@@ -160,7 +163,7 @@ def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
 
 
 def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare: ElectrodeGains) -> float:
-    """Return the thickness of the unit's film by all its recordings, which are raw, together."""
+    """Return the thickness of the unit's film, estimated from all its raw recordings together."""
     plain = dataclasses.replace(options or PrepareOptions(), film=1.0, drift=False)
     every = [Preparer(plain, bare)(one) for one in recordings]
     change = np.concatenate([one.change for one in every])
@@ -172,13 +175,12 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
 
 
 def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
-    """Return a unit of which the rest alone is known, from a recording of the untouched finger. Raises TactileError."""
+    """Return a unit of which only the rest is known, from a recording of the untouched finger. Raises TactileError."""
     name = os.path.basename(path)
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 
 
 def _bare(rest: UnitRest | None) -> ElectrodeGains | None:
-    """Return a unit with a known rest alone."""
     if rest is None:
         return None
     source = f"the {rest.recordings} least pressed recordings" if rest.recordings else "a recording without contact"
@@ -195,7 +197,7 @@ def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
 def _fitted(
     parts: list[np.ndarray], rectified: bool, typical: ReferenceSignals, note: str, bare: ElectrodeGains | None
 ) -> Adapted:
-    """Fit gains and offsets, and add the unit's rest; rest alone where there is too little contact to fit gains."""
+    """Fit gains and offsets and add the unit's rest; the rest alone where there is too little contact to fit gains."""
     change = np.concatenate(parts)
     if bare is None:
         return fit(change, rectified, typical, note)
@@ -214,8 +216,8 @@ def _contacts(signals: Signals) -> np.ndarray:
 
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
-    """Fit gains and offsets to frames in contact (n, 19) counts. Raises TactileError for fewer than half a second of
-    them, or of different contacts than FEWEST_CONTACTS."""
+    """Fit gains and offsets to frames in contact (n, 19) counts. Raises TactileError for less than half a second of
+    them, and for fewer than FEWEST_CONTACTS different contacts."""
     frames = len(change)
     if frames < FEWEST_FRAMES:
         advice = "Use recordings with more contact"
@@ -241,7 +243,8 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains that the frames do not determine by 1; returns gains, which were fitted, warnings for others."""
+    """Replace gains that the frames do not determine by 1; return the gains, a mask of the fitted ones, and
+    warnings."""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():
@@ -260,7 +263,7 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
 
 
 def _uncertainty(gain: np.ndarray, contacts: int) -> float:
-    """Error to be expected of fitted gains (n,) from so many different contacts; NaN of none."""
+    """Return the expected error of fitted gains (n,) from so many different contacts; NaN for none."""
     if not len(gain):
         return np.nan
     return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))

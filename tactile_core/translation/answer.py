@@ -27,9 +27,8 @@ class Answer:
     frames_apart : estimate each frame from its own signals; otherwise the contact is tracked through all frames
     mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: the position of the BioTac on it
     samples : number of contacts drawn for each frame from its posterior
-    contacts : 2 to look for a second contact in each frame. On another unit than the simulated one a single wide
-        contact is often taken for two: ask where you know that there may be two
-    """
+    contacts : 2 looks for a second contact in each frame. Use it only where there may be two: on a real unit a single
+        wide contact is often taken for two"""
 
     kind: Estimate = LIKELY
     frames_apart: bool = False

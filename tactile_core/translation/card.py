@@ -1,11 +1,10 @@
-"""The model card: sizes and tensors of its networks, their sensors, their errors on held-out presses and bounds.
+"""The model card: sizes and tensors of its networks, their sensors, their errors on held-out presses, error bounds.
 
-A bound holds for 95 of 100 largest errors: a factor on the expected error for each region. It is split conformal
-prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012). The groups are
-regions along the finger in which the contact lies: with one factor for all, bounds were too wide over the electrodes
-and too narrow beyond them. Results without contact are a group with the error itself as score: nearly all are right to
-a micrometre, and the few that missed a light touch have no ratio to such an expectation.
-"""
+A bound is a factor on the expected error that covers the largest error of 95 of 100 contacts. It is found by split
+conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012). The
+groups are regions along the finger: one factor for all gave bounds that were too wide over the electrodes and too
+narrow beyond them. Results without contact are a group whose score is the error itself: nearly all are right to a
+micrometre, so a ratio to the expected error says nothing about the few that missed a light touch."""
 
 from __future__ import annotations
 
@@ -116,12 +115,12 @@ WORSE = 0.8  # of the baseline, the error of no displacement at all: above it we
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
-    """Return the sensor that is read and the gel that is translated to; raises what ``descriptor.pair_of`` raises."""
+    """Return the sensor that is read and the gel that is translated to. Raises as ``descriptor.pair_of`` does."""
     return descriptor.pair_of(card, where, "networks", "") or PAIR
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return error and baseline, um, of the translation on held-out presses; None where the card has no such row."""
+    """Return error and baseline, um, of the translation on held-out presses; None for a card without that row."""
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):
@@ -132,8 +131,8 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Write a sentence on weights that are worse than none, or hardly better; "" for those that translate. Or return
-    the card's own, under ``DOUBT``."""
+    """Return a sentence on weights that are worse than none or hardly better, or the card's own (``DOUBT``); "" for
+    none."""
     if isinstance(card.get(DOUBT), str):
         return card[DOUBT]
     found = chain_error(card)
@@ -147,7 +146,7 @@ def doubt(card: Mapping[str, Any]) -> str:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return the 99 % quantile of a quantity in a card's ``silence``, frames of noise without contact."""
+    """Return the 99 % quantile of a quantity over frames of noise without contact, from a card's ``silence``."""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 
 
@@ -159,13 +158,14 @@ KINDS = ("signed", "rectified")
 
 
 def region(x: np.ndarray) -> np.ndarray:
-    """Return the region's number (T,) int. x : (T,) m, contact's middle along the finger, NaN without contact."""
+    """Return the number (T,) int of a contact's region. x : (T,) m, place along the finger; NaN without contact"""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 
 def fit_bounds(error: np.ndarray, expected: np.ndarray, x: np.ndarray) -> list[float]:
-    """Fit the REGIONS numbers that cover LEVEL of the contacts of each region, four digits: m, then factors.
-    error, expected : (C,) m, the largest node error and what was expected of it; x : (C,) m, as in `region`"""
+    """Fit the bounds of all REGIONS, four digits each: a length in m (without contact), then factors on the expected
+    error. Each covers LEVEL of the contacts in its region.
+    error, expected : (C,) m, the largest node error and its estimate; x : (C,) m, as in `region`"""
     ratio, where = error / expected, region(x)
     scores = [error, *[ratio] * (REGIONS - 1)]
     parts = [score[where == each] for each, score in enumerate(scores)]
@@ -177,13 +177,14 @@ def _quantile(score: np.ndarray) -> float:
 
 
 def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
-    """Bound (T,) float32 m on 95 of 100 largest errors. expected : (T,) m; x : (T,) m, as in `region`."""
+    """Bound (T,) float32 m of 95 of 100 largest errors. expected : (T,) m; x : (T,) m, as in `region`"""
     where = region(x)
     return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 
 
 def check_tables(card: dict[str, Any], where: str) -> None:
-    """Check the quantiles behind confidence and silence, growing finite numbers, one a level, and the bounds."""
+    """Raise TactileError unless a card has bounds, and rising finite quantiles, one a level, for confidence and
+    silence."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
     distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
@@ -207,7 +208,7 @@ def _grows(values: Any) -> bool:
 
 
 def check_pair(card: dict[str, Any], source: str | None, target: str | None, where: str) -> None:
-    """Check that a card's networks, which its hashes of surfaces name, lead from a sensor to the gel of another."""
+    """Raise TactileError unless a card's networks translate from `source` to `target` (None: any)."""
     if target is not None:
         sensors.shape_of(target)  # raises for a name that is none, and for a sensor without a gel
     known = pair_of(card, where)

@@ -64,8 +64,8 @@ class ContactFrame:
         return local
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
-        """Locate the dent of (T, n, 3): (T, 2) float32, in PLACE_UNIT cells from the lattice's middle, row and column.
-        The mean of the nodes that move more than `CORE` of the largest, weighted with their displacement."""
+        """Locate the dent of (T, n, 3): (T, 2) float32, row and column from the lattice's middle in PLACE_UNIT cells.
+        It is the mean of the nodes that move more than `CORE` of the largest displacement, weighted with theirs."""
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
         peak = moved.max(-1, keepdims=True)
@@ -95,7 +95,7 @@ class ContactFrame:
         return np.outer(along, along).astype(np.float32)
 
     def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Cut the window (T, width, width, 3) around each cell out of a field (T, n, 3); 0 beyond the lattice."""
+        """Cut the window (T, width, width, 3) around each cell (T, 2) from a field (T, n, 3); 0 beyond the lattice."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)
         out = np.zeros((len(local), self.width, self.width, 3), local.dtype)
         for frame, cell in enumerate(cells):
@@ -104,7 +104,7 @@ class ContactFrame:
         return out
 
     def add(self, local: np.ndarray, windows: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Add windows (T, width, width, 3) to the field (T, n, 3) round each cell, in place."""
+        """Add windows (T, width, width, 3) to a field (T, n, 3) around each cell (T, 2), in place."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)  # a view
         for frame, cell in enumerate(cells):
             on_grid, in_window = self._overlap(cell)
@@ -112,7 +112,7 @@ class ContactFrame:
         return local
 
     def _overlap(self, cell: np.ndarray) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """Slices of the lattice and of the window in which they meet."""
+        """Return the part of the lattice that a window covers, and the part of the window that lies on the lattice."""
         on_grid, in_window = [], []
         for middle, size in zip(cell.tolist(), (self.rows, self.columns), strict=True):
             first, last = max(middle - self.half, 0), min(middle + self.half + 1, size)
@@ -122,7 +122,7 @@ class ContactFrame:
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:
-    """Return the moving frame of a sensor's surface; a skin's nodes are turned with their angle round its axis."""
+    """Return the moving frame of a sensor's surface; the nodes of a skin are rotated by their angle about its axis."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):

@@ -1,15 +1,12 @@
 """Track a contact through time: the most plausible path given the posteriors of all frames.
 
-A finger's contact moves little in 10 ms, so a frame whose signals leave two places open is decided by its neighbours.
-Each frame's posterior is a mixture; first the best path through its components is found, by their weights less the cost
-of each step (Viterbi 1967), then the places on it are smoothed both ways (Kalman filter; Rauch, Tung and Striebel
-1965). Force and depth may change within a frame, so they are not smoothed: they are the frame's own estimates, given
-its place. What changes slowly is the force over the size of the signals (at one place, under one object, force is
-proportional to it), and that is smoothed in the force's stead. `Tracker` runs the filter both ways through a recording,
-`ForwardTracker` forward alone, frame by frame, on live signals.
-
-A path may jump without contact, where frames are missing, and, at a cost, anywhere.
-"""
+A finger's contact moves little in 10 ms, so a frame whose signals allow two places is decided by its neighbours. Each
+frame's posterior is a mixture. The best path through its components maximises their weights less the cost of each step
+(Viterbi 1967). The places on that path are then smoothed both ways (Kalman filter; Rauch, Tung and Striebel 1965).
+Force and depth may change within a frame, so each frame keeps its own estimate of them, given its place; only the ratio
+of force to signal size, which changes slowly (at one place, under one object, they are proportional), is smoothed.
+`Tracker` runs the filter both ways through a recording, `ForwardTracker` forward only, frame by frame, on live signals.
+A path may jump without contact, where frames are missing and, at a cost, anywhere."""
 
 from __future__ import annotations
 
@@ -46,13 +43,12 @@ BLOCK, MARGIN = 256, 64  # frames smoothed at once, and how many more are read o
 
 @dataclass(frozen=True)
 class Evidence(Posterior):
-    """Posterior of each frame alone, and what its signals show beside it.
+    """Posterior of each frame alone, and what its signals show besides.
 
     size : (T,) counts, root mean square of the changes; rectified : (T,) bool
-    latent : (T, K) of the signals; unsigned : (T,) bool, those of lost signs that were not recovered
+    latent : (T, K) of the signals; unsigned : (T,) bool, frames whose lost signs were not recovered
     second : (T, e) counts, changes by the weaker of two contacts, NaN where there is one; (T, 0) where none is looked
-        for. All else is then of the stronger one
-    """
+        for. All other fields then describe the stronger contact"""
 
     size: np.ndarray
     rectified: np.ndarray
@@ -101,13 +97,13 @@ def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
 
 
 def needed(frames: np.ndarray, count: int) -> np.ndarray:
-    """Return the frames (n,), out of `count`, whose posteriors decide the states of rising frames (T,)."""
+    """Return the frames (n,), of `count` in all, whose posteriors are needed for the states of rising frames (T,)."""
     blocks = np.unique(frames // BLOCK)
     return np.unique(np.concatenate([np.arange(*_span(int(block), count)) for block in blocks]))
 
 
 def _span(block: int, count: int) -> tuple[int, int]:
-    """Return the first frame, and the one past the last, that a block and its margins hold."""
+    """Return the first frame of a block with its margins, and the one past its last."""
     return max(block * BLOCK - MARGIN, 0), min((block + 1) * BLOCK + MARGIN, count)
 
 
@@ -176,12 +172,12 @@ class ForwardTracker:
 
 
 def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """States (T, STATE) of contacts at places (T, PLACE), their force and depth each frame's own there."""
+    """States (T, STATE) of contacts at places (T, PLACE), with each frame's own force and depth at that place."""
     return np.concatenate([place, evidence.near(place, touched)[:, PLACE:]], axis=-1)
 
 
 def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Logarithm of forces, given on their asinh scale, over signals' sizes, counts."""
+    """Return log(force / signal size); force on the asinh scale of a state, size in counts."""
     return np.log(np.sinh(np.clip(force, LEAST_TOUCH, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
 
 
@@ -204,13 +200,13 @@ def _components(posterior: Posterior) -> _Frame:
 
 
 def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarray:
-    """Variance (..., STATE) of the change of a state in that time (...,)."""
+    """Return the variance (..., STATE) by which a state changes in a time (...,) s."""
     shorter = np.where(np.asarray(rectified)[..., None] & (np.arange(STATE) < PLACE), RECTIFIED_STEP, 1.0)
     return np.square(shorter * STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
 def _ratio_step(seconds: np.ndarray) -> np.ndarray:
-    """Variance (T,) of the change of `_log_ratio` in that time (T,)."""
+    """Return the variance (T,) by which `_log_ratio` changes in a time (T,) s."""
     return RATIO_STEP**2 * seconds / FRAME
 
 
@@ -221,12 +217,13 @@ def _elapsed(time: np.ndarray, before: float = -np.inf) -> np.ndarray:
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Negative cost (..., C, C) of each component's step to each of the next frame, and true where it is free.
+    """Return the log probability (..., C, C) of each component's step to each of the next frame, and whether it is
+    free.
 
-    The cost is half the squared distance in standard deviations, without a density's normalisation: neighbours err
-    together, by gains and rest, so that two frames that agree prove less than with independent errors (with it, the 90
-    % quantile of place is 6.1 cells for 3.3, on the recording that the steps were chosen by).
-    """
+    It is minus half the squared distance in standard deviations, without a density's normalisation: errors of
+    neighbouring frames are correlated (gains, rest), so two frames that agree prove less than independent ones would.
+    (With it, the 90 % quantile of place is 6.1 cells instead of 3.3, on the recording that the steps were chosen
+    by.)"""
     far = now.mean[..., None, :, :] - before.mean[..., :, None, :]
     known = np.square(now.spread[..., None, :, :]) + np.square(before.spread[..., :, None, :])
     lightest = np.minimum(now.mean[..., None, :, PLACE], before.mean[..., :, None, PLACE])
@@ -238,9 +235,9 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the scores (C,) of paths to the last of frames after one that is scored (C,), and where they came from.
-    moves : (T, C, C); weight : (T, C), logarithms; the second, (T, C), is each component's best one in the frame
-        before"""
+    """Continue the best paths (Viterbi): from their scores (C,) through further frames, return the last scores (C,),
+    and for each frame and component (T, C) its best predecessor.
+    moves : (T, C, C) log probability of each step; weight : (T, C) log weights of the components"""
     came = np.empty(weight.shape, int)
     for frame, move in enumerate(moves):
         total = score[:, None] + move
@@ -267,8 +264,8 @@ def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
 def _filtered(
     value: np.ndarray, noise: np.ndarray, steps: np.ndarray, mean: np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Filter a random walk forward (Kalman 1960): means, variances and, before each measurement, variances (T, k).
-    value, noise, steps : (T, k) measurements, their variances, and those of the walk before each
+    """Filter a random walk forward (Kalman 1960): means, variances, and variances before each measurement (T, k).
+    value, noise, steps : (T, k) measurements, their variances, and the walk's variance before each
     mean, variance : (k,) of the walk before the first"""
     means, variances, expected = (np.empty_like(value) for _ in range(3))
     for frame, step in enumerate(steps):
@@ -281,7 +278,7 @@ def _filtered(
 
 
 def _smoothed(value: np.ndarray, noise: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Means (T, k) of a random walk of variances `steps` (T, k), given all its measurements and their variances."""
+    """Means (T, k) of a random walk given all measurements, their variances, and the walk's `steps` (variances)."""
     mean, variance, expected = _filtered(value, noise, steps, value[0], np.zeros(value.shape[1]))
     for frame in range(len(steps) - 2, -1, -1):
         back = variance[frame] / expected[frame + 1]

@@ -31,13 +31,11 @@ PARTS = 8  # of the frames, whose scales say by their scatter how far the scale 
 
 @dataclasses.dataclass(frozen=True)
 class ForceScale:
-    """Scale of the translated force that fits the first half of the frames best, and what it does on the other half.
-
-    scale : measured over translated force; error : of it, relative: the scatter of an eighth of the frames
+    """Scale of the translated force that fits the first half of the frames best, judged on the other half.
+    scale : measured over translated force; error : relative error of it, from the scatter of eighths of the frames
     lag : s, of the force behind the electrodes; correlation : of the two, on the first half
-    without, scaled, constant : N, mean absolute error on the second half of the force as translated, of the scaled one,
-        and of the first half's median force
-    """
+    without, scaled, constant : N, mean absolute error on the second half: of the translated force, of the scaled one,
+        and of the first half's median"""
 
     scale: float
     error: float
@@ -49,7 +47,7 @@ class ForceScale:
 
     @property
     def better(self) -> bool:
-        """Return true if the scale is worth its number: force is nearer the measured one where it was not fitted."""
+        """Return true if the scaled force is nearer the measured one on the half that it was not fitted to."""
         return self.scaled < self.without and self.correlation >= TOGETHER
 
     def describe(self) -> str:
@@ -69,12 +67,10 @@ class ForceScale:
 def with_stiffness(
     unit: ElectrodeGains, named: str, paths: Sequence[str], translator: Translator, options: PrepareOptions
 ) -> tuple[ElectrodeGains, str]:
-    """Return a unit with the stiffness that a measured force shows, where it makes force better; and what was found.
-
-    Gains and offsets with which the scaled force is no nearer the measured one than without are given up as well.
+    """Return a unit with the stiffness that a measured force shows, if that improves the force; and a text on the fit.
+    Gains and offsets that do not improve the scaled force are dropped as well.
     named : file of the force beside the first recording, or columns of all recordings' own files
-    Raises TactileError for what `force_file.read_force` refuses, too few frames, and a scale that no unit has.
-    """
+    Raises TactileError for what `force_file.read_force` refuses, too few frames, and a scale that no unit has."""
     beside = paths[:1] if os.path.exists(named) else paths
     recordings = [read(path, options.columns, translator.source) for path in beside]
     forces = [read_force(named, recording) for recording in recordings]
@@ -132,7 +128,7 @@ def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: 
 def _translated(
     translator: Translator, recording: Recording, unit: ElectrodeGains, options: PrepareOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n,) s and sizes (n,) N of the translated force, of frames spread evenly over a recording."""
+    """Return times (n,) s and sizes (n,) N of the translated force in frames spread evenly over a recording."""
     frames = spread_out(len(recording), MOST_FRAMES)
     rows = PreparedRows(recording, frames, translator.answer, options, unit)
     whole = RecordingPass(translator, rows.read, rows.count)

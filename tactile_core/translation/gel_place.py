@@ -44,7 +44,7 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the posterior's share (T,) in contacts ``APART`` m and more on the gel from states (T, STATE)."""
+    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from states (T, STATE)."""
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
     far = accuracy.lengths(points - on_gel(frame, place)[:, None]) > APART
@@ -79,10 +79,9 @@ def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
     """Mark (T, n) bool the nodes in contact from displacements (T, n, 3) m of a surface that is one lattice.
 
     A surface takes the indenter's curvature in contact and the opposite one beside it: the patch is where the smoothed
-    Laplacian of the depth is negative. (The pressure on a half-space is |k| times the depth over wave numbers k; k^2 in
-    its place is the local form, and measured better: thin gels damp long waves.)
-    A frame dented less than ``FLOOR`` has none.
-    """
+    Laplacian of the depth is negative. (Pressure on a half-space is |k| times the depth, k the wave number; the
+    Laplacian takes k^2 instead, which measured better: thin gels damp long waves.) A frame dented less than ``FLOOR``
+    has no patch."""
     rows, columns = surface.shape
     inward = -np.einsum("tni,ni->tn", displacement, node_normals(surface.rest, surface.faces))
     found = inward.reshape(-1, rows, columns) > FLOOR
@@ -100,12 +99,12 @@ def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
 
 
 def _fast_length(least: int) -> int:
-    """Return a length of at least so many cells that Fourier sums take fast: one of factors 2, 3 and 5 alone."""
+    """Return the next length >= least with prime factors 2, 3 and 5 alone, for which FFTs are fast."""
     return next(length for length in range(least, 2 * least + 1) if pow(30, length, length) == 0)
 
 
 class Shift:
-    """Shift of fields at the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
+    """Shift fields of the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
         """Take the shift (2,) = (x, z) m of contacts."""

@@ -1,19 +1,18 @@
-"""The five networks and the force estimate as numpy: what runs where there is no torch, Blender included.
+"""The five networks and the force estimate in numpy, for machines without torch (Blender included).
 
 Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
-SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
-S2MPN  signal latent -> which contacts it may come from (`Posterior`), and with one of them -> BioTac latent
-M2MPN  BioTac latent -> DIGIT latent
-R2MPN  as S2MPN, for rectified signals: what makes it cope with unknown units would make S2MPN worse
-D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
-force  head, from the BioTac's latent       pressure and error  heads, from the signal
-parts  signal -> the signals of two contacts at once; weights may lack it
+  SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
+  S2MPN  signal latent -> posterior over contacts (`Posterior`); with one of these -> BioTac latent
+  M2MPN  BioTac latent -> DIGIT latent
+  R2MPN  as S2MPN, for rectified signals: training for unknown units, which it needs, would make S2MPN worse
+  D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
+  force  head on the BioTac latent            pressure, error  heads on the signal
+  parts  signal -> the signals of two contacts at once; weights may lack it
 
 Results are computed in blocks of `BLOCK` frames, padded with zeros, so that a frame gives the same numbers whatever
-part of a recording it is asked for with: the matrix products then have the same shape (equal bits with OpenBLAS as
-measured on most machines; where a BLAS rounds by a row's place in the block, as on some processors without AVX-512,
-equal to 1e-5 of the largest number). A frame alone goes by itself, in a twentieth of the time, and is as equal.
-"""
+other frames are asked for: the matrix products then have the same shape (equal bits with OpenBLAS as measured on most
+machines; equal to 1e-5 of the largest number where a BLAS rounds by a row's place in the block, as on some processors
+without AVX-512). A single frame is computed alone, in a twentieth of the time, and is as equal."""
 
 from __future__ import annotations
 
@@ -42,13 +41,12 @@ SHIPPED_CARD_SHA256 = "9fa2615fd2ff73ac79a38a53f32e45e1d1af0587d25167aeea3b684e2
 
 
 class Networks:
-    """The trained networks. Arrays are float32, T first; displacements in metres, forces in newtons, changes in counts.
+    """The trained networks. Arrays are float32, T first; displacements in m, forces in N, changes in counts.
 
     tensors : network -> tensor name -> array
-    card : the model card (see `training/export_weights.py` for its fields); source, target : the sensors that it names
-    electrodes : of the source; 19 where a shape says so is of a BioTac
-    sha256 : hash of the card, which fixes every file; names these weights
-    """
+    card : the model card (fields: `training/export_weights.py`); source, target : the sensors that it names
+    electrodes : number of the source's electrodes; shapes below say 19, as of a BioTac
+    sha256 : hash of the card, which identifies these weights"""
 
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
         self.card, self.sha256 = card, sha256
@@ -66,7 +64,7 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode change (T, 19) counts from rest, as `sensors.COUNT_SIGN`, rectified or not, to SVB's mean (T, K)."""
+        """Encode changes (T, 19) counts, signed as `sensors.COUNT_SIGN` or rectified, to SVB's mean (T, K)."""
         return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
@@ -109,7 +107,7 @@ class Networks:
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
-        """Map states of contacts (T, STATE) and their latent_source (T, L) to latent_target (T, L') at their place."""
+        """Map states (T, STATE) and latent_source (T, L) to latent_target (T, L') placed where the state says."""
         latent = self.m2m(latent_source)
         latent[:, :PLACE] = state[:, :PLACE]
         return latent
@@ -123,8 +121,8 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_source)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return the expected largest node errors (T, 2) m of BioTac and DIGIT, of change (T, 19) counts.
-        rectified : (T,) bool, or one for all"""
+        """Return the expected largest node errors (T, 2) m of BioTac and DIGIT. change : (T, 19) counts; rectified :
+        (T,) or one"""
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_source(self, displacement: np.ndarray) -> np.ndarray:
@@ -148,16 +146,16 @@ class Networks:
         return in_blocks(self._force, latent_source, (self.sizes["MVB"]["latent"],), "force")
 
     def force_in(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
-        """Return the force (T, 3) N, of the states' size, from states (T, STATE) and their latent_source (T, L)."""
+        """Return forces (T, 3) N: direction from latent_source (T, L), size from the states (T, STATE)."""
         estimate = self.force(latent_source)
         length = np.sqrt(np.square(estimate).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one. Rectified
-        ones' is proportional to the sum of their changes: where the gains are not known and a real finger shares its
-        changes out among the electrodes otherwise than a simulated one, their pattern misleads."""
+        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one for all.
+        For rectified frames it is proportional to the sum of changes: their pattern misleads where gains are unknown,
+        as a real finger distributes its changes otherwise than a simulated one."""
         return in_blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
@@ -215,13 +213,13 @@ class Networks:
         return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
-        """Apply a map whose input is the latent and the remainder of its place after rounding to whole cells."""
+        """Apply a map to a latent whose place is replaced by its remainder after rounding to whole cells."""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
         return in_blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append to a latent its place's remainder after rounding to cells: (B, L + 2); also returns the cells."""
+        """Append to a latent the remainder of its place after rounding to cells: (B, L + 2); also return the cells."""
         cells, left = self.frames[net].cells(latent[:, :PLACE])
         return np.concatenate([latent, left], -1), cells
 
@@ -274,8 +272,8 @@ def shipped_folder(source: str | None = None) -> Path:
 
 
 def load(folder: str | os.PathLike | None = None, source: str | None = None) -> Networks:
-    """Read and verify a weights folder; None: the weights that ship for recordings of a sensor, ``source``. raises:
-    TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)"""
+    """Read and verify a weights folder; None: the weights that ship for recordings of ``source``.
+    Raises TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)."""
     shipped, folder = folder is None, Path(folder or shipped_folder(source))
     card, digest = read_card(folder)
     if shipped and folder == WEIGHTS_FOLDER and digest != SHIPPED_CARD_SHA256:

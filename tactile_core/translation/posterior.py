@@ -1,4 +1,4 @@
-"""The state of a contact, and its posterior given the signals: a mixture of Gaussians."""
+"""The state of a contact, and its posterior given the signals."""
 
 from __future__ import annotations
 
@@ -21,10 +21,9 @@ class Posterior:
     """Posterior of a contact's state given the signals: a mixture of Gaussians.
 
     A state (STATE,) is the place of the gel's dent, as in the DIGIT's latent, asinh(force / 0.1 N) and asinh(depth of
-    that dent / 20 um); all zero without contact. The gel is flat and its place plain; at the BioTac's tip, where most
-    real contacts lie, the skin's lattice runs together in a pole and a place on it says little.
-    weight : (T, C), their sum one; mean, spread : (T, C, STATE)
-    """
+    that dent / 20 um); all zero without contact. The place is that on the gel, which is flat: at the BioTac's tip,
+    where most real contacts lie, the skin's lattice has a pole, and a place on it says little.
+    weight : (T, C), sum 1 over C; mean, spread : (T, C, STATE)"""
 
     weight: np.ndarray
     mean: np.ndarray
@@ -32,9 +31,10 @@ class Posterior:
 
     @property
     def likely(self) -> np.ndarray:
-        """State (T, STATE) float32 of the most plausible contact, not the average of all. From the place of the
-        heaviest component the mean shifts (Cheng 1995) over the components that share it: several often describe one
-        contact, and each alone is less certain."""
+        """State (T, STATE) float32 of the most plausible contact, not the average of all.
+
+        Mean shift (Cheng 1995) from the place of the heaviest component, over the components near it: several often
+        describe one contact, and together they are more certain than each alone."""
         state = self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
         touched = touches(state)
         for _ in range(MEAN_SHIFTS):
@@ -42,9 +42,9 @@ class Posterior:
         return state.astype(np.float32)
 
     def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-        """Return the mean (T, STATE) over components, weighted by their density at places (T, PLACE).
-        touched : (T,) bool, whether those in contact count or those without: the latter's place is zero, where contacts
-            lie too"""
+        """Return the mean state (T, STATE) of the components, weighted by their density at places (T, PLACE).
+        touched : (T,) bool, true averages the components in contact, false those without contact. (Both may lie at one
+            place, because components without contact have place zero.)"""
         spread = self.spread[..., :PLACE].astype(np.float64)
         far = (place[:, None] - self.mean[..., :PLACE]) / spread
         share = np.log(np.maximum(self.weight, np.finfo(np.float32).tiny)) - np.log(spread).sum(-1)
@@ -59,7 +59,7 @@ class Posterior:
         return (self.weight[..., None] * self.mean).sum(1)
 
     def drawn(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Draw states (T, count, STATE) of frames (T,), whose numbers are the only seeds."""
+        """Draw states (T, count, STATE) of frames (T,); the frame numbers are the seeds."""
         found = np.empty((len(frames), count, self.mean.shape[-1]), np.float32)
         for row, frame in enumerate(frames):
             random = np.random.default_rng([SEED, int(frame)])
@@ -71,5 +71,5 @@ class Posterior:
 
 
 def touches(state: np.ndarray) -> np.ndarray:
-    """Mark states (..., STATE) of contacts; others are of no contact."""
+    """Mark the states (..., STATE) that are in contact."""
     return state[..., PLACE] >= LEAST_TOUCH

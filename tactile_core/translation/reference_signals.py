@@ -1,5 +1,5 @@
-"""Store a few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match. They ship
-with the weights as ``signals.safetensors``, whose hash is in the card under "signals"."""
+"""A few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match. They ship with
+the weights as ``signals.safetensors``, whose hash is in the card under "signals"."""
 
 from __future__ import annotations
 
@@ -29,8 +29,9 @@ TRIES = 2_000  # readings made up to find the match's own bias
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
-    """Typical signals (P, 19) counts, signed; bias : log gain (19,) by which simulated signals match themselves. There
-    is a bias for signed and for rectified readings: a typical signal is a mean of signals, so it is smaller."""
+    """Typical signals (P, 19) counts, signed; bias : log gains (19,) that matching finds for simulated signals
+    themselves. There is one bias for signed and one for rectified readings: a typical signal is a mean of signals and
+    therefore smaller than they are."""
 
     typical: np.ndarray
     bias_signed: np.ndarray
@@ -65,7 +66,7 @@ def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
 
 
 def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Centres (p, 19) of points (n, 19) by Lloyd's k-means from some of them; at most COUNT, and half the points."""
+    """Return centres (p, 19) of points (n, 19) by Lloyd's k-means; p is COUNT, or half the points if that is fewer."""
     count = min(COUNT, len(points) // 2)
     centres = points[random.choice(len(points), count, replace=False)]
     for _ in range(TURNS):

@@ -20,8 +20,8 @@ PARTED = 0.25  # of the signal's length, the unit of half the difference between
 
 
 class SecondContact(NamedTuple):
-    """Second contacts of some rows (n,), and what all frames have of them.
-    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e); center : (T, 2) m; force : (T, 3) N"""
+    """Second contacts in n of T frames.
+    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e) counts; center : (T, 2) m; force : (T, 3) N"""
 
     rows: np.ndarray
     skin: np.ndarray
@@ -32,8 +32,8 @@ class SecondContact(NamedTuple):
 
 
 def told_apart(nets: Networks, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the changes (T, e) counts by the stronger contact and by the weaker, NaN where there is one.
-    unsigned : (T,) bool, frames whose signs are lost, which are left whole"""
+    """Separate the changes (T, e) counts of the stronger contact from those of the weaker, NaN where there is only one.
+    unsigned : (T,) bool, frames whose signs are lost; they are not separated"""
     tensors, blocks = nets.tensors[PARTS], nets.sizes[PARTS]["blocks"]
     change = np.asarray(change, np.float32)
     seen = np.concatenate([compress(change), compress(np.float32(FINE) * change)], -1)
@@ -50,9 +50,10 @@ def second_contact(
     nets: Networks, change: np.ndarray, silent: np.ndarray, mounted: Callable[[np.ndarray], np.ndarray], least: float,
     stiffness: float,
 ) -> SecondContact:  # fmt: skip
-    """Translate the weaker of two contacts by its changes (T, e), NaN where there is none, each frame alone.
-    silent : (T,) bool, frames without a first contact, which have no second; mounted : moves gels (n, M, 3) m by the
-    mount's shift; least : m, what a gel's deepest node moves by at least; stiffness : of `Signals`"""
+    """Translate the weaker of two contacts from its changes (T, e) counts, NaN where there is none, each frame alone.
+    silent : (T,) bool, frames without a first contact, which get no second
+    mounted : function that moves gels (n, M, 3) m by the mount's shift
+    least : m, smallest displacement of the deepest node that counts as contact; stiffness : of `Signals`"""
     center, force = np.full((len(change), 2), np.nan, np.float32), np.zeros((len(change), 3), np.float32)
     rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
     if not len(rows):

@@ -1,21 +1,20 @@
-"""Compare signals with those of simulated contacts: tell two contacts at once, and changes that no contact makes.
+"""Compare signals with those of simulated contacts, to find two contacts at once and changes that no contact makes.
 
-The networks know single contacts, and translate two to one between them or to one of the two. Electrodes respond to two
-contacts far apart about as to the sum of both, so each signal is fitted by one simulated contact and by two, of any
-strengths. Two always fit better; what counts is that they leave little where one leaves much. Signals of a unit unlike
-the simulated one are fitted badly by both, and not marked. A second contact near the first, or much lighter, looks like
-one.
+The networks know single contacts; they translate two contacts to one between them or to one of the two. Electrodes
+respond to two contacts far apart about as to the sum of both, so each signal is fitted by one simulated contact and by
+two, of any strengths. Two always fit better; a frame counts as two where two leave little and one leaves much. Both fit
+badly for signals of a unit unlike the simulated one, which are not marked. A second contact near the first, or much
+lighter, looks like one.
 
-A signal unlike even the most similar simulated contact comes from a wrong rest, polarity or order of channels. One
-that is more like a change of the fluid's conductivity, which moves all electrodes alike, comes from drift.
-Rectified signals are not judged: without signs, two contacts look like one (5 % of pairs were found).
+A signal unlike every simulated contact comes from a wrong rest, polarity or order of channels. One that is more like a
+change of the fluid's conductivity, which moves all electrodes alike, comes from drift. Rectified signals are not
+judged: without signs, two contacts look like one (5 % of pairs were found).
 
-The signs of rectified changes are recovered where they match one simulated contact closely.
-Which electrodes rise and which fall goes with the pattern of their sizes: on test contacts of a unit with gains 10 %
-off the nearest simulated signal has the right sign in 89 of 100 electrodes, with 98 % of the changes' sum. S2MPN then
-knows more of the place than R2MPN, which must allow for any signs. Real slides resemble no simulated contact as
-closely: there signs would hop from frame to frame, and nearly all frames are left as they are.
-"""
+Lost signs are recovered where rectified changes match one simulated contact closely, because the pattern of sizes
+determines which electrodes rise and which fall: on test contacts of a unit with gains 10 % off, the nearest simulated
+signal has the right sign in 89 of 100 electrodes, with 98 % of the changes' sum. S2MPN then finds the place better than
+R2MPN, which must allow for any signs. Real slides match no simulated contact as closely: signs would change from frame
+to frame, and nearly all frames stay as they are."""
 
 from __future__ import annotations
 
@@ -55,8 +54,9 @@ FIRST = 64  # patterns, the most similar to the signal, that one of the two is l
 
 @dataclass(frozen=True)
 class Patterns:
-    """Simulated contacts: signals (P, e) float64 counts; units (P, e), of length one; alike (P, P), their cosines.
-    drift : (e,), of length one: the change where the fluid's conductivity changes"""
+    """Simulated contacts: signals (P, e) float64 counts; units (P, e), scaled to length one; alike (P, P), their
+    cosines.
+    drift : (e,), of length one, the change when the fluid's conductivity changes"""
 
     signals: np.ndarray
     units: np.ndarray
@@ -65,7 +65,7 @@ class Patterns:
 
 
 def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
-    """Return the patterns of simulated contacts whose signals are (P, e) counts, of a unit at rest counts (e,)."""
+    """Return the patterns of simulated contacts with signals (P, e) counts, of a unit that rests at counts (e,)."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
     drift = divider.of_films(DRIFT, rest) - rest
     return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))
@@ -73,7 +73,7 @@ def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
 
 @functools.cache
 def shipped_patterns(sensor: str = SOURCE) -> Patterns:
-    """Return the patterns of the simulated contacts that lie beside a sensor's descriptor."""
+    """Return the patterns of the simulated contacts that ship with a sensor's descriptor."""
     return patterns_of(contact_signals(sensor), places_of(sensor).rest_counts)
 
 
@@ -99,21 +99,21 @@ def two_contacts(shares: np.ndarray) -> np.ndarray:
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
     """Mark (T,) bool the frames that resemble no simulated contact, or drift more, by ``residual_shares`` (T, 3).
-    change : (T, 19) counts; of a faint one, noise leaves a larger share"""
+    change : (T, 19) counts; in faint changes a larger share is allowed, for noise"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)
     return one > np.minimum(np.sqrt(UNLIKE**2 + change.shape[1] * NOISE**2 / square), by_drift)
 
 
 def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames whose estimated pressure (T,) Pa is not the measured one, NaN where none was."""
+    """Mark (T,) bool the frames whose estimated pressure (T,) Pa disagrees with the measured one (NaN: none)."""
     measured = np.maximum(measured, 0)
     return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + PRESSED)
 
 
 def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarray, np.ndarray]:
-    """Return the residual lengths (T,) of unit signals (T, 19) after fitting the best pattern, and the best two. Two
-    are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal."""
+    """Return the lengths (T,) of what the best pattern leaves of unit signals (T, 19), and of what the best two leave.
+    Two are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal."""
     alike, near = patterns.alike, signals @ patterns.units.T
     one = np.sqrt(np.maximum(1 - np.square(near.max(axis=1, initial=0)), 0))
     two = one.copy()
@@ -131,8 +131,9 @@ def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarra
 def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Restore the signs of changes (T, 19) counts where they are certain; also return the frames (T,) left rectified.
-    rectified : (T,) bool, those that have lost their signs; patterns : of the sensor, None for a BioTac's"""
+    """Restore the signs of changes (T, 19) counts where they are certain; also return the frames (T,) that stay
+    rectified.
+    rectified : (T,) bool, frames that have lost their signs; patterns : of the sensor, None for a BioTac's"""
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)
     if not len(rows):

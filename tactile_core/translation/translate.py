@@ -1,4 +1,4 @@
-"""One pass over a recording: its signals prepared, the contact tracked, every frame decoded."""
+"""One pass over a recording: prepare its signals, track the contact, decode every frame."""
 
 from __future__ import annotations
 
@@ -42,8 +42,7 @@ class Decoded(NamedTuple):
 
 
 class RecordingPass:
-    """Takes prepared frames of a recording, some at a time, through tracking and decoding. What it returns of a frame
-    does not depend on which others are asked for."""
+    """Track and decode frames of a recording, some at a time; a frame's result does not depend on the others."""
 
     def __init__(self, translator: Translator, read: Read, count: int) -> None:
         """Take read(frames), which gives their times and signals; count : frames of the whole recording."""
@@ -70,8 +69,8 @@ def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> Rec
 
 
 class PreparedRows:
-    """Rows of a recording in memory, prepared: of a long one only those that some frames need.
-    recording, signals : of the rows alone, prepared by all of the recording; count : frames of the whole recording"""
+    """Prepared rows of a recording in memory; of a long one only those that the requested frames need.
+    recording, signals : of these rows, prepared with the whole recording; count : frames of the whole recording"""
 
     def __init__(
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
@@ -87,11 +86,11 @@ class PreparedRows:
             self.signals = Preparer(options, unit)(recording, rows)
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the indices (n,) of needed frames (n,) among the rows."""
+        """Return the indices (n,) among the rows of frames (n,) of the recording."""
         return np.searchsorted(self._rows, frames)
 
     def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
-        """Return times (n,) s and signals of needed frames (n,)."""
+        """Return times (n,) s and signals of frames (n,) of the recording."""
         rows = self.at(frames)
         return self.recording.time[rows], self.signals.at(rows)
 
@@ -156,7 +155,7 @@ def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndar
 
 @lru_cache(maxsize=2)
 def _shared_translator(weights: str | None, source: str | None, answer: Answer) -> Translator:
-    """Load networks once a process: 13 MB, a quarter of a second."""
+    """Load networks once in a process: 13 MB, a quarter of a second."""
     return load_translator(weights, answer, None, source)
 
 

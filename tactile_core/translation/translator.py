@@ -47,20 +47,19 @@ class Translation(Summary):
     """Result of a translation; T frames first, float32, SI units.
 
     latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
-    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface
-    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact, as displacements are
-    pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero where the force is
+    displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface; zero without contact
+    force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
+    pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero without contact
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
-    confidence : (T,), share of frames like this one whose largest node error is below ``error_bound_digit``, on
-        simulated units; less far from the training, at most `UNTRAINED_CONFIDENCE` where a flag doubts the frame
-    expected_error_biotac, expected_error_digit : (T,) m, half of all frames like this one have a largest node error
-        below it; error_bound_biotac, error_bound_digit : (T,) m, 95 of 100 have (as the validation presses had)
+    confidence : (T,), share of simulated frames like this one whose largest node error is below ``error_bound_digit``;
+        lower far from the training, and at most `UNTRAINED_CONFIDENCE` where a flag doubts the frame
+    expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one
+    error_bound_biotac, error_bound_digit : (T,) m, its 95 % quantile (as of the validation presses)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
-    second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, where `Answer.contacts` asks for
-        two; NaN and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
-    explained : (T,), share of the electrodes' change, 1 less the squared rest over its square, that such a unit shows
-        under the translated contact; at most 1, below 0 where no change is a better guess, NaN without contact
-    """
+    second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
+        and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
+    explained : (T,), 1 - |change - predicted|^2 / |change|^2, predicted being the electrodes' change that such a unit
+        shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without contact"""
 
     latent_signal: np.ndarray
     latent_biotac: np.ndarray
@@ -92,11 +91,10 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 class Translator:
-    """Verified networks that encode signals and decode contacts.
-    card : their model card; sha256 : of the card, which names all weights"""
+    """Verified networks that encode signals and decode contacts; card : their model card; sha256 : of the card"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
-        """Take patterns : simulated contacts of the source; None for a BioTac's, which ship."""
+        """Store networks and options; patterns : simulated contacts of the source, None for a BioTac's, which ship."""
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
         self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()
@@ -108,8 +106,8 @@ class Translator:
         self._unrolled = surface.unrolled_nodes(self.source)
 
     def encode(self, signals: Signals) -> Evidence:
-        """Return each frame's own posterior of its contact, and what tracking and decoding need beside it. Raises
-        TactileError for another sensor's signals."""
+        """Return each frame's own posterior, and what tracking and decoding need. Raises TactileError for another
+        sensor."""
         change, unsigned = self.changes(signals)
         whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
         if self.answer.contacts > 1:
@@ -121,8 +119,9 @@ class Translator:
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, **beside)
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
-        """Draw contacts on the gel for each frame from its posterior, as many as the answer asks for, by ``SAMPLES``.
-        frames : (T,) in the recording, whose numbers are the only seeds; stiffness : of `Signals`
+        """Draw contacts on the gel for each frame from its posterior, by the names of ``SAMPLES``; ``answer.samples``
+        of them.
+        frames : (T,) numbers in the recording, which are the seeds; stiffness : of `Signals`
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
         states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
@@ -133,12 +132,13 @@ class Translator:
         return dict(zip(SAMPLES, (center, np.where(touched, force, 0).reshape(shape)), strict=True))
 
     def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
-        """Return what the networks see: changes (T, e) counts, with signs where they are known, and the frames (T,)
-        that are left rectified. Raises TactileError for another sensor's signals."""
+        """Return the networks' input: changes (T, e) counts, signed where signs are known, and the frames (T,) that
+        stay rectified. Raises TactileError for another sensor's signals."""
         return recovered(self._typical(signals), _rectified(signals), self._patterns)
 
     def _typical(self, signals: Signals) -> np.ndarray:
-        """Changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor's."""
+        """Convert changes to (T, e) counts of the unit that the networks know. Raises TactileError for another
+        sensor."""
         if signals.sensor != self.source:
             found = f"signals of a {sensors.title(signals.sensor)}"
             raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")
@@ -151,8 +151,7 @@ class Translator:
 
     def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:
         """Translate frames with their own evidence; a frame's numbers do not depend on its neighbours.
-        state : (T, STATE) of the contacts, estimated from several frames; None: from each frame alone, as ``answer``
-            says"""
+        state : (T, STATE) of contacts tracked through several frames; None estimates each frame alone, by ``answer``"""
         nets, rectified, alone = self.nets, evidence.rectified, state is None
         change = np.asarray(self._typical(signals), np.float32)
         latent_signal, unsigned = evidence.latent, evidence.unsigned
@@ -200,8 +199,9 @@ class Translator:
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
+
         displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts, changes against
-        rest. All are zero where no node of the gel moves as far as noise alone makes the networks move one."""
+            rest. All are zero where the gel moves less than noise alone makes the networks move it."""
         nets = self.nets
         skin = nets.m2m_back(nets.encode_target(displacement))
         found = {
@@ -216,8 +216,8 @@ class Translator:
     def _explained(
         self, signals: Signals, change: np.ndarray, predicted: np.ndarray, rectified: np.ndarray
     ) -> np.ndarray:
-        """Share (T,) of typical changes (T, e) that predicted ones (T, e) explain as the unit's own; see `Translation`.
-        Rectified ones (T,) bool are compared without signs."""
+        """Return the share (T,) of typical changes (T, e) that predicted ones (T, e) explain, as of this unit; see
+        `Translation`. Rectified frames (T,) bool are compared without signs."""
         at = self.card.get(REST, sensors.typical_rest(self.source))
         own, told = (signals.of_typical(each, at) for each in (change, predicted))
         own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
@@ -242,14 +242,14 @@ class Translator:
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool the changes (T, 19) counts outside those of the training, by any distance's quantile."""
+        """Mark (T,) bool the changes (T, 19) counts that lie outside the training's in any of the distances."""
         return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 
     def _confidence(
         self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray, explained: np.ndarray
     ) -> np.ndarray:
-        """Confidence (T,); see `Translation`. explained : (T,), NaN without contact. Each distance to the training's
-        signals takes off nothing up to its 95 % quantile, all at the outermost."""
+        """Return the confidence (T,); see `Translation`. explained : (T,), NaN without contact. Each distance to the
+        training's signals lowers it: by nothing up to the distance's 95 % quantile, to zero at the outermost."""
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         near = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))
@@ -262,7 +262,7 @@ class Translator:
         return np.stack([getattr(distance, name) for name in DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
-        """Quantiles (distances, T) or (distances, 1) at each distance's level over like validation frames."""
+        """Quantiles (distances, T) or (distances, 1), at a level each, over validation frames of the same kind."""
         table = self.card["distance"]
         limits = {
             kind: np.array([[np.interp(level[name], table["levels"], table[kind][name])] for name in DISTANCES])
@@ -271,7 +271,7 @@ class Translator:
         return np.where(rectified, limits["rectified"], limits["signed"])
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it."""
+        """Mark (T,) contacts of the BioTac that have no counterpart on the gel: the dent's centre unrolls beyond it."""
         moved = accuracy.lengths(displacement)
         peak = moved.max(axis=1, keepdims=True)
         core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))

@@ -48,8 +48,9 @@ DENIED = "PDC shows another pressure than that of the contact: drift, rest under
 
 
 def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: float = 0.0) -> bool:
-    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags, or its shape is.
-    expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where it is not known"""
+    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags, or by the error of its
+    shape.
+    expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where unknown"""
     doubted = confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS)
     return bool(doubted or (dent > 0 and expected_error > MOST_OF_DENT * dent))
 
@@ -64,7 +65,7 @@ def in_words(
 ) -> str:
     """Return a frame's line: "guess: rectified recording, expected error 0.40 mm of 1.20", or "no contact".
     confidence, flags, expected_error, dent : see `is_guess`
-    force : (3,) N of the translation, zero where it finds no contact; of a gel at rest no error is told"""
+    force : (3,) N of the translation, zero without contact, where no error is stated"""
     reasons = remarks(flags)
     touching = bool(np.any(force))
     guess = is_guess(confidence, flags, expected_error if touching else 0.0, dent)

@@ -31,13 +31,12 @@ THICKNESSES = 1.0, 0.7, 0.5, 0.35  # of the films over a typical unit's, that ar
 
 @dataclass(frozen=True)
 class UnitRest:
-    """Rest of a unit; counts : (19,); spread : (19,) counts, half the range of recordings' levels.
-
-    The range is that of their less pressed half, or of their middle half.
-
-    pdc : counts, None where the recordings have none; recordings : number that rest was averaged over, none where it
-        was recorded by itself; film : thickness over a typical unit's, None where it was not looked for
-    """
+    """Rest of a unit.
+    counts : (19,); spread : (19,) counts, half the range of levels in the less pressed half of the recordings (or the
+        middle half)
+    pdc : counts, None where the recordings have none
+    recordings : number that rest was averaged over, 0 for a recording of the rest itself
+    film : thickness over a typical unit's, None where it was not looked for"""
 
     counts: np.ndarray
     spread: np.ndarray
@@ -57,12 +56,11 @@ class Simulated:
 def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     """Find one unit's rest in recordings that may all be of contacts.
 
-    Each gives the level of the window of its lowest fluid pressure; the least pressed quarter of the levels is
-    averaged. Where one of them has no PDC, each electrode's median over the recordings is taken instead: this works
-    while different contacts leave different electrodes unloaded (on two real fingers, trials 01 to 03 of the PHAC set,
-    17 and 34 counts rms from what pressure gives; the least squeezed recordings by the sum of counts: 32 and 49).
-    Raises TactileError for fewer than three recordings, and for recordings that are not raw.
-    """
+    Each recording gives the level of its window of lowest fluid pressure; the least pressed quarter of the levels is
+    averaged. If a recording has no PDC, each electrode's median over the recordings is taken instead: that works while
+    different contacts leave different electrodes unloaded (on two real fingers, trials 01 to 03 of the PHAC set, 17 and
+    34 counts rms from the result by pressure; the least squeezed recordings by the sum of counts: 32 and 49). Raises
+    TactileError for fewer than three recordings, and for recordings that are not raw."""
     if len(recordings) < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
@@ -83,7 +81,7 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
 
 def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
     """Read the rest of a unit from a recording of it untouched. Raises TactileError for a recording that is not raw, or
-    in which an electrode moves as no drift moves it."""
+    in which an electrode moves more than drift does."""
     recording = read(path, columns)
     readings = _raw(recording)
     spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)
@@ -98,13 +96,12 @@ def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
 def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitRest:
     """Find rest and film of a BioTac SP's unit in recordings that have no PDC and all begin in contact.
 
-    Counts fall under load: rest is first each electrode's median over the tenth of all frames in which it reads
-    highest. There it bulges, so that this is too high, by up to 250 counts: rest is moved to where simulated contacts
-    leave least of the changes, with the film that leaves least. Halves of 35 recordings and of six sets of grasps: of
-    the other half the translation then explains a third to two thirds, and a tenth at most without (docs/units.md).
-    ``spread`` is half of what the tenth spans, its ends left out. Raises TactileError for fewer than three recordings
-    or snapshots, and for recordings that are not raw.
-    """
+    Counts fall under load, so rest is first each electrode's median over the tenth of all frames in which it reads
+    highest. The skin bulges there, so this is too high, by up to 250 counts: rest and film are then changed to those
+    with which simulated contacts explain most of the changes. Tested on halves of 35 recordings and of six sets of
+    grasps: the translation then explains a third to two thirds of the other half, and a tenth at most without
+    (docs/units.md). ``spread`` is half the range of that tenth without its ends. Raises TactileError for fewer than
+    three recordings or snapshots, and for recordings that are not raw."""
     contacts = sum(len(one) if np.isnan(one.time).all() else 1 for one in recordings)
     if contacts < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
@@ -118,7 +115,7 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
 
 
 def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: float) -> tuple[np.ndarray, float]:
-    """Move rest (e,) counts to where the contacts nearest to readings (n, e) leave least; returns it, and what."""
+    """Move rest (e,) counts to where simulated contacts explain readings (n, e) best; also return what they leave."""
     share = np.inf
     for _ in range(STEPS):
         change = readings - rest
@@ -141,7 +138,7 @@ def _pressure(recording: Recording) -> np.ndarray | None:
 
 
 def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:
-    """Level (19,) counts of the window of the lowest pressure, and that pressure, counts of PDC."""
+    """Return the level (19,) counts of the window of lowest pressure, and that pressure, counts of PDC."""
     electrodes = _raw(recording)
     n = min(window_frames(recording.rate), len(electrodes))
     windows = np.convolve(pdc, np.full(n, 1 / n), mode="valid")

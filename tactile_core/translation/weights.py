@@ -1,5 +1,5 @@
 """Read and write network weights: safetensors files, without the safetensors library, and their model card. Format:
-https://github.com/huggingface/safetensors#format. Nothing in it is executed: a hostile file can only be refused."""
+https://github.com/huggingface/safetensors#format. Reading executes nothing."""
 
 from __future__ import annotations
 
@@ -55,8 +55,7 @@ def to_safetensors(tensors: dict[str, np.ndarray]) -> bytes:
 
 def from_safetensors(data: bytes, where: str | os.PathLike) -> dict[str, np.ndarray]:
     """Decode arrays by name, in the dtype of the file, from the bytes of a safetensors file.
-    where : name of the file for the message
-    raises: TactileError if anything about the file is not as the format says"""
+    where : name of the file for the message. Raises TactileError for bytes that break the format."""
     header, body = _split(data, where)
     arrays: dict[str, np.ndarray] = {}
     spans = []
@@ -102,7 +101,7 @@ def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
 def _entry(
     name: str, entry: object, body: int, where: str | os.PathLike
 ) -> tuple[np.dtype, tuple[int, ...], tuple[int, int]]:
-    """Dtype, shape and byte range of one tensor, checked against each other and against the size of the body."""
+    """Return dtype, shape and byte range of one tensor, checked against each other and against the body's size."""
     place = f"{os.fspath(where)}, tensor {name}"
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
         raise TactileError(place, f"header entry {str(entry)[:80]}", "dtype, shape and data_offsets", ADVICE)
@@ -142,7 +141,7 @@ def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.P
 
 
 def read_bytes(path: str | os.PathLike) -> bytes:
-    """Read the bytes of a weights file. raises: TactileError if it is not there, cannot be read or is far too large"""
+    """Read the bytes of a weights file. Raises TactileError if it is missing, cannot be read or is far too large."""
     try:
         path = outside.inside(Path(path).parent, Path(path).name, "a weights file")
         return outside.read(path, MAX_FILE_BYTES, "a weights file")
@@ -153,9 +152,9 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def read_verified(
     path: str | os.PathLike, expected_sha256: str, shapes: dict[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Read arrays of a safetensors file whose hash and tensor shapes are known. For an intact file of other shapes the
-    error names the shapes, which says more than the hash. raises: TactileError naming the file or tensor, what was
-    found and what was expected"""
+    """Read arrays of a safetensors file whose hash and tensor shapes are known. Raises TactileError naming the file or
+    tensor, what was found and what was expected; for an intact file of other shapes it names the shapes, which say more
+    than a hash."""
     data = read_bytes(path)
     found = sha256(data)
     if found == expected_sha256:
@@ -187,8 +186,8 @@ def card_bytes(card: dict) -> bytes:
 
 
 def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
-    """Read a weights folder's model card and the SHA-256 of its bytes, which pins every file and so names the weights.
-    raises: TactileError if it is missing, not JSON, or of another format"""
+    """Read a weights folder's model card and the SHA-256 of its bytes, which identifies the weights: the card holds the
+    hash of every file. Raises TactileError if it is missing, not JSON, or of another format."""
     path = Path(folder) / CARD_NAME
     data = read_bytes(path)
     try:

@@ -1,6 +1,7 @@
-"""The verbs of ``tactile``: one file each, with its words, its arguments and the call of the room that does the work. A
-verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what is left when it is stopped), ``arguments``
-(parser) and ``run`` (options -> exit status). Its rooms are imported in ``run``, so that help costs nothing."""
+"""The verbs of ``tactile``, one file each.
+
+A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what an interruption leaves behind), ``arguments``
+(parser) and ``run`` (options -> exit status). It imports its rooms in ``run``, so that help costs nothing."""
 
 from . import (
     adapt,

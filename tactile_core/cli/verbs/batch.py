@@ -101,7 +101,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_cost(job: Job) -> None:
-    """Print what 1,000 frames of a job of translations build and cost on one core; inputs are not read for it."""
+    """Print what 1,000 frames of a job of translations hold and cost on one core; reads no input."""
     from ...jobs import plan
     from ...jobs.engine.recipes import Translate
 
@@ -124,7 +124,7 @@ def _say_warnings(folder: Path) -> None:
 
 
 def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
-    """Return what is done next with a job, or with one part of it, that ended without a failure."""
+    """Return the next step after a job, or one part of it, that ended without a failure."""
     from ...jobs.engine.recipes import Translate
 
     ours, name = isinstance(job.recipe, Translate), quote(str(folder))
@@ -135,7 +135,7 @@ def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
 
 
 def _job(folder: Path, options: argparse.Namespace) -> Job:
-    """Return the folder's job, made from the options where it has none. Raises TactileError where the two differ."""
+    """Return the folder's job, or make one from the options. Raises TactileError where the two differ."""
     from ...jobs.engine import inputs
     from ...jobs.engine import job as jobs
 

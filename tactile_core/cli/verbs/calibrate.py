@@ -165,7 +165,7 @@ def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
 
 
 def _object(unit: Calibration, through: float) -> str:
-    """Say how bright what touched the gel is, whose light through the coating is a share of the coating's own."""
+    """Describe the object's reflectance; through : its light through the coating, as a share of the coating's own"""
     seen = unit.with_through(through)
     return (
         f"the object's reflectance: {seen.object_reflectance:.2f} (0 black, 1 white; light through the coating,"
@@ -176,7 +176,7 @@ def _object(unit: Calibration, through: float) -> str:
 def _tell_test(
     options: argparse.Namespace, tried: list[Evaluation], photographs: Photographs, unit: Calibration
 ) -> int:
-    """Say what a trial found, and write what is asked for."""
+    """Print the errors of a tested calibration, and write the files that the options ask for."""
     from ...accuracy import HEADER, line
     from ...files import atomic
     from ...pictures.calibrate.evaluate import rows_of, sheet
@@ -200,7 +200,7 @@ def _tell_test(
 
 
 def _error(tried: list[Evaluation]) -> str:
-    """Say how far the pictures are from the photographs in the region of the press, and the background alone."""
+    """Describe the distance of pictures and photographs in the region of the press, beside the background's."""
     from ...pictures.calibrate.evaluate import mean_metrics
 
     ours, baseline = (each["roi_l1"] for each in mean_metrics(tried))
@@ -208,5 +208,5 @@ def _error(tried: list[Evaluation]) -> str:
 
 
 def _way(mm: float, less: str, more: str) -> str:
-    """Say where a press lies along a direction: 1.2 mm left."""
+    """Describe a position along a direction: 1.2 mm left."""
     return f"{abs(mm):.1f} mm {less if mm < 0 else more}"

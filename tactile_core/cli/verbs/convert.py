@@ -136,7 +136,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str], float | None]:
-    """Return the work on each recording, what translates and draws them, the recordings, and the bound in levels."""
+    """Return the work on each recording, what translates and draws, the recordings, and --error in grey levels."""
     from ...jobs import convert, results
     from ...jobs.error_budget import Budget, parse_budget
     from ...pictures import presets
@@ -162,7 +162,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
 
 
 def reverse(options: argparse.Namespace) -> int:
-    """Translate one gel's frames back, as --reverse asks for; returns the exit status."""
+    """Translate one gel's frames back for --reverse; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import results
     from ...jobs.reverse import reverse as translate_back

@@ -50,7 +50,7 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Optional library. module : to import; package : in the index; extra : of ours that brings it, "" for always"""
+    """Optional library; module : to import; package : in the index; extra : of ours that brings it, or """ ""
 
     module: str
     package: str
@@ -98,7 +98,7 @@ def report() -> Iterator[str]:
 
 
 def try_library(library: Library) -> tuple[str, str]:
-    """Import a library; returns its version, MISSING or BROKEN, and what is wrong, in words; "" where nothing is."""
+    """Import a library; returns its version (or MISSING, BROKEN) and what is wrong, "" for nothing."""
     install = advice(library.extra) if library.extra else f"python -m pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:

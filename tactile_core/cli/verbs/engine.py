@@ -1,4 +1,4 @@
-"""Arguments and helpers of the verbs that run jobs: where the work is done."""
+"""Arguments and helpers of the verbs that run jobs in several processes."""
 
 from __future__ import annotations
 
@@ -82,14 +82,14 @@ def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
 
 
 def tell_plan(planned: Path, folder: Path, after: str) -> None:
-    """Print what was planned, and how the parts of the job in `folder` are made; after : the command once they are."""
+    """Print a plan, and how to run the parts of the job in `folder`; after : the command that follows them."""
     tell(str(planned))
     parts = f"tactile batch --out {quote(str(folder))} --array I/N"
     next_step(f"{parts}, for each I from 0 to N - 1, on any machines; then {after}")
 
 
 def tell_planned_parts(folder: Path) -> None:
-    """Print the folder of a planned job whose shards are put together into one result, and how they are made."""
+    """Print the folder of a planned job whose shards are merged into one result, and how to make them."""
     tell_plan(folder, folder, ASSEMBLES)
 
 

@@ -133,7 +133,7 @@ def _done(folder: Path) -> int:
 
 
 def _calibration(file: str | None, gel: str | None) -> str | None:
-    """Return the calibration's file; of a gel that is named, the one that ships with it, or a file that is checked."""
+    """Return the calibration's file: the one that ships with the named gel, or the given one, checked for that gel."""
     if gel is None:
         return file
     from ...sensors.calibration_file import calibration_path, load_calibration

@@ -48,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _following(copied: list[Path]) -> str:
-    """Return a command that tries what was copied: a recording, or else a scene; "" where neither is among it."""
+    """Return a command that tries what was copied: a recording, or else a scene; "" for neither."""
     for recording in (folder / f"{folder.name}.h5" for folder in copied):
         if recording.is_file():
             return f"tactile convert {quote(str(recording))} --out results"

@@ -95,7 +95,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Return words of ``scene_recording.outputs``; ``traction`` is both sensors'. Raises TactileError for others."""
+    """Return names of ``scene_recording.outputs``; ``traction`` means both sensors'. Raises TactileError for others."""
     from ...jobs import results
     from ...sensors import PAIR
     from ...simulation.scene_recording import DEFAULT, outputs
@@ -132,7 +132,7 @@ def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier
 
 
 def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
-    """Simulate many."""
+    """Simulate every scene of a grid; returns the exit status."""
     engine.check_counts(options, "workers")
     if options.error:
         raise TactileError("--grid", "given with --error", "one of the two")

@@ -111,7 +111,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Raise TactileError for words that do not go together."""
+    """Raise TactileError for options that do not go together."""
     if (options.recording is None) == (options.rosbag_play is None):
         raise TactileError("tactile watch", "no recording, or two", "PATH or --rosbag-play FILE")
     if options.serve is not None and not 0 <= options.serve < 2**16:
@@ -133,7 +133,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _check_out(path: str) -> None:
-    """Raise TactileError for a place that no picture may take, before the first one is drawn: it would be lost."""
+    """Raise TactileError for a path that cannot take a picture, before the first is drawn."""
     from ...files import atomic, outside
     from ...files.png_writer import SIGNATURE
 
@@ -159,7 +159,7 @@ def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:
-    """List what shows frames: the file, the port, or without either a window. ``opened`` closes the port."""
+    """List the outputs of frames: file and port, or without either a window. ``opened`` closes the port."""
     outputs: list[Output] = []
     if options.serve is not None:
         from ...jobs.live import FrameServer
@@ -178,14 +178,14 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
 
 
 def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
-    """Draw a frame's pictures, one beside the other."""
+    """Return an output that draws a frame's pictures side by side."""
     import numpy as np
 
     return lambda shown, seen: draw(np.concatenate(list(seen.values()), axis=1))
 
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:
-    """Write pictures to a file that is complete at every moment."""
+    """Return a function that writes pictures to a file, which is complete at every moment."""
     from ...files import atomic
     from ...files.png_writer import pack_png
 
@@ -198,7 +198,7 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
 
 
 def _window(title: str) -> Callable[[np.ndarray], bool]:
-    """Show pictures in a window; False once the user closes it. Raises TactileError without a display."""
+    """Return a function that shows pictures, False once the window is closed. Raises TactileError without a display."""
     from matplotlib import pyplot
 
     if pyplot.get_backend().lower() == "agg":

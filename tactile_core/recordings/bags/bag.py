@@ -1,4 +1,4 @@
-"""Open ROS 1 and ROS 2 bags and MCAP files without ROS, and tell the topics with BioTacs from the others."""
+"""Open ROS 1 and ROS 2 bags and MCAP files without ROS, and separate topics with BioTacs from the others."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UNDAMAGED = re.compile(r"not supported|[Uu]nsupported|not ros2|not indexed|not i
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic with BioTacs. kind : type of its messages; definitions : those that they may have"""
+    """A topic with BioTacs. kind : message type; definitions : candidates for its definition"""
 
     name: str
     kind: str
@@ -39,7 +39,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """An open bag. topics : those with BioTacs, by name; others : those without, in words; middle : of its time, ns"""
+    """Open bag; topics : with BioTacs, by name; others : without, in words; middle : ns, of its time span"""
 
     path: str
     ros1: bool
@@ -95,7 +95,7 @@ def open_bag(path: str, file: BinaryIO) -> Iterator[Bag]:
 
 @contextmanager
 def refused(path: str) -> Iterator[None]:
-    """Turn an error of the library into a TactileError, which says damage only where the library saw damage."""
+    """Turn errors of the library into a TactileError; it speaks of damage only where the library found damage."""
     try:
         with damage_reported(path, "bag"):
             yield
@@ -107,7 +107,7 @@ def refused(path: str) -> Iterator[None]:
 
 
 def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
-    """Tell the topics with BioTacs from the others. Raises TactileError where there are none."""
+    """Separate the topics with BioTacs from the others. Raises TactileError where there are none."""
     grouped: dict[tuple[str, str], list[Any]] = {}
     for connection in reader.connections:
         grouped.setdefault((connection.topic, connection.msgtype), []).append(connection)
@@ -142,7 +142,7 @@ def _bound_unpacking() -> None:
     from rosbags.rosbag2 import storage_mcap
 
     def bounded(unpacker: Callable[[], Any]) -> Callable[..., bytes]:
-        """Make a function that unpacks a chunk by an ``unpacker()`` and stops at MAX_CHUNK."""
+        """Return a function that unpacks a chunk with an ``unpacker()`` and stops at MAX_CHUNK."""
 
         def unpack(data: bytes, size: int = 0) -> bytes:
             """Unpack a chunk, whatever size it declares; raises ValueError for one of MAX_CHUNK and more."""

@@ -24,14 +24,14 @@ LOOKED_AT = 100
 
 @dataclass
 class Finger:
-    """A sensor in a topic's messages. electrodes : their number; live : whether one of them is not 0"""
+    """A sensor in a topic's messages. electrodes : their number; live : true if one of them is ever non-zero"""
 
     electrodes: int
     live: bool = False
 
     @property
     def silence(self) -> str:
-        """The reason for which no recording is made of it, unless it is asked for."""
+        """Return why no recording is made of this finger unless it is asked for."""
         known = sensor_with(self.electrodes)
         return f"{self.electrodes} electrodes" if not known else "all zeros at the start and in the middle"
 
@@ -46,7 +46,7 @@ class Stream:
 
     @property
     def name(self) -> str:
-        """The words behind # that choose it in a bag of several topics."""
+        """Return the part of the path after # that selects this stream in a bag of several topics."""
         return f"{self.topic.name.strip('/')}/finger{self.number}"
 
     @property
@@ -56,9 +56,9 @@ class Stream:
 
 
 def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
-    """Return the fingers with signals of the chosen topic, or of all; of a topic without any, the first.
-    chosen : `split` of a path; its finger is returned alone, signals or not
-    Raises TactileError for a topic or finger that the bag has not."""
+    """Return the fingers with signals in the chosen topic, or in all; of a topic without any, its first finger.
+    chosen : `split` of a path; a finger that it names is returned alone, with signals or not
+    Raises TactileError for a topic or finger that the bag does not have."""
     topics, finger = _topics(bag, chosen)
     found: list[Stream] = []
     fingers = 0
@@ -98,7 +98,7 @@ def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
 
 
 def _hand(bag: Bag, topic: Topic) -> list[Finger]:
-    """Look at the fingers of some of a topic's messages, until one of them has signals."""
+    """Read some of a topic's messages, until a finger has signals; return all its fingers."""
     hand: list[Finger] = []
     for start in (None, bag.middle):
         for count, (_, sensors) in enumerate(_messages(bag, topic, start), start=1):
@@ -129,7 +129,7 @@ def read_bag(
 
 
 def _warnings(bag: Bag, chosen: Chosen, first: Stream, others: list[Stream]) -> list[str]:
-    """Sentences on what a reader of a whole bag misses."""
+    """Return sentences on what reading the bag as one recording leaves out."""
     if chosen.finger is None and not first.hand[first.number].live:
         return [f"all electrodes of all {len(first.hand)} fingers are 0: finger {first.number} is read"]
     if not others:
@@ -140,7 +140,7 @@ def _warnings(bag: Bag, chosen: Chosen, first: Stream, others: list[Stream]) -> 
 
 
 def _not_taken(bag: Bag, stream: Stream) -> tuple[str, ...]:
-    """Topics, fingers and fields of which no recording is made."""
+    """Return the topics, fingers and fields that are not read."""
     topic = stream.topic
     silent: dict[str, list[str]] = {}
     for number, one in enumerate(stream.hand):
@@ -177,7 +177,7 @@ def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
 def _messages(
     bag: Bag, topic: Topic, start: int | None = None
 ) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
-    """Yield stamp (unix s, the bag's if there is none) and sensors' `channels` of each message from `start` ns on."""
+    """Yield stamp (unix s; the bag's if it has none) and sensors' `channels` of each message from `start` ns on."""
     known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
         for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):
@@ -187,7 +187,7 @@ def _messages(
 
 
 def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict[str, Any], list[Any]]:
-    """Decode a message by the first definition that it fits, which is returned alone with its sensors."""
+    """Decode a message by the first definition that fits; also return that definition alone, with its sensors."""
     for one in known:
         try:
             return one[0](data), [one]

@@ -1,5 +1,5 @@
-"""Decode ROS messages by their definitions, which are parsed and never compiled. The decoding library generates code
-from definitions; those of bags come from strangers."""
+"""Decode ROS messages by their definitions, which are parsed and never compiled: the decoding library generates code
+from definitions, and those of a bag come from strangers."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ KNOWN: dict[str, list[dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class Definition:
-    """Fields of a message, and of those within it. types : name -> names and kinds of fields, as rosbags parses them"""
+    """Fields of a message and of those inside it. types : name -> names and kinds of fields, as rosbags parses them"""
 
     root: str
     types: dict[str, list[tuple[str, Any]]]
@@ -75,7 +75,7 @@ class Definition:
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
-    """Return the definitions that a type may have: the bag's own, or of `KNOWN`; unreadable ones are left out."""
+    """Return the possible definitions of a type: the bag's own, or those of `KNOWN`; unreadable ones are left out."""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
     if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):
@@ -92,14 +92,13 @@ def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
 
 
 def _parsed(texts: dict[str, str]) -> dict[str, Any]:
-    """Parse the definitions of types, by their names."""
     from rosbags.typesys import get_types_from_msg
 
     return {name: get_types_from_msg(text, name)[name] for name, text in texts.items()}
 
 
 class Decoder:
-    """A decoder of one type of message to dictionaries: numbers, arrays of numbers, texts, lists of dictionaries."""
+    """Decoder of one message type to dictionaries of numbers, arrays, texts and lists of dictionaries."""
 
     def __init__(self, definition: Definition, ros1: bool) -> None:
         self._definition, self._ros1 = definition, ros1
@@ -143,7 +142,7 @@ class _Cursor:
             self.place = 4
 
     def count(self) -> None:
-        """Raise ValueError for more messages within than bytes, as empty ones in nested lists make."""
+        """Raise ValueError once there are more nested messages than bytes, as empty ones in nested lists would make."""
         self._messages += 1
         if self._messages > len(self.data) + 64:
             raise ValueError("more entries than bytes")
@@ -160,7 +159,7 @@ class _Cursor:
         return found
 
     def text(self, kind: str) -> str:
-        """Return the next text, whose characters matter to nobody here."""
+        """Skip the next text, which is not needed."""
         length = int(self.numbers("u4", 1)[0]) * (2 if kind == "wstring" else 1)
         self.place += length
         if self.place > len(self.data):

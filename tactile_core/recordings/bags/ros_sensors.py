@@ -19,7 +19,7 @@ PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SensorFields:
-    """Names of a sensor's fields. path : to the sensor, or a list of them; slow : pdc, tac, tdc; others : not read"""
+    """Names of a sensor's fields; path : to the sensor or a list of them; slow : pdc, tac, tdc; others : not read"""
 
     path: tuple[str, ...]
     electrodes: str

@@ -1,13 +1,13 @@
-"""Layouts of recordings, one file each. Every module here is found automatically and has four names:
+"""Layouts of recordings, one file each, found automatically. Each module has four names:
 
 ``CONTAINER``  "csv", "hdf5", "npz" or "mat"
 ``NAME``       the layout in words, for messages
-``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file ``read(source) ->
-Recording``  source is a ``table.Table`` for CSV, a ``array_store.Store`` for HDF5 and NPZ; it picks its columns and
-hands them to ``assemble.assemble``, which checks them.
-Arrays and columns that it does not pick are named to users as not taken. Those of MATLAB also have
-``fingers(keys)``, and ``read(store, finger)``, as those of a BioTac SP, whose ``SENSOR`` names it. Those of HDF5 have
-``ELECTRODES_NAME`` too, the array whose length is the number of frames: see ``chunks``.
+``score(keys) -> float``  share (0..1) of the layout's own columns or arrays among those of the file
+``read(source) -> Recording``  source is a ``table.Table`` for CSV, an ``array_store.Store`` for all others; it picks
+               its columns and gives them to ``assemble.assemble``, which checks them; the rest is reported as not taken
+
+A MATLAB layout has also ``fingers(keys)``, and ``read(store, finger)``, as a BioTac SP's has, whose ``SENSOR`` names
+it. An HDF5 layout has also ``ELECTRODES_NAME``, the array whose length is the number of frames (see ``chunks``).
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 
 
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
-    """Build the recording of a table with pdc, tac and tdc; time, electrodes, channels : the names of their columns.
-    Channels that the table leaves out are None, electrodes that it has not are dead channels. Raises TactileError for
-    another missing column, and the errors of ``assemble``."""
+    """Build the recording of a table with pdc, tac and tdc. time, electrodes, channels : names of their columns
+
+    Missing channels are None, missing electrodes dead channels. Raises TactileError for another missing column, and the
+    errors of ``assemble``."""
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)
         for channel, names in channels.items()
@@ -62,7 +63,7 @@ HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": 
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
-    """Return a file's largest share of the columns of a finger. style : of their names, from finger and number"""
+    """Return the largest share of one finger's columns in a file. style : of a column's name, by finger and number"""
     return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
 
 
@@ -72,7 +73,8 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build a finger's recording of a BioTac SP's table, other columns in ``about``. Raises as ``assemble`` does."""
+    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``
+    does."""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

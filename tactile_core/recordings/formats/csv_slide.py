@@ -1,4 +1,4 @@
-"""CSV of the slide set: timestamp,tdc,tac,pdc,pac1..22,ele1..19, a separator at the end of each row."""
+"""CSV of the public set of slides: timestamp,tdc,tac,pdc,pac1..22,ele1..19, a separator at the end of each row."""
 
 from __future__ import annotations
 

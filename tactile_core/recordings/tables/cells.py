@@ -1,4 +1,4 @@
-"""Cells of a table: numbers, times of day, and texts, which the table holds as numbers of words."""
+"""Cells of a table: numbers, times of day, and texts, which the table stores as their index."""
 
 from __future__ import annotations
 
@@ -51,20 +51,20 @@ def seconds(cell: str) -> float:
 
 
 class Words:
-    """Different texts of a column, each of which the table holds by its number."""
+    """Distinct texts of a column, which the table stores by their index."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
 
     def number(self, cell: str) -> float:
-        """Return the number of a text."""
+        """Return the index of a text."""
         word = cell.strip().translate(OUTSIDE)
         if word not in self._numbers and len(self._numbers) >= MOST_WORDS:
             word = MORE
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object of their numbers (T,) float; empty ones where a row had no such cell."""
+        """Return the texts (T,) object of indices (T,) float; empty where a row had no such cell."""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
@@ -81,7 +81,7 @@ class Cells:
     """Kinds of a table's columns. words : of columns of texts, by name; plain : true where all hold numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Decide it by the first rows."""
+        """Decide the kinds by the first rows."""
         self.words: dict[str, Words] = {}
         self._readers: list[Callable[[str], float]] = [_plain_number] * len(names)
         for place, name in enumerate(names):
@@ -124,5 +124,5 @@ def _is_clock(cell: str) -> bool:
 
 
 def unquoted(text: str) -> str:
-    """Return a text without quotes; separators within them are kept apart until a cell is read."""
+    """Return a text without quotes; separators within them are protected until a cell is read."""
     return QUOTED.sub(lambda found: found[1].strip().translate(INSIDE), text).replace('"', "") if '"' in text else text

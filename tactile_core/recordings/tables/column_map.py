@@ -28,12 +28,11 @@ MOST_NAMED = 40  # of the file's columns, in the comment of a new map
 class ColumnMap:
     """Names of a file's columns, in any case.
 
-    electrodes : of E1 to E19, "" for one that the file has not; or the one name of an array of 19 columns
-    time : empty where there is none, `rate` in Hz says it then; time_unit : of that column
-    pdc, tac, tdc : empty where there are none
-    channel, value : of a long table, a row for each value of a channel: its columns with the channel's name and the
-        value; electrodes, pdc, tac and tdc are then names of channels
-    """
+    electrodes : of E1 to E19, "" for one that the file lacks; or the one name of an array of 19 columns
+    time : "" where there is none, then `rate` in Hz counts; time_unit : of that column
+    pdc, tac, tdc : "" where there are none
+    channel, value : of a long table, which has a row for each value of a channel: its columns with the channel's name
+        and the value; electrodes, pdc, tac and tdc are then names of channels"""
 
     electrodes: tuple[str, ...] = ()
     time: str = ""
@@ -55,7 +54,7 @@ class ColumnMap:
         return [name.lower() for name in (*values, self.time) if name]
 
     def is_nanoseconds(self, name: str) -> bool:
-        """Return true for the column beside one of whole seconds, as ``stamp.nanosec`` beside ``stamp.sec`` of ROS."""
+        """Return true for the column beside one of whole seconds, as ROS's ``stamp.nanosec`` beside ``stamp.sec``."""
         stem = re.sub(r"secs?$", "", self.time.lower())
         return stem != self.time.lower() and re.fullmatch(re.escape(stem) + r"n(ano)?secs?", name) is not None
 
@@ -127,6 +126,6 @@ def _channel_lines(columns: ColumnMap) -> list[str]:
 
 
 def refuse_bag(path: str, container: str) -> None:
-    """Raise TactileError where a map is given for a bag, whose messages say what is what."""
+    """Raise TactileError where a map is given for a bag, whose messages name their fields."""
     if container == "bag":
         raise TactileError("--columns", f"given for {path} (bag)", "a file of columns or arrays", "Leave it out")

@@ -48,7 +48,7 @@ def read_json(path: str, file: BinaryIO) -> Table:
 
 
 def _records(path: str, text: str) -> Iterator[Any]:
-    """Yield the records of an array, or one after the other; a last one that is cut off ends them."""
+    """Yield the records of an array, or of records in sequence; a last one that is cut off ends them."""
     decode, place, count = json.JSONDecoder().raw_decode, _next(text, 0), 0
     if text[place : place + 1] == "[":
         place = _next(text, place + 1)
@@ -89,7 +89,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _of_object(path: str, whole: dict[str, Any]) -> Table:
-    """Make a table of the one object of a file: of its list of records, or of its lists of numbers."""
+    """Make a table of the file's single object: of its list of records, or of its lists of numbers."""
     lists = dict(_lists("", whole))
     constants = {name: str(value) for name, value in _flat("", {k: v for k, v in whole.items() if _plain(v)})}
     records = next((each for each in lists.values() if all(isinstance(one, dict) for one in each)), None)
@@ -114,7 +114,7 @@ def _lists(name: str, value: dict[str, Any]) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dict[str, str] | None = None) -> Table:
-    """Make a table of records; a field that a record has not is NaN."""
+    """Make a table of records; fields missing in a record are NaN."""
     begin = [dict(_flat("", record)) for record in begin if isinstance(record, dict | list)]
     for record in more:
         if len(begin) >= LOOKED_AT:

@@ -30,8 +30,8 @@ DRIVER = {"17": {"pdc": "1", "tac": "2", "tdc": "3"}}
 
 
 def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]:
-    """Guess the maps of a file's fingers, of which the first is to be read; without electrodes where none are found.
-    names : of the columns, in lower case; of arrays with their lengths, of which those of the electrodes' are taken
+    """Guess the maps of a file's fingers, the one to read first; without electrodes where none are found.
+    names : of the columns, in lower case; of arrays, with their lengths, those as long as the electrodes
     table : some of the columns' rows"""
     found = []
     for each in _series(names):
@@ -102,12 +102,12 @@ def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
 
 
 def _is_called(word: str, name: str) -> bool:
-    """Return true for a column of that channel, and not of an array of them."""
+    """Return true for the column of a channel, false for one of its array's columns."""
     return word in name.rpartition("/")[2] and not INDEXED.search(name)
 
 
 def _nearest(names: Iterable[str], like: str) -> str:
-    """Return the name that begins with most of another one, the first of such; empty where there is none."""
+    """Return the name with the longest common beginning with `like`, the first of such; "" for none."""
     return max(names, key=lambda name: _alike(name, like), default="")
 
 
@@ -134,7 +134,8 @@ def _rises(table: Table, name: str) -> bool:
 
 
 def _long(table: Table) -> list[ColumnMap]:
-    """Return the maps of a long table: the column that names 19 channels in turn, and each that has their values."""
+    """Return the maps of a long table: the column that names 19 channels in turn, with each column that may hold
+    values."""
     for place, name in enumerate(table.header):
         if name in table.words:
             held = [word.lower() for word in table.words[name]]
@@ -159,7 +160,7 @@ def _is_raw(table: Table, name: str) -> bool:
 
 
 def _by_values(table: Table) -> list[ColumnMap]:
-    """Return the map of columns without names: electrodes are the 19 in a row with the highest counts."""
+    """Return the map of columns without names: electrodes are the 19 neighbouring columns with the highest counts."""
     names = table.header
     if not names[0].startswith("column") or len(names) < ELECTRODES:
         return [_beside((), names)]

@@ -25,13 +25,13 @@ TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers h
 
 
 def refuse_several(table: Table, columns: ColumnMap) -> None:
-    """Raise TactileError where rows of several fingers take turns: a column tells rows of one stamp apart."""
+    """Raise TactileError where rows of several fingers alternate: a column tells rows of one stamp apart."""
     if not columns.time or any(name not in table.header for name in columns.names()):
         return
     keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
 
     def different(places: list[int]) -> int:
-        """Count the different values that columns have together in the first rows."""
+        """Count the distinct combinations of values in these columns in the first rows."""
         rows = np.column_stack([table.exact.get(place, table.values[:, place])[:LOOKED_AT] for place in places])
         return len(np.unique(rows, axis=0))
 
@@ -45,12 +45,11 @@ def refuse_several(table: Table, columns: ColumnMap) -> None:
 
 
 def widen(table: Table, columns: ColumnMap) -> Table:
-    """Return a table of a column for each mapped channel, and the time's.
+    """Return a table with one column for each mapped channel, and the time's.
 
     Rows of one stamp are a frame, in the order of time, where stamps differ from frame to frame; else a frame ends
-    where the channels begin again, in the order in which the file first has them. What a frame has not is NaN.
-    Raises TactileError where the file has none of the channels.
-    """
+    where the channels begin again, in their order in the file. Missing values are NaN. Raises TactileError for a file
+    without any of the channels."""
     channels = _texts(table, columns.channel.lower())
     wanted = [name for name in dict.fromkeys(channels.tolist()) if name in columns.channels()]
     if not wanted:

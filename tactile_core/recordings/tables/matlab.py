@@ -1,4 +1,4 @@
-"""MATLAB 5 files as named arrays: scipy reads them, and runs nothing of theirs. Needs scipy, of the extra [matlab]."""
+"""MATLAB 5 files as named arrays, read by scipy (extra [matlab]), which executes nothing in them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parse the rows of a text table: clean ones together, others cell by cell, whose errors are told."""
+"""Parse the rows of a text table: clean ones together, others cell by cell, with an error for each bad cell."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def is_row(line: str, header: Header) -> bool:
 
 
 def clean(rows: list[str], header: Header) -> np.ndarray | None:
-    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None where a cell is none."""
+    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None if any cell is none."""
     trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
     if not all(map(str.strip, trimmed)):
         return None
@@ -73,14 +73,14 @@ def _bad_row(
 
 
 def no_number(cell: str) -> str:
-    """Say what a cell is that is no number: one with a decimal comma is mended by another setting of the export."""
+    """Describe a cell that is no number; for a decimal comma, advise another setting of the export."""
     comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
     is_what = "a number with a decimal comma, where a point is expected" if comma else "not a number"
     return f"{shown(cell)} is {is_what}"
 
 
 def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """Write a sentence on lines without a row between the header and the last: a frame may be missing there."""
+    """Return a sentence on blank lines between the header and the last row: a frame may be missing there."""
     count = int(rows[-1]) - header_line - len(rows)
     if count == 0:
         return ()

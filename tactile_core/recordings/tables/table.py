@@ -30,13 +30,12 @@ class Table:
     """Parsed table of a text.
 
     header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is line 1
-    exact : (T,) float64 of the columns that values, if float32, would round, such as time stamps
+    exact : (T,) float64 of columns that float32 values would round, such as time stamps
     start : line after which the rows begin
-    left_out : columns that the file has, which were parsed and are not held
+    left_out : columns of the file that were parsed and not kept
     taken : names of the columns that were read so far, or that belong to another recording of the file
-    words : texts of the columns that hold texts, of which values has the numbers
-    texts : name -> (T,) further labels, which the file holds beside its columns
-    """
+    words : distinct texts of text columns, whose values are indices
+    texts : name -> (T,) further labels, which the file has beside its columns"""
 
     path: str
     header: tuple[str, ...]
@@ -82,7 +81,7 @@ class Table:
         return found
 
     def labels(self, used: Collection[str]) -> dict[str, np.ndarray]:
-        """Return the texts (T,) of columns that are not used, and of numbers whose name says that they are labels."""
+        """Return the texts (T,) of columns that are not used, and numbers whose column's name is that of a label."""
         found = dict(self.texts)
         for column, name in enumerate(self.header):
             values = self.exact.get(column, self.values[:, column])
@@ -94,7 +93,8 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns` (T, n), as float32 where that is exact; missing ones are NaN, unless half are missing."""
+        """Return `columns` (T, n), in float32 where exact; missing columns are NaN. Raises TactileError where half are
+        missing."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:
@@ -117,7 +117,7 @@ class Table:
         return self.columns([name])[:, 0]
 
     def essential(self, names: Iterable[str], also: Iterable[str] = ()) -> list[Problem]:
-        """Return the problems in these columns, and those in others that are read, marked as not essential."""
+        """Return the problems in these columns, and those in other columns that are read, marked as not essential."""
         keep, read = {*names, "row"}, {*names, "row", *also}
         return [replace(p, essential=p.field in keep) for p in self.problems if p.field in read]
 
@@ -150,7 +150,7 @@ def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None
 
 
 def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_out: Callable[[str], bool]) -> Table:
-    """Put blocks together in half the memory, float32 where exact. size : bytes of the file; left_out : not held"""
+    """Join blocks in half the memory, in float32 where exact. size : bytes of the file; left_out : columns to drop"""
     path = first.path
     held = [column for column, name in enumerate(first.header) if name in first.words or not left_out(name)]
     header = tuple(first.header[column] for column in held)
@@ -202,8 +202,8 @@ def _check_problems(path: str, problems: list[Problem], line: int) -> None:
 
 
 def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
-    """Read the file in parts of about `part_bytes` of text; each begins with the last `context` rows of the one before.
-    Yields each part and how many of its rows were in the one before. Raises TactileError like `read_table`."""
+    """Yield the file in parts of about `part_bytes` of text, each with the number of its first rows (at most `context`)
+    that repeat the part before. Raises TactileError like `read_table`."""
     file.seek(0)
     data = _whole_lines(path, file, file.read(part_bytes))
     lines = text_lines(path, data)

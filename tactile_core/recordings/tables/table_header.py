@@ -20,7 +20,7 @@ NUMBERED = "column{}"  # names of columns without a header, from 1
 
 @dataclass
 class Header:
-    """Header of a table. names : lower case; lines : up to and with it; separator : of cells; line : its text"""
+    """Header of a table; names : lower case; lines : up to and including it; separator : of cells; line : its text"""
 
     names: tuple[str, ...]
     lines: int
@@ -48,7 +48,7 @@ class Header:
         return cls(_names(path, cells, first), first + 1, separator, lines[first])
 
     def cells(self, rows: Sequence[str]) -> Cells:
-        """Return what the columns hold, which the first rows decide for all."""
+        """Return the kinds of the columns, which the first rows decide."""
         if self._cells is None:
             self._cells = Cells(self.names, [split(row, self.separator) for row in rows[:LOOKED_AT]])
         return self._cells
@@ -63,7 +63,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
-    """Return the place of the first line that is no comment or title, and of the comment before it."""
+    """Return the index of the first line that is no comment or title, and of the last comment before it."""
     told = [place for place, line in enumerate(lines) if line.strip()]
     first = next((place for place in told if not lines[place].lstrip().startswith(COMMENTS)), None)
     if first is None:
@@ -93,7 +93,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _is_data(cells: Sequence[str]) -> bool:
-    """Return true for a row that holds numbers, unless they count from 0 or 1, as pandas names columns."""
+    """Return true for a row of numbers, unless they count from 0 or 1, as pandas names columns."""
     values = [value for cell in cells if (value := number(cell)) is not None]
     counts = len(values) > 1 and values[0] in (0, 1) and values == [values[0] + step for step in range(len(values))]
     return len(values) > len([cell for cell in cells if cell]) // 2 and not (counts and len(values) >= MANY)

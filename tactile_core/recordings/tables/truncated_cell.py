@@ -25,9 +25,9 @@ def listed(names: Sequence[str], most: int = 8) -> str:
 def doubt_last_cell(
     kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
 ) -> None:
-    """Report the last number of a file without final newline as a problem where it may be cut off. It is cut off where
-    every other row ends in a separator and this one does not. Else its value decides, see `_looks_cut`; complete files
-    that merely lack the last newline are common."""
+    """Report the last number of a file without final newline as a problem where it may be cut off: every other row ends
+    in a separator and this one does not, or else its value looks cut (`_looks_cut`). Complete files that merely lack
+    the last newline are common."""
     number, line = kept[-1]
     if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
         return
@@ -40,9 +40,9 @@ def doubt_last_cell(
 
 
 def _looks_cut(column: np.ndarray) -> bool:
-    """Return true if the last value of a column (T,) looks like the first digits of a longer number. A digit less makes
-    a count ten times smaller: it is doubted below half of the last value before it (assumed), if no step in the column
-    is as large, so that a signal that swings around 0 is not. Lost decimals change little."""
+    """Return true if the last value of a column (T,) looks like the first digits of a longer number: below half the
+    value before (assumed; a missing digit makes a count ten times smaller), and no step in the column is as large. A
+    signal that swings around 0 passes; lost decimals change little."""
     before = column[:-1][np.isfinite(column[:-1])]
     if not len(before) or abs(column[-1]) >= 0.5 * abs(before[-1]):
         return False

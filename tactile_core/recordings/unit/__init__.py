@@ -1,1 +1,1 @@
-"""Tell units of a sensor apart: their fluid film and the gains of their electrodes."""
+"""The properties of a unit of a sensor: its fluid film and the gains of its electrodes."""

@@ -1,15 +1,14 @@
 """Check whether the contacts of a recording, taken together, resemble simulated ones.
 
-A wrong polarity, gains, order of channels or rest turns each contact into a signal that a contact may well have: one
-frame hardly shows it. What a few neighbouring simulated contacts leave unexplained, averaged over different contacts of
-a recording, does, and so does how much less is left with two electrodes exchanged, or where each electrode may have a
-gain of its own and those that fit best are far apart. A softer skin, or one that is filled otherwise, moves the
-electrodes alike at another pressure: the fluid's, where it is recorded, shows that (docs/accuracy.md has the table).
+A wrong polarity, gains, order of channels or rest turns each contact into a signal that some contact may have: one
+frame hardly shows it. Three statistics over the different contacts of a recording do: the share that a few neighbouring
+simulated contacts leave unexplained; how much less is left with two electrodes exchanged; and how much less with a gain
+for each electrode, if the fitted gains differ widely. A softer or otherwise filled skin moves the electrodes alike at
+another fluid pressure, which shows it where recorded (table: docs/accuracy.md).
 
 A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Units rest at
-different counts, but of five real ones a contact explains little of how: beside a conductivity of its own it leaves
-.53 to .84. Of eight hard grips it leaves .23 to .38; soft ones (.47 to .87) are not told apart.
-"""
+different counts, but of five real ones a contact explains little of how: beside a free conductivity it leaves .53 to
+.84. Of eight hard grips it leaves .23 to .38; soft ones (.47 to .87) are not separable."""
 
 from __future__ import annotations
 
@@ -55,7 +54,8 @@ LEAST_APART = 100.0  # counts, root of the sum of squares: units differ by 106 t
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and of how many contacts."""
+    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and the number of
+    contacts."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
@@ -70,7 +70,7 @@ def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, 
 
 
 def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
-    """Put unit vectors (n, 19) together from their neighbours among simulated ones, to which they are alike (n, P)."""
+    """Rebuild unit vectors (n, 19) from their nearest simulated ones; like : (n, P) cosines to all of these."""
     near = patterns(sensor)[np.argpartition(-like, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]]
     products = near @ near.transpose(0, 2, 1) + RIDGE * np.eye(NEIGHBOURS)
     weights = np.linalg.solve(products, (near @ chosen[:, :, None]))
@@ -78,7 +78,8 @@ def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float]:
-    """Return how much of (n, 19) in contact fitted gains explain more, and the rms of their logarithms, centred."""
+    """Fit gains to changes (n, 19) in contact; return the drop of the unexplained share, and the gains' log rms,
+    centred."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     even, log_gain = change, np.zeros(change.shape[1])
     for _ in range(FITS):
@@ -89,8 +90,8 @@ def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float
 
 
 def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tuple[int, int]]:
-    """Return by how much exchanging two electrodes reduces the unexplained share of changes (n, 19) most, and which.
-    Where two are exchanged, what is left over of each goes with the other's simulated change and against its own."""
+    """Find the two electrodes whose exchange reduces the unexplained share of changes (n, 19) counts most; return the
+    reduction and the pair. (The residual of each exchanged electrode correlates with the other's simulated change.)"""
     change = change[spread_out(len(change), MOST_MATCHED)]
     chosen = unit(change)
     product = chosen.T @ _rebuilt(chosen, chosen @ patterns(sensor).T, sensor)
@@ -107,7 +108,7 @@ def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tu
 
 
 def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
-    """Count the simulated contacts nearest to changes (n, 19) counts that are unlike one another."""
+    """Count the nearest simulated contacts of changes (n, 19) counts that are mutually dissimilar."""
     known = patterns(sensor)
     near, counts = np.unique((unit(change[spread_out(len(change), MOST)]) @ known.T).argmax(axis=1), return_counts=True)
     kept: list[int] = []
@@ -118,9 +119,9 @@ def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
 
 
 def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return measured over simulated pressure, the median of different contacts, and how many there are.
+    """Return measured over simulated pressure, the median over different contacts, and their number; (NaN, 0) for none.
     change : (n, 19) counts in contact; pressure : (n,) Pa over rest, NaN where it was not measured
-    That of simulated contacts of nearly the size that are most alike, scaled to the size. (NaN, 0) where none is."""
+    The simulated pressure is that of the most similar contacts of nearly that size, scaled to the size."""
     simulated, size = contact_pressures_of(sensor), np.linalg.norm(change, axis=1)
     judged = np.flatnonzero((size > PRESSED) & np.isfinite(pressure))
     if simulated is None or not len(judged):
@@ -143,7 +144,7 @@ def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURC
 
 
 def limit(contacts: int) -> float:
-    """Return the share left over beyond which a recording of so many different contacts is doubted."""
+    """Return the unexplained share beyond which a recording of so many different contacts is doubted."""
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
@@ -168,7 +169,8 @@ def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = 
 def flagged(
     typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
 ) -> tuple[np.ndarray, Doubt | None]:
-    """Return the flags (T,) of changes of a typical unit, and the doubt of their law, if there is one."""
+    """Return the flags (T,) of changes of a typical unit, with the doubt that their contacts raise together, or
+    None."""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
         return flags, None
     contact = touching(typical) & ~quiet
@@ -184,7 +186,7 @@ def flagged(
 
 
 def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt | None:
-    """Return the doubt that explains more than `beyond`: two electrodes exchanged, or wrong gains; else None."""
+    """Return the doubt that explains more than `beyond`: exchanged electrodes or wrong gains; None for neither."""
     less, (first, second) = exchanged_share(change, sensor)
     if less > max(EXCHANGED, beyond):
         return Doubt(Reason.LAW_EXCHANGED, share=less, first=first + 1, second=second + 1, most=EXCHANGED)
@@ -195,9 +197,9 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
 
 
 def as_contact(level: np.ndarray, sensor: str) -> float | None:
-    """Return the share (0..1) of how a level differs from a typical unit at rest that one contact explains. None where
-    that is too little for a contact, and for a sensor without simulated contacts. The unit's conductivity is
-    free. level : (e,) counts"""
+    """Return the share (0..1) of the difference between a level (e,) counts and a typical unit's rest that one contact
+    explains, the unit's conductivity being free. None where that is too little for a contact, and for a sensor without
+    simulated contacts."""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None

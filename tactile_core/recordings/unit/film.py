@@ -1,14 +1,12 @@
 """Find a unit's fluid film from its recording: how thick it is, and how the fluid's conductivity drifts.
 
-The film over an electrode has an impedance of 1 over its thickness and the fluid's conductivity. Where the same
-movement of the skin leaves a thinner film, impedances grow more: of a unit with films half as thick as a typical one's
-the networks would read contacts three times too firm. The counts at rest give the product of thickness and
-conductivity. How the two share in it is a belief, until contacts show it: simulated ones resemble a unit's only where
-its films are scaled as they are.
+The film over an electrode has an impedance of 1 / (thickness * conductivity). The same movement of the skin raises
+impedances more where the film is thinner: the networks would read contacts of a unit with films half as thick as a
+typical one's three times too firm. The counts at rest give the product of thickness and conductivity. A prior splits
+the product, until there are contacts: they resemble simulated ones only at the right thickness.
 
 The conductivity changes all electrodes alike, as no contact does: it moves by a quarter in minutes, probably with
-temperature. It is tracked as what makes each moment most alike to a simulated contact, or to none.
-"""
+temperature. It is tracked as the course with which each moment is most like a simulated contact, or like none."""
 
 from __future__ import annotations
 
@@ -53,11 +51,9 @@ NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another u
 @dataclass(frozen=True)
 class Film:
     """Film of the unit that made a recording.
-
-    thickness : over a typical unit's; evidence : what shows it, in words
-    conductivity : (P,) logarithms of the fluid's over that at rest, at rising frames (P,); linear between them
-    sensor : whose simulated contacts are told from drift; idle : whether no change is larger than drift leaves
-    """
+    thickness : over a typical unit's; evidence : for it, in words
+    conductivity : (P,) log of the fluid's over that at rest, at rising frames (P,); linear between them
+    sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves"""
 
     thickness: float
     evidence: str
@@ -75,9 +71,8 @@ class Film:
         """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
 
         They are zero where they are no larger than what the largest drift leaves, and like no simulated contact. A rest
-        of another recording may be off by `REST_OFF`: then also smaller ones are zero in the frames perhaps_idle.
-        perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself
-        """
+        from another recording may be off by `REST_OFF`: then smaller ones are zero, too, in the frames perhaps_idle.
+        perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself"""
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change
 
@@ -85,7 +80,7 @@ class Film:
         known = known / np.linalg.norm(known, axis=1, keepdims=True)
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
-            """Return what a typical unit would show, (len(frames), 19) counts, without what is drift."""
+            """Return a typical unit's changes (len(frames), 19) counts, without drift."""
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
@@ -103,7 +98,7 @@ class Film:
         return Changes(len(change), of_typical_film)
 
     def report(self) -> dict[str, object]:
-        """Return it in numbers and words fit for JSON."""
+        """Return the film as numbers and words fit for JSON."""
         least, most = np.exp([self.conductivity.min(), self.conductivity.max()])
         return {
             "thickness": round(self.thickness, 4), "evidence": self.evidence,
@@ -112,7 +107,7 @@ class Film:
 
 
 class _Seen:
-    """Frames of a recording that are looked at: changes (n, e) counts from rest (n, e), and times (n,) s."""
+    """Sampled frames of a recording: changes (n, e) counts from rest (n, e), and times (n,) s."""
 
     def __init__(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> None:
         self.change, self.rest, self.sensor = change, rest, sensor
@@ -124,12 +119,14 @@ class _Seen:
         self._squares = np.square(self._known).sum(axis=1)
 
     def typical(self, thickness: float, conductivity: float | np.ndarray) -> np.ndarray:
-        """Changes (n, e) counts of a typical unit, where this one's film and conductivity (n, 1) over rest are so."""
+        """Convert the changes to (n, e) counts of a typical unit, for a film's thickness and conductivity (n, 1) over
+        rest."""
         change = divider.of_typical_film(self.change, self.rest, thickness, conductivity)
         return divider.typical(change, self.rest, self.typical_rest)
 
     def apart(self, typical: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Squared distance (n,) to the nearest simulated contact, which (n,), and squared length (n,), compressed."""
+        """Squared distance (n,) to the nearest simulated contact, its index (n,), squared length (n,); on an asinh
+        scale."""
         seen = np.arcsinh(typical / SCALE)
         length = np.square(seen).sum(axis=1)
         apart = length[:, None] - 2 * seen @ self._known.T + self._squares
@@ -144,9 +141,8 @@ def find(
     """Find the film of the unit that made a raw recording.
 
     change : (T, e) counts from rest (T, e); time : (T,) s; pressure : (T,) Pa, NaN where it was not measured
-    thickness : where it is known; own_rest : whether rest was found in the recording itself
-    drifts : whether the conductivity may
-    """
+    thickness : where it is known; own_rest : true if rest was found in this recording; drifts : true if conductivity
+        may drift"""
     frames = spread_out(len(change), FRAMES)
     seen = _Seen(change[frames], rest[frames], time[frames], sensor)
     believed = _believed(_doubt_at_rest(_impedance_at_rest(seen))) if thickness is None else thickness
@@ -164,7 +160,7 @@ def find(
 
 
 def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
-    """Root of the sum of squares (T,) counts that the largest drift leaves of a film; 0 without one. rest : (T, e)"""
+    """Norm (T,) over electrodes, counts, of what the largest drift leaves of a film; 0 without drift. rest : (T, e)"""
     most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
     drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
     return DRIFT_LEFT * np.linalg.norm(drift, axis=1)
@@ -177,13 +173,13 @@ def _impedance_at_rest(seen: _Seen) -> float:
 
 
 def _doubt_at_rest(impedance: float) -> np.ndarray:
-    """Negative log probability of each thickness, nats, by the impedance at rest over a typical unit's alone."""
+    """Negative log probability of each thickness, nats, by the impedance at rest (over a typical unit's) alone."""
     of_fluid = np.log(impedance * THICKNESSES) / CONDUCTIVITY_SPREAD
     return (np.square(np.log(THICKNESSES) / THICKNESS_SPREAD) + np.square(of_fluid)) / 2
 
 
 def _believed(doubt: np.ndarray) -> float:
-    """Thickness, the mean by negative log probabilities; a typical unit's unless another is clearly likelier."""
+    """Return the mean thickness by negative log probabilities; 1 (typical) unless another is clearly likelier."""
     if doubt[TYPICAL] < doubt.min() + CLEARLY:
         return 1.0
     likely = np.exp(doubt.min() - doubt)
@@ -191,7 +187,7 @@ def _believed(doubt: np.ndarray) -> float:
 
 
 def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
-    """Most plausible course of the conductivity: logarithms (windows,) over that at rest (Viterbi's algorithm)."""
+    """Most plausible course of the conductivity, (windows,) log over that at rest (Viterbi's algorithm)."""
     still = seen.apart(seen.typical(thickness, 1.0))[2]
     scale = 2 * (len(seen.rest[0]) * (NOISE / SCALE) ** 2 + MISFIT**2 * still)
     cost = np.empty((len(seen.windows), len(CONDUCTIVITIES)))
@@ -214,7 +210,8 @@ def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
 
 
 def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str]:
-    """Most plausible thickness by the counts at rest and enough different contacts, and what showed it."""
+    """Return the most plausible thickness, by the counts at rest and enough different contacts, and the evidence in
+    words."""
     impedance = _impedance_at_rest(seen)
     doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
     at_first = seen.typical(_believed(doubt), conductivity)

@@ -1,10 +1,9 @@
 """Fit gains and offsets of an unknown sensor by matching its signals to the simulated ones most like them.
 
 Alternately, every frame is assigned its nearest typical signal, and every electrode the gain that fits its readings to
-them, until nothing changes (as in k-means and iterated closest points). Frames are matched as wholes, so that a
-recording may hold any mixture of contacts: matching the distribution of one electrode alone would confuse a finger
-touched in one place with a finger of wrong gains.
-"""
+them, until nothing changes (as in k-means and iterated closest points). Frames are matched as wholes, so a recording
+may hold any mixture of contacts; matching the distribution of each electrode would take a finger touched in one place
+for a finger of wrong gains."""
 
 from __future__ import annotations
 
@@ -84,8 +83,7 @@ def _over_contacts(
     values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Weighted means (19,) of (n, 19), shrunk towards 0 by `prior`, and the weights' sums. All frames with the same
-    match count as one contact: a finger that rests on a table for a minute counts as much as one that does so for a
-    second."""
+    match count as one contact, so a finger that rests on a table for a minute counts as much as for a second."""
     groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
     weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))
     np.add.at(weights, index, weight)

@@ -1,4 +1,4 @@
-"""Tell the unit of the fluid's pressure beside raw electrodes: counts of 12 bit, the electrodes' own, or a pressure."""
+"""Detect the unit of the fluid's pressure beside raw electrodes: 12-bit counts, the electrodes' own, or a pressure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Return PDC (T,) of raw electrodes in counts, or None; unit : counts a unit of theirs; adds to the warnings."""
+    """Return PDC (T,) in counts, or None if its unit is unknown; unit : counts a unit of the electrodes."""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -31,7 +31,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return counts a unit of PDC (T,), 0 if unknown, and its pressure's unit, if any; unit : of the electrodes"""
+    """Return counts a unit of PDC (T,), 0 if unknown, and the name of a pressure's unit; unit : as `in_counts`"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):
