@@ -33,7 +33,7 @@ def names_of(store: Store) -> dict[str, int]:
 
 
 def _rows(shape: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
-    """Return the number of rows and the shape of a row of an array; (19, T) and (1, T), as MATLAB writes, are transposed."""
+    """Return an array's number of rows and the shape of a row; (19, T) and (1, T), as of MATLAB, are transposed."""
     if _is_turned(shape):
         shape = shape[::-1]
     if len(shape) == 2 and shape[1] == 1:
