@@ -1,4 +1,4 @@
-"""What a conversion tells its user: warnings, errors to expect, and the contact sheet, a few frames as columns."""
+"""The report of a conversion to its user: warnings, expected errors, and the contact sheet, a few frames as columns."""
 
 from __future__ import annotations
 
@@ -36,10 +36,11 @@ SHEET_ARRAYS = (
 
 
 class ConversionReport:
-    """Keeps what is told of all frames, and what the contact sheet shows of some. flagged : frames of each flag"""
+    """Collects what is reported of all frames, and what the contact sheet shows; flagged : number of frames of each
+    flag"""
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
-        """Take the prepared rows, and rising frames (T,) of them that `made` takes through."""
+        """Start a report on rising frames (T,) of prepared rows, which `made` translates."""
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._pressure: list[np.ndarray] = []
@@ -52,7 +53,7 @@ class ConversionReport:
         self._shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def take(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Take the arrays of some frames."""
+        """Add the arrays of some frames."""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
         self._pressure.append(arrays["pressure"])
@@ -90,13 +91,14 @@ class ConversionReport:
 
     @property
     def explained(self) -> float | None:
-        """Mean share of the electrodes' change that the translation explains in contact; None where nothing touches."""
+        """Mean over frames in contact of the share of the electrodes' change that the translation explains; None
+        without any."""
         share = np.concatenate(self._explained)
         touching = np.isfinite(share)
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None
 
     def describe_traction(self) -> str:
-        """Describe by how much the kept traction misses the force; empty where it is not kept."""
+        """Describe the difference between kept traction and force; empty where traction is not kept."""
         if not self._forces:
             return ""
         from .solved_gel import describe_miss
@@ -105,7 +107,7 @@ class ConversionReport:
         return describe_miss(total, force, solved=self._tools.drawer.solve is not None)
 
     def draw_sheet(self, path: Path) -> None:
-        """Draw the contact sheet of the frames kept for it, once all were taken."""
+        """Draw the contact sheet once all frames were added."""
         recording, signals = self._rows.recording, self._rows.signals
         shown, rows = np.array(list(self._shown)), self._rows.at(self._frames)
         columns = {name: np.stack([at[name] for at in self._shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
@@ -178,8 +180,8 @@ class Contents:
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
-    """Choose the frames (k,) to show, in order: the strongest contacts that lie apart from each other. Taken one by
-    one, each at least half of a `count`-th of the recording away from those before.
+    """Choose the frames (k,) to show, in order: the strongest contacts, each at least 1 / (2 count) of the recording
+    apart.
     strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none"""
     left = np.where(np.isfinite(strength), strength, -1.0)
     count = min(count, len(left))
@@ -200,7 +202,7 @@ def contact_sheet(path: str | os.PathLike, shown: Contents) -> None:
 
 @contextlib.contextmanager
 def _plain_matplotlib() -> Iterator[None]:
-    """Use matplotlib in our style alone: a user's own settings must not change the bytes."""
+    """Use matplotlib's settings of this package alone: a user's own must not change the bytes."""
     import matplotlib
 
     with matplotlib.rc_context(), python_warnings.catch_warnings():

@@ -1,4 +1,4 @@
-"""The main job: a recording becomes a gel's pictures, deformations and a note, in a folder of its own."""
+"""Convert a recording to a gel's pictures and deformations, with a note, in a folder of its own."""
 
 from __future__ import annotations
 
@@ -36,10 +36,9 @@ class Options:
     """Options of the conversion of a recording.
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
-    prepare : tare and kind overrides, None for automatic; overwrite : replace an older result
-    sensor : the unit's rest, and gains and offsets to take off, as `tactile adapt` finds them
-    calibration : file of the DIGIT that is drawn, for the note; None for the one that ships
-    """
+    prepare : options of the preparation, None for automatic; overwrite : replace an older result
+    sensor : the unit's rest, gains and offsets, from `tactile adapt`
+    calibration : file of the DIGIT that is drawn, for the note; None for the one that ships"""
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     keep: tuple[str, ...] = results.DEFAULT_KEEP
@@ -58,15 +57,12 @@ class Options:
 class ToolOptions:
     """What translates and draws all recordings of a command.
 
-    weights : folder of the networks, None for those that ship; source : the sensor whose recordings they must
-        translate, None for whichever they do
-    calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``, for
-        all pictures but fast ones
+    weights : folder of networks, None for those that ship; source : the sensor they must translate, None for any
+    calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
-    answer : which of the contacts that signals may come from, and where on the gel; see ``Answer``
-    gel : the networks', or the found contact solved on the target (``solved_gel``), as for any target to which the
-        shipped weights do not lead; target : the gel, to which the weights must translate unless it is solved
-    """
+    answer : options of the estimated contact, see ``Answer``
+    gel : "networks", or the found contact solved on the target (``solved_gel``), as for any target without weights
+    target : the gel; weights must translate to it unless it is solved"""
 
     weights: str | None = None
     calibration: str | None = None
@@ -79,7 +75,7 @@ class ToolOptions:
     object_reflectance: float | None = None
 
     def load_networks(self) -> tuple[Translator, bool]:
-        """Load the networks, and tell whether the target is solved under the contacts that they find."""
+        """Load the networks; also return whether the target is solved under the contacts that they find."""
         must_lead_to = None if self.gel == SOLVED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
         solves = self.gel == SOLVED or translator.target != self.target
@@ -90,7 +86,7 @@ class ToolOptions:
 
 def load_tools(options: ToolOptions) -> Tools:
     """Load the weights, and camera and lights of the gel. Raises TactileError for weights that are missing, changed or
-    of another shape, and what `load_drawer` raises."""
+    of another shape, and as `load_drawer` does."""
     translator, solves = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
     return Tools(translator, load_drawer(*unit, translator.target, options.object_reflectance, solves=solves))
@@ -98,7 +94,8 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : the result; warnings : sentences; remark : on a kept traction's miss, if any"""
+    """A finished conversion. folder : the result; warnings : sentences; remark : how far kept traction is from the
+    force"""
 
     folder: Path
     warnings: tuple[str, ...]
@@ -152,7 +149,7 @@ def _write_frames(
     folder: Path, made: FramePass, report: ConversionReport, rows: PreparedRows, frames: np.ndarray, options: Options,
     clock: Stopwatch, progress: Callable[[int, int], None] | None,
 ) -> None:  # fmt: skip
-    """Write ``frames.h5`` and the pictures; `progress` is called with (frames done, frames in all)."""
+    """Write ``frames.h5`` and the pictures, with progress (frames done, frames in all)."""
     pictures, done = _Pictures(folder / results.IMAGES) if "image" in options.keep else None, 0
 
     def take(some: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
@@ -175,7 +172,7 @@ def _write_frames(
 
 
 class _Pictures:
-    """Writes pictures as PNG; one that equals the one before, as while nothing touches, is not packed again."""
+    """Writer of PNG pictures; one that equals the one before, as without contact, is not compressed again."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
@@ -190,14 +187,14 @@ class _Pictures:
 
 
 def check_order(recording: Recording, answer: Answer) -> None:
-    """Raise TactileError where a contact is to be tracked through snapshots, which have no order."""
+    """Raise TactileError for tracking a contact through snapshots, which have no order."""
     if answer.follows and np.isnan(recording.time).all():
         found = "snapshots, which do not follow each other"
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
-    """Return the origin of a result for JSON: what the same input reproduces, so no paths and no time of day."""
+    """Return a result's origin for JSON: only what the same input reproduces, so no paths and no time of day."""
     from ..recordings import labels
 
     recording = rows.recording
@@ -226,7 +223,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
 
 
 def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, str]]:
-    """Return the calibration that pictures are drawn by, where one was given."""
+    """Return the given calibration's entry of a note; empty where none was given."""
     if calibration is None:
         return {}
     return {"calibration": {"file": os.path.basename(calibration), "sha256": provenance.sha256(calibration)}}

@@ -1,4 +1,4 @@
-"""Draw translated gels: solved where that is asked for, their heights under the camera, pictures, and printed dots."""
+"""Draw translated gels: solve them if asked, then heights under the camera, pictures, and printed dots."""
 
 from __future__ import annotations
 
@@ -26,12 +26,11 @@ class Drawer:
 
     height_map : (T, M, 3) m -> (T, H, W) m
     shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
-    camera : of the gel that is drawn, by which contacts beside its picture are flagged
-    solve : arrays by the names of frames.h5 -> the same with solved gels; None: gels are the networks'
-    dots : on the gel that is drawn; None: it has none
-    target : the gel; found_on : the gel of the networks, on which contacts are found that are solved on another
-    object_reflectance : 0 black to 1 white, of what touches the gel
-    """
+    camera : of the gel that is drawn; contacts outside its picture are flagged
+    solve : arrays by the names of frames.h5 -> the same with solved gels; None keeps the networks' gels
+    dots : on the gel that is drawn; None for no dots
+    target : the gel; found_on : the networks' gel, on which contacts are found before they are solved on another
+    object_reflectance : 0 black to 1 white, of what touches the gel"""
 
     height_map: Callable[[np.ndarray], np.ndarray]
     shade: Callable[..., np.ndarray]
@@ -44,7 +43,7 @@ class Drawer:
     object_reflectance: float = 0.0
 
     def gel(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return arrays by the names of frames.h5 with the gel that is drawn: the networks', or solved."""
+        """Return arrays by the names of frames.h5 with the gel that is drawn: the networks' or the solved one."""
         return arrays if self.solve is None else self.solve(arrays)
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
@@ -52,7 +51,7 @@ class Drawer:
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
     def warm_up(self) -> None:
-        """Draw the resting gel, so that the next picture need not wait for what the first one makes."""
+        """Draw the resting gel, which makes what later pictures reuse."""
         still = np.zeros((1, len(sensor_surface(self.target).rest), 3), np.float32)
         self.draw(self.height_map(still)[0], still[0])
 
@@ -65,12 +64,12 @@ class Drawer:
         return self.dots
 
     def describe_gel(self) -> tuple[str, ...]:
-        """Say that contacts are solved on another gel than that of the networks, where they are."""
+        """Return a sentence where contacts are solved on another gel than the networks', else nothing."""
         return describe_gel(self.target, self.found_on)
 
 
 def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
-    """Say that contacts found on one gel are solved on another; nothing where both are the same."""
+    """Return a sentence where contacts found on one gel are solved on another, else nothing."""
     if target == found_on:
         return ()
     return (
@@ -90,11 +89,10 @@ def load_drawer(
 ) -> Drawer:
     """Load camera and lights of a gel: the unit's that ships, or a file's.
 
-    preset, variant : of ``renderer.Renderer``, for all pictures but fast ones; solves : whether contacts are solved
+    preset, variant : of ``renderer.Renderer``; solves : true if contacts are solved
     object_reflectance : of what touches the gel; None for the calibration's
     The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
-    Raises TactileError for a bad calibration, and what ``renderer.Renderer`` raises.
-    """
+    Raises TactileError for a bad calibration, and as ``renderer.Renderer`` does."""
     from ..pictures import background, height_map, renderer
     from ..sensors.calibration_file import load_calibration
 

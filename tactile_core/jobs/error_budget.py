@@ -13,7 +13,7 @@ EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6lev
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """Largest error that will do: um rms of a surface, grey levels rms of a picture; None without a bound."""
+    """Largest acceptable error: um rms of a surface, grey levels rms of a picture; None without a bound."""
 
     um: float | None = None
     levels: float | None = None
@@ -24,7 +24,7 @@ class Budget:
         return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
 
     def only(self, unit: str, advice: str) -> float:
-        """Return the bound in ``unit``; raises TactileError where one is given in the other unit, meaningless here."""
+        """Return the bound in ``unit``. Raises TactileError for a bound in the other unit, meaningless here."""
         other = "levels" if unit == "um" else "um"
         if getattr(self, other) is not None:
             raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", advice)

@@ -1,4 +1,4 @@
-"""Take the frames of a recording once through all stages: prepared, tracked, decoded, drawn and written, in chunks."""
+"""One pass over the frames of a recording through all stages: prepare, track, decode, draw and write, in chunks."""
 
 from __future__ import annotations
 
@@ -37,13 +37,14 @@ class Tools:
 
 
 class FramePass:
-    """All arrays of a recording's frames, part by part, and their file. folded : height maps of folded gels so far"""
+    """All arrays of a recording's frames, part by part, and their file; folded : number of height maps of folded gels
+    so far"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None
     ) -> None:
-        """Take read(frames), which gives their times, s, and signals; count : frames of the whole recording.
-        keep : words of results.KEEPABLE. Raises TactileError for motion of dots on a gel that has none."""
+        """Store read(frames), which returns their times, s, and signals; count : frames of the whole recording
+        keep : words of results.KEEPABLE. Raises TactileError for motion of dots on a gel without dots."""
         self._translator, self._drawer, self._pair = tools.translator, tools.drawer, tools.pair
         self._keep, self._clock = tuple(keep), clock or Stopwatch()
         self._decoded = RecordingPass(tools.translator, read, count)
@@ -56,10 +57,9 @@ class FramePass:
     ) -> None:  # fmt: skip
         """Write the arrays of rising frames (T,) to a new file.
 
-        signals : of any of them, for their rest and kind; start_time : unix s; about : attributes of the file
+        signals : any of the recording's, for rest and kind; start_time : unix s; about : attributes of the file
         take : called with each chunk's frames and arrays; labels : name -> (T,) texts
-        room : before the HDF5 part, as of `FramesFile`
-        """
+        room : bytes before the HDF5 part, as in `FramesFile`"""
         words = kept(self._keep, self._translator.answer)
         with FramesFile(path, len(frames), words, about, room=room, pair=self._pair) as file:
             for start in range(0, len(frames), CHUNK):
@@ -76,7 +76,7 @@ class FramePass:
                 file.annotate("marker_motion", rest=self._dots.rest)
 
     def __call__(self, frames: np.ndarray) -> dict[str, np.ndarray]:
-        """Return all arrays of rising frames (T,) that are kept, by the names of frames.h5, and those behind them."""
+        """Return the kept arrays of rising frames (T,), by the names of frames.h5, and those they are made from."""
         with self._clock.stage("translate"):
             arrays = self._translate(frames)
         if "traction" in self._keep:
@@ -110,7 +110,7 @@ class FramePass:
         return heights
 
     def pictures(self, arrays: dict[str, np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
-        """Return the pictures (H, W, 3) uint8 of some rows of the arrays, drawn where they are not among them."""
+        """Return the pictures (H, W, 3) uint8 of some rows of the arrays, drawn unless the arrays hold them."""
         if "image" in arrays:
             return [arrays["image"][row] for row in rows]
         moved = arrays["displacement_digit"][rows]

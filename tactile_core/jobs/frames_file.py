@@ -88,7 +88,7 @@ LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk 
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Return the words of KEPT: `keep`, the posterior's samples and a second contact where the options ask for them."""
+    """Return words of KEPT: `keep`, and the posterior's samples and the second contact if the options ask for them."""
     return (*keep, *[SAMPLES] * (answer.samples > 0), *[SECOND] * (answer.contacts > 1))
 
 
@@ -99,14 +99,14 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 
 
 def named(name: str, pair: tuple[str, str]) -> str:
-    """Return the name of a dataset of frames of another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's name for another source than a BioTac, or another gel than a DIGIT's."""
     stem, _, role = name.rpartition("_")
     sensor = dict(zip(PAIR, pair, strict=True)).get(role)
     return f"{stem}_{sensor}" if sensor else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's meaning in frames of another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's meaning for another source than a BioTac, or another gel than a DIGIT's."""
     for role, sensor in zip(PAIR, pair, strict=True):
         if role != sensor:
             meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")
@@ -116,7 +116,7 @@ def described(meaning: str, pair: tuple[str, str]) -> str:
 
 
 def netcdf_value(value: Any) -> Any:
-    """Return an attribute as netCDF can hold it, which has neither truth values nor arrays of several axes."""
+    """Return an attribute as netCDF can hold it: without booleans or arrays of several axes."""
     if isinstance(value, bool | np.bool_):
         return int(value)
     return value.ravel() if isinstance(value, np.ndarray) else value
@@ -131,11 +131,10 @@ class FramesFile:
     ) -> None:  # fmt: skip
         """Create the file.
 
-        pair : the sensor that was read and the gel, after which datasets are named
-        path : new file; count : T; attributes : of the file itself, beside format and version.
-        room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's seal; pictures are then in the file,
-            and a large array has one chunk a frame
-        """
+        pair : the sensor that was read and the gel; they name datasets
+        path : new file; count : T; attributes : of the file itself, beside format and version
+        room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's checksum; the file then holds
+            pictures, too, and a large array has one chunk a frame"""
         import h5py
 
         self._about = arrays_of(keep, shard=bool(room))
@@ -157,7 +156,7 @@ class FramesFile:
 
     @contextmanager
     def _checked(self) -> Iterator[None]:
-        """Raise what the disk refused, also where HDF5 stumbles over it first."""
+        """Raise the disk's error, also where HDF5 fails by it first."""
         try:
             yield
         except Exception:  # raised again; HDF5 gives many types to one cause
@@ -166,7 +165,7 @@ class FramesFile:
         self._disk.check()
 
     def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
-        """Write frames from `start` on; arrays that are not kept are passed over. Floats become float32."""
+        """Write frames from `start` on, without arrays that are not kept. Floats become float32."""
         with self._checked():
             for name, array in arrays.items():
                 if name in self._about:

@@ -1,6 +1,9 @@
-"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out. gel =
-Gel("digit", indenter=Sphere(3e-3)) for pose in poses:                      # 4 x 4, or (position, quaternion), in the
-sensor's frame contact = gel.press(pose) picture = gel.picture()"""
+"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out.
+
+gel = Gel("digit", indenter=Sphere(3e-3))
+for pose in poses:                      # 4 x 4, or (position, quaternion), in the sensor's frame
+    contact = gel.press(pose)
+    picture = gel.picture()"""
 
 from __future__ import annotations
 
@@ -83,7 +86,7 @@ class Gel:
         return f"<Gel of a {self.sensor}, friction {self.friction:g}, preset {self.preset}, under {self.indenter!r}>"
 
     def reset(self) -> None:
-        """Take the indenter away: the next contact depends on nothing before."""
+        """Remove the indenter: the next contact does not depend on earlier ones."""
         self._press: CorrectedPress | None = None
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
@@ -94,14 +97,13 @@ class Gel:
         """Move the indenter to a pose, along a straight line from the last one, and return the contact there.
 
         pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z), of the indenter's origin and axes
-        force : N along +y; with it the indenter moves on along +y, out or in, until it bears that force; 0 lifts it
-        Raises TactileError for what is no pose or force, and above 500 N; the contact before then stays. Whatever
-        else happens is said in ``flags``.
-        """
+        force : N along +y; the indenter then moves on along +y, out or in, until it bears that force; 0 lifts it
+        Raises TactileError for an invalid pose or force, and above 500 N; the contact before then stays. All else is
+        reported in ``flags``."""
         return self._step(*given(pose, force))
 
     def _step(self, here: Pose, force: float | None) -> GelContact:
-        """Do as ``press`` does, to a pose and force that were checked."""
+        """Do ``press`` to a checked pose and force."""
         flags: list[str] = []
         self._work.left = _WORK
         jumps = self._press is not None and self._contact.patch.any() and too_far(self._pose, here)
@@ -122,9 +124,10 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose. What is no
-        pose or force is passed over: the contact before comes again, flagged ``refused``, and the reason is logged.
-        Raises TactileError where poses or forces end before the others."""
+        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose.
+
+        For an invalid pose or force the contact before comes again, flagged ``refused``, and the reason is logged.
+        Raises TactileError where poses and forces differ in number."""
         if forces is None:
             yield from map(self._press_or_keep, poses)
             return
@@ -135,7 +138,7 @@ class Gel:
             yield self._press_or_keep(pose, force)
 
     def _press_or_keep(self, pose: Any, force: float | None = None) -> GelContact:
-        """The contact at a pose, or the one before, flagged, where that is no pose or force."""
+        """Return the contact at a pose, or the one before, flagged, for an invalid pose or force."""
         try:
             asked = given(pose, force)
         except TactileError as error:
@@ -145,7 +148,7 @@ class Gel:
 
     @property
     def contact(self) -> GelContact:
-        """The last contact; nothing touches before the first step."""
+        """The last contact; an untouched one before the first step."""
         return self._contact
 
     @property
@@ -155,8 +158,8 @@ class Gel:
 
     def height_map(self) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact. Where a hard
-        slide folds the gel over itself the height there is a guess. Raises TactileError for the BioTac, and for a gel
-        without a calibration."""
+        slide folds the gel over itself a height is a guess. Raises TactileError for the BioTac, and for a gel without a
+        calibration."""
         if not sensors.is_gel(self.sensor):
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
             raise TactileError("Gel, picture", found, "a Gel of a sensor with a camera, as the DIGIT")
@@ -170,13 +173,13 @@ class Gel:
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
-        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it passes the sensor by."""
+        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it misses the sensor."""
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
         return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
 
     def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
-        """Return the pose at first touch and the greatest depth, m: as before where the pose differs in depth alone."""
+        """Return the pose at first touch and the greatest depth, m; reused where the pose differs in depth alone."""
         if self._touch is None or not same_line(self._touch[0], pose):
             touch = first_touch_on_line(self.surface, self.indenter, pose)
             self._touch = touch, DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
@@ -191,7 +194,7 @@ class Gel:
         return compliance_of(self.sensor)
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """See ``_moved_to``; where the path leads to no contact, the one of an indenter that comes straight in."""
+        """Return ``_moved_to``'s contact; if the path leads to none, that of an indenter that comes straight in."""
         path = self._press
         try:
             return self._moved_to(pose, force, flags, began=began)
@@ -209,7 +212,7 @@ class Gel:
         return found
 
     def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """The contact at a pose or force; None where nothing touches. Raises UnsolvedError."""
+        """Return the contact at a pose or force; None where nothing touches. Raises UnsolvedError."""
         try:
             touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by
@@ -244,7 +247,7 @@ class Gel:
     def _at_force(
         self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
     ) -> FastContact:
-        """The contact at a force, or where it is not reached the nearest to it that is found."""
+        """Return the contact at a force or, if that is not reached, the nearest one found."""
         bears, above = float(self._contact.force[1]), None
         if bears > _LARGEST_DROP * force:
             above = press.at_force(float(np.sqrt(bears * force)), touch, touches=True)

@@ -1,5 +1,5 @@
-"""A contact of a ``Gel``, and the pose and force that it is asked for. Poses come as simulators give them: 4 x 4
-matrices, or a position and a quaternion."""
+"""A contact of a ``Gel``, and the pose and force of a request. Poses come as simulators give them: 4 x 4 matrices, or a
+position and a quaternion."""
 
 from __future__ import annotations
 
@@ -35,13 +35,12 @@ class GelContact(Summary):
     """A contact of a ``Gel``, SI units, in the sensor's frame; n surface nodes.
 
     force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the surface
-    traction : (n, 3) Pa; times the nodes' areas (n,) m2, ``Gel.areas``, and added up it is the force
-    patch : (n,) bool, the nodes that carry force; slipping : share of them whose friction is spent
+    traction : (n, 3) Pa; its sum, weighted with the nodes' areas (n,) m2 (``Gel.areas``), is the force
+    patch : (n,) bool, the nodes that carry force; slipping : share of them at the limit of friction
     depth : m, past first touch along +y; below zero the indenter stands in front of the sensor
     pressure : Pa, rise of the BioTac's fluid pressure; 0 for the DIGIT
-    pose : (4, 4), where the indenter stands, deeper than the pose given where a force was asked for
-    flags : names out of ``FLAGS`` of what is wrong with it, none for a sound contact
-    """
+    pose : (4, 4) of the indenter, deeper than the given one where a force was asked for
+    flags : names out of ``FLAGS`` of what is wrong with it, none for a sound contact"""
 
     force: np.ndarray
     displacement: np.ndarray
@@ -55,13 +54,13 @@ class GelContact(Summary):
 
     @classmethod
     def untouched(cls, count: int, pose: Pose) -> GelContact:
-        """Return the contact of an indenter that touches none of so many nodes."""
+        """Return the contact of an indenter that touches none of `count` nodes."""
         none, patch = np.zeros((count, 3)), np.zeros(count, bool)
         return cls(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, matrix_of(pose))
 
 
 def too_far(before: Pose | None, pose: Pose) -> bool:
-    """Return true where a step is so long, or turns so far, that the contact is another one."""
+    """Return true for a step or turn so large that the contact is another one."""
     if before is None:
         return False
     turn = np.arccos(np.clip((np.trace(pose.axes.T @ before.axes) - 1) / 2, -1, 1))
@@ -69,7 +68,7 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 
 
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Return where an indenter is to stand, and with which force, N. Raises TactileError for no pose or force."""
+    """Return the checked pose of an indenter and its force, N. Raises TactileError for an invalid pose or force."""
     if force is not None:
         force = not_negative(force, "Gel, force", "newtons, zero or more, and finite")
         if force > MOST_FORCE:
@@ -149,7 +148,7 @@ def _from_quaternion(quaternion: np.ndarray) -> np.ndarray:
 
 
 def _orthonormal(axes: np.ndarray) -> np.ndarray:
-    """The rotation nearest to ``axes`` (3, 3), which may differ from it by rounding alone."""
+    """Return the rotation nearest to ``axes`` (3, 3), which may differ from it only by rounding."""
     off = np.abs(axes.T @ axes - np.eye(3)).max()
     if off > _RIGID:
         size = ", ".join(f"{length:.4g}" for length in np.linalg.norm(axes, axis=0))

@@ -1,4 +1,4 @@
-"""Read inputs of rendering, frames of a recording, height maps or a scene, as height maps under a camera."""
+"""Read inputs of rendering (frames of a recording, height maps or a scene) as displacements or height maps."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclasses.dataclass(frozen=True)
 class Frames:
-    """Frames of an input: displacements of a gel's nodes or height maps, one of the two.
-    kind : in words; numbers : (T,) by which frames are known
+    """Frames of an input: displacements of a gel's nodes, or height maps.
+    kind : in words; numbers : (T,) frame numbers
     displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m"""
 
     kind: str
@@ -60,8 +60,7 @@ def read_frames(
     path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
-    gel : whose displacement is read, or solved
-    Raises TactileError for anything else, or what cannot be read."""
+    gel : whose displacement is read, or solved. Raises TactileError for anything else, or an unreadable file."""
     path = Path(path)
     if is_scene(path):
         return _of_scene(path, progress, gel)
@@ -129,7 +128,7 @@ def _of_scene(path: Path, progress: Progress, gel: str) -> Frames:
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
     """Return the displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording. Raises
     TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was not kept
-    or lies on another surface, and a frame that it does not hold."""
+    or is of another surface, and a missing frame."""
     held = read_displacement(path, sensor)
     row = np.flatnonzero(held.numbers == frame)
     if held.displacement is None or len(row) != 1:
@@ -139,7 +138,7 @@ def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.n
 
 
 def check_numbers(path: str | os.PathLike, numbers: np.ndarray) -> None:
-    """Raise TactileError for frame numbers (T,) that are no whole numbers from 0 on, each greater than the last."""
+    """Raise TactileError unless frame numbers (T,) are rising whole numbers from 0 on."""
     whole = np.isfinite(numbers).all() and (numbers == np.floor(numbers)).all() and (numbers >= 0).all()
     if not (whole and (np.diff(numbers) > 0).all() and (numbers < 2**31).all()):
         found = f"frame numbers {np.array2string(numbers, threshold=6, edgeitems=3)}"

@@ -32,9 +32,8 @@ class MujocoGel:
     geom : name of the geom that stands for the gel in MuJoCo's contacts
     site : name of a site whose frame is the sensor's: x along the finger, tip toward -x, y into the gel
     friction : of the gel, Coulomb's coefficient; preset : of its pictures
-    Where several geoms touch, the gel is pressed by the one that MuJoCo lets press hardest; planes never press it.
-    Raises TactileError for names that the model lacks.
-    """
+    Of several geoms that touch, the one with MuJoCo's largest force presses the gel; planes never do. Raises
+    TactileError for names that the model lacks."""
 
     def __init__(
         self,
@@ -55,9 +54,10 @@ class MujocoGel:
         self.gel: Gel | None = None  # the one that pressed last
 
     def __call__(self, data: mujoco.MjData) -> GelContact | None:
-        """The gel's contact at MuJoCo's state; None before anything touched. Its force along +y is MuJoCo's; that along
-        the surface follows MuJoCo's within a few frames. Call it after ``mj_step`` or ``mj_forward``, 100 times a
-        second or more often while something moves."""
+        """Return the gel's contact at MuJoCo's state; None before anything touched.
+
+        Its force along +y is MuJoCo's; that along the surface follows MuJoCo's within a few frames. Call it after
+        ``mj_step`` or ``mj_forward``, at least 100 times a second while something moves."""
         pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
         if not pressing:
             self._shift = np.zeros(3)
@@ -82,9 +82,11 @@ class MujocoGel:
         return contact
 
     def _shear(self, contact: GelContact, force: np.ndarray) -> None:
-        """Shift the next pose along the gel so that its force there comes to be MuJoCo's ``force`` (3,) N. MuJoCo's
-        contacts creep and have no shear stiffness of their own, so its poses say little about shear. A ball's is
-        Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, of that along the normal, which by Hertz is 3/2 of force over depth."""
+        """Shift the next pose along the gel so that its force there approaches MuJoCo's ``force`` (3,) N.
+
+        MuJoCo's contacts creep and have no shear stiffness, so its poses say little about shear. A ball's shear
+        stiffness is Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, times the normal one, which by Hertz is 3/2 of force over
+        depth."""
         if contact.force[1] <= 0 or contact.depth <= 0:
             self._shift = np.zeros(3)
             return
@@ -111,7 +113,7 @@ class MujocoGel:
         return found
 
     def _presses(self, geom: int) -> bool:
-        """Return false for planes and height fields, which have no bounds; it is logged once."""
+        """Return false for planes and height fields, which have no bounds; this is logged once."""
         import mujoco
 
         endless = self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -122,7 +124,7 @@ class MujocoGel:
         return not endless
 
     def _pose(self, data: mujoco.MjData, geom: int) -> np.ndarray:
-        """Pose (4, 4) of a geom in the sensor's frame."""
+        """Return the pose (4, 4) of a geom in the sensor's frame."""
         axes, pose = data.site_xmat[self._site].reshape(3, 3), np.eye(4)
         pose[:3, :3] = axes.T @ data.geom_xmat[geom].reshape(3, 3)
         pose[:3, 3] = axes.T @ (data.geom_xpos[geom] - data.site_xpos[self._site])
@@ -130,9 +132,10 @@ class MujocoGel:
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
-    """Return the indenter that a geom is, and its frame (4, 4) in the geom's. Spheres, capsules, boxes and cylinders
-    are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids go through a grid of their distance,
-    built once. Raises TactileError for planes and height fields."""
+    """Return a geom as an indenter, and the indenter's frame (4, 4) in the geom's.
+
+    Spheres, capsules, boxes and cylinders are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids
+    become a grid of their distance, built once. Raises TactileError for planes and height fields."""
     import mujoco
 
     kind, size = mujoco.mjtGeom(int(model.geom_type[geom])), np.array(model.geom_size[geom])
@@ -174,7 +177,7 @@ def _trimesh(model: mujoco.MjModel, geom: int, kind: Any, size: np.ndarray) -> A
 
 
 def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
-    """Number of a named geom or site."""
+    """Return the number of a named geom or site."""
     import mujoco
 
     wanted = mujoco.mjtObj.mjOBJ_GEOM if kind == "geom" else mujoco.mjtObj.mjOBJ_SITE

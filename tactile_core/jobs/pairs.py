@@ -1,6 +1,6 @@
-"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data. Presses are
-numbered; press i draws all it needs from (seed, i), so any number of workers makes the same file, and an interrupted
-run goes on from the blocks of presses that are already on disk."""
+"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data. Press i draws all it
+needs from (seed, i), so any number of workers makes the same file, and an interrupted run continues with the missing
+blocks of presses."""
 
 from __future__ import annotations
 
@@ -54,13 +54,12 @@ def make_pairs(
 ) -> None:
     """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
 
-    progress : called with (blocks of presses done, known so far). Blocks wait in ``<out>.parts``, a folder as of
+    progress : called with (blocks of presses done, known so far). Blocks are kept in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
-    place : where blocks are made, from the job's folder
+    place : executor, by the job's folder
     electrodes : the law of their counts, of ``biotac_sheet.LAWS``; pair : the sensors, source and target
     keep : words of ``pairs_file.KEEPABLE``
-    Raises TactileError for a bad scene, count, or for parts of another scene or seed.
-    """
+    Raises TactileError for a bad scene or count, and for parts of another scene or seed."""
     out = Path(out)
     job, names, text = plan(scene_path, count, seed, out, electrodes, pair, keep)
     compliance_of(pair[1]), compliance_of(pair[0])  # built once here, not by every worker at the same time
@@ -98,7 +97,7 @@ def plan(
 
 
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:
-    """Return the number of blocks that the job needs, by the contacts made so far; nothing is prepared (False)."""
+    """Return the number of blocks that the job needs, by the contacts made so far; False: nothing is prepared."""
     _scene(job.inputs[index], tuple(job.recipe.files))
     return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
 
@@ -123,7 +122,7 @@ def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Pairs], index: int) -> InputFacts | None:
-    """Return the number of blocks needed in all, by the counts of those made so far; None before the first."""
+    """Return the number of blocks needed in all, by the contacts made so far; None before the first."""
     counts = _counts(folder, job, index)
     if not counts:
         return None
@@ -154,7 +153,7 @@ def wanted(counts: dict[int, int], count: int, where: str) -> int:
 
 
 def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
-    """Contacts of each block that is there."""
+    """Return the number of contacts in each existing block."""
     name, found = job.inputs[index].name, {}
     for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
         number = file.stem.rpartition("-")[2]
@@ -164,7 +163,7 @@ def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
 
 
 def _count(file: Path) -> int:
-    """Number of contacts in a block; a damaged one counts as empty until it is made again."""
+    """Return the number of contacts in a block; 0 for a damaged one, until it is made again."""
     try:
         return int(array_pack.read(file, names=(COUNT,))[COUNT])
     except (TactileError, KeyError):

@@ -25,7 +25,7 @@ TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
 
 class Part(NamedTuple):
-    """Output that is built, how much of it in words, and its cost: seconds; MB of memory and disk that it adds."""
+    """A part of the output: its amount in words, seconds, and MB of memory and disk that it adds."""
 
     what: str
     extent: str
@@ -35,7 +35,7 @@ class Part(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Parts of a command's work, in the order they are built; matrices are built one after another."""
+    """Parts of a command's work, in their order; matrices are built one after another."""
 
     parts: Sequence[Part]
 
@@ -65,8 +65,8 @@ def costs() -> dict[str, Any]:
 
 
 def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[str, TierChoice]) -> Plan:
-    """Plan `tactile simulate`; keep : words of ``scene_recording.outputs``; choices : the tier of each of its sensors.
-    Raises TactileError for what cannot be read."""
+    """Plan `tactile simulate`. keep : words of ``scene_recording.outputs``; choices : the tier of each of its sensors.
+    Raises TactileError for a scene that cannot be read."""
     from ..simulation import scene_recording
     from ..simulation.scene import load_scene
 
@@ -86,7 +86,7 @@ def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[st
 
 
 def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
-    """Plan `tactile pairs` in the fast tier; a sensor whose cost was not measured counts for nothing and says so."""
+    """Plan `tactile pairs` in the fast tier; a sensor without measured cost counts 0 and is marked."""
     parts = []
     for sensor in pair:
         what = f"{title(sensor)} contacts"
@@ -100,7 +100,7 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Plan a conversion of so many frames; keep : words of ``results.KEEPABLE``; preset : of the pictures."""
+    """Plan a conversion of so many frames. keep : words of ``results.KEEPABLE``; preset : of the pictures"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
@@ -121,7 +121,7 @@ def _part(name: str) -> dict[str, float]:
 
 
 def _matrices(sensor: str) -> Part:
-    """Return the surface compliance as a part of the plan, with the cost of building it where it is not cached."""
+    """Plan the surface compliance: its memory, and the cost of building it where it is not cached."""
     from ..mechanics.fast.compliance import stored
 
     found, what = stored(sensor), f"{title(sensor)} matrices"
@@ -133,7 +133,7 @@ def _matrices(sensor: str) -> Part:
 
 
 def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept: int) -> Part:
-    """Plan the solves of one sensor. kept : frames that are kept; rough : with friction, which takes longer"""
+    """Plan the solves of one sensor. kept : number of frames kept; rough : true with friction, which takes longer"""
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":
@@ -149,7 +149,7 @@ def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept:
 
 
 def _preset_ms(name: str) -> float:
-    """Time of a picture, ms, by the variant of Mitsuba that was measured slowest, as any machine runs it."""
+    """Return a preset's time a picture, ms, in the slowest of the measured variants of Mitsuba."""
     from ..pictures.presets import measured
 
     return max(measured()["presets"][name]["ms"].values())

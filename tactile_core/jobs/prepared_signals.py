@@ -2,8 +2,7 @@
 
 Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, e) counts; ``quiet`` bool;
 ``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, e)
-counts. ``about``: JSON of what is reported of the recording. Chunks carry checksums, so a shard reads no damaged ones.
-"""
+counts. ``about``: JSON of the recording's reports. Chunks carry checksums, so a shard reads no damaged ones."""
 
 from __future__ import annotations
 
@@ -46,7 +45,8 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording. prepared : its parts' reports; frames, labels : of all of it, see ``recordings.labels``"""
+    """Facts of a recording; prepared : its parts' reports; frames, labels : of the whole recording, see
+    ``recordings.labels``"""
 
     recording: str
     layout: str
@@ -64,7 +64,8 @@ class About(TypedDict):
 
 
 def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare recording `index` unless it is; returns its frames, and if made. Raises TactileError if it changed."""
+    """Prepare recording `index` unless it is; returns its frames, and if it was made. Raises TactileError if it
+    changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     frames = checksummed.stated_rows(file)
@@ -97,7 +98,7 @@ def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
 
 
 def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signals, int]]:
-    """Prepare each part of a recording; also yields the number of its frames that the part before had."""
+    """Prepare each part of a recording; also yields the number of its first frames that repeat the part before."""
     options, source = job.recipe.prepare.options(), job.recipe.source
     sensor = job.recipe.sensor
     unit = None if sensor is None else sensor.gains_for(path, split(path).section, "--sensor", source)
@@ -112,7 +113,7 @@ def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signal
 
 
 class _Writer:
-    """The datasets of a prepared file, part by part."""
+    """Writer of the datasets of a prepared file, part by part."""
 
     def __init__(self, file: h5py.File) -> None:
         self.count, self._file = 0, file
@@ -120,7 +121,7 @@ class _Writer:
         self._about: dict[str, Any] = {"warnings": [], "prepared": [], "labels": {}}
 
     def append(self, recording: Recording, signals: Signals, repeated: int) -> None:
-        """Add the frames of a part that are new."""
+        """Add a part's new frames."""
         arrays = {"time": recording.time, **{name: getattr(signals, name) for name in tuple(COLUMNS)[1:]}}
         end = self.count + len(recording) - repeated
         for name, kind in COLUMNS.items():
@@ -147,7 +148,7 @@ class _Writer:
         self.count = end
 
     def close(self, digest: str) -> None:
-        """Write the facts that are known only at the end. digest : SHA-256 of the recording."""
+        """Write the facts known only at the end. digest : SHA-256 of the recording"""
         warnings = self._about["warnings"]
         if len(warnings) > MAX_WARNINGS:
             warnings[MAX_WARNINGS:] = [f"{len(warnings) - MAX_WARNINGS} more warnings"]
@@ -159,7 +160,7 @@ class _Writer:
 
 
 class Prepared:
-    """A prepared file, which each call opens anew, so that none stays open. Raises TactileError where it is damaged."""
+    """Reader of a prepared file, opened anew by each call. Raises TactileError where it is damaged."""
 
     def __init__(self, file: Path) -> None:
         self._path = file
@@ -199,7 +200,7 @@ class Prepared:
 
 
 def _check(path: Path, file: h5py.File) -> None:
-    """Raise ValueError or TactileError for other arrays than ours, whose rows would take more memory."""
+    """Raise ValueError or TactileError for unknown arrays, whose rows might take more memory."""
     import h5py
 
     count, electrodes = len(file["time"]), file["rest"].shape[1]

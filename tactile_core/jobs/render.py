@@ -1,12 +1,11 @@
 """The job of ``tactile render``: an input becomes a folder of pictures, as PNG and OpenEXR, with a note.
 
 DIR/images/%05d.png  pictures, numbered as the input's frames are
-DIR/exr/%05d.exr     where asked for: linear radiance of the coating in float32, R, G, B the light of each LED
+DIR/exr/%05d.exr     if asked for: linear radiance of the coating in float32, R, G, B the light of each LED
 DIR/rest.exr         the same of the undeformed gel
-DIR/camera.exr       what the camera makes of it: response.R.red ... and ambient.R ..., see UNITS
+DIR/camera.exr       from radiance to camera levels: response.R.red ... and ambient.R ..., see UNITS
 DIR/note.json        input, calibration, preset, versions; same input, same bytes
-DIR/timings.json     ms a frame of each stage on this machine; differs from run to run
-"""
+DIR/timings.json     ms a frame of each stage on this machine; differs from run to run"""
 
 from __future__ import annotations
 
@@ -50,12 +49,11 @@ MAKER = "tactile render"  # in the note
 class Options:
     """Options of rendering.
 
-    preset : its name, None to choose by levels; levels : grey levels rms that will do, None for the default preset
+    preset : its name, None to choose by levels; levels : acceptable error, grey levels rms, None for the default preset
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
-    frames : part of the input; exr : whether to write OpenEXR too; variant : None for the faster one
-    noise : whether PNG pictures have the camera's noise, the same in every run
-    """
+    frames : part of the input; exr : true writes OpenEXR too; variant : None for the faster one
+    noise : true adds the camera's noise to PNG pictures, the same in every run"""
 
     preset: str | None = None
     levels: float | None = None
@@ -78,7 +76,7 @@ def render(
     say: Callable[[str], None] = lambda words: None,
 ) -> Path:
     """Render an input into the folder `out`, which appears whole or not at all; returns it.
-    progress : given a word, a context that yields a callback (done, in all); say : receives what was picked, and why
+    progress : word -> context that yields a callback (done, in all); say : called with a sentence on the chosen preset
     Raises TactileError for a bad input, calibration or option, and a disk that cannot be written."""
     clock, out = Stopwatch(), Path(out)
     gel = load_calibration(options.calibration).camera.sensor
@@ -123,7 +121,8 @@ def claimed(out: Path, options: Options) -> str:
 
 
 def choose_preset(options: Options) -> str:
-    """Return the preset named, the cheapest that is exact enough, or the default. Raises TactileError for both."""
+    """Return the named preset, the cheapest one within the levels, or the default. Raises TactileError for both
+    options."""
     if options.levels is None:
         return options.preset or DEFAULT
     if options.preset is not None:
@@ -132,7 +131,8 @@ def choose_preset(options: Options) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration in pixels of height maps (H, W) or of size (width, height). Raises where they differ."""
+    """Return the calibration in pixels of height maps (H, W) or of size (width, height). Raises TactileError if they
+    differ."""
     if heights is not None:
         height, width = heights
         if size not in (None, (width, height)):
@@ -144,9 +144,9 @@ def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tup
 
 @dataclasses.dataclass(frozen=True)
 class Pictures:
-    """Writes frames as files.
-    about : attributes of EXR files; heights : whether frames are height maps, not displacements
-    noise : whether PNG pictures have some; exr : whether to write OpenEXR too"""
+    """Writer of frames as files.
+    about : attributes of EXR files; heights : true if frames are height maps, false for displacements
+    noise : true adds the camera's noise to PNG pictures; exr : true writes OpenEXR too"""
 
     renderer: Renderer
     clock: Stopwatch
@@ -162,7 +162,7 @@ class Pictures:
             (folder / EXR).mkdir()
 
     def write_rest(self, folder: Path) -> None:
-        """Write the undeformed gel, where OpenEXR is asked for."""
+        """Write the undeformed gel, if OpenEXR is asked for."""
         if self.exr:
             self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
             self._write_camera(folder / CAMERA)
@@ -195,7 +195,7 @@ class Pictures:
         write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
 
     def _write_camera(self, path: Path) -> None:
-        """Write the response to each LED's light, and the part of the picture at rest that is not from LEDs."""
+        """Write the response to each LED's light, and the part of the resting picture that is not from LEDs."""
         from ..files.exr_file import write_exr
 
         ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
@@ -215,7 +215,7 @@ def pictures(
 def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
-    """Return the origin of a result, fit for JSON: only what the same input reproduces."""
+    """Return a result's origin for JSON: only what the same input reproduces."""
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))
     about = PRESETS[preset] if preset != FAST else None
@@ -238,7 +238,7 @@ def note_of(
 
 
 def background_of(renderer: Renderer) -> dict[str, Any] | str:
-    """Describe what makes the picture at rest, and by how much a photograph corrects the lights'."""
+    """Describe the source of the resting picture, and by how much a photograph corrects the modelled one."""
     photograph = renderer.calibration.photograph
     if not photograph:
         return "lights"

@@ -1,4 +1,4 @@
-"""`tactile render` by many processes: the folder of one process, but for timings.json, which only that one measures."""
+"""`tactile render` in many processes: the same folder as from one process, but without timings.json."""
 
 from __future__ import annotations
 
@@ -37,9 +37,8 @@ def render_in_parts(
     place: Callable[[Path], Place],
     progress: Callable[[int, int], None],
 ) -> Path:
-    """Render like ``render.render``; the job is in ``<out>.parts`` until complete, and the same call resumes it.
-    place : where frames are rendered, from the job's folder; progress : (tasks done, known so far)
-    Raises what ``render.render`` raises."""
+    """Do ``render.render`` in a job, kept in ``<out>.parts`` until complete; the same call resumes it. Raises alike.
+    place : executor, by the job's folder; progress : (tasks done, known so far)"""
     out = Path(out)
     job = plan(path, out, options)
     with (
@@ -83,7 +82,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
-    """Read the input, simulating a scene; keep the values to be rendered."""
+    """Read the input (a scene is simulated) and keep the values to render."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None
@@ -116,14 +115,14 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | None:
-    """Return how many frames an inspected input has."""
+    """Return the number of frames of an inspected input."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     return InputFacts(count(folder, job), _frames(folder, job))
 
 
 def count(folder: Path, job: Job[Render]) -> int:
-    """Return how many shards the prepared input has."""
+    """Return the number of shards of the prepared input."""
     return -(-_frames(folder, job) // job.recipe.shard_frames)
 
 
@@ -138,13 +137,13 @@ def _frames(folder: Path, job: Job[Render]) -> int:
 
 
 def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> dict[str, np.ndarray]:
-    """Read arrays of what is to be rendered, the only input of such a job."""
+    """Read arrays of the prepared input."""
     return array_pack.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
 
 
 @functools.lru_cache(maxsize=2)
 def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
-    """The renderer, once a process; heights : (H, W) of height maps, None for displacements."""
+    """Make the renderer, once a process; heights : (H, W) of height maps, None for displacements."""
     check_unit(calibration, recipe.calibration)
     options = Options(
         calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise,

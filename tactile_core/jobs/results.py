@@ -41,9 +41,9 @@ def parse_keep(text: str) -> tuple[str, ...]:
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
-    """Return the result folder of each recording, after all checks that need no work. Clears what killed runs left in
-    `out`. Raises TactileError: an empty `out`, two recordings of the same name, a result that exists (unless
-    `overwrite`), something that is no result in its place, a folder that cannot be written."""
+    """Return the result folder of each recording, after all checks that need no work; clears what killed runs left in
+    `out`. Raises TactileError: an empty `out`, two recordings of one name, a result that exists (unless `overwrite`),
+    something else in its place, a folder that cannot be written."""
     if not os.fspath(out):
         raise TactileError("--out", "an empty name", "a folder to write", "Name one")
     out = Path(out)
@@ -65,9 +65,9 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
-    """Raise TactileError where a result may not stand: one is there (unless `overwrite`), or something else is.
-    maker : what its note says of who made it; another verb's result is something else, and so is one among whose files
-        there are others"""
+    """Raise TactileError where a result exists (unless `overwrite`), or something that is none.
+    maker : verb of the result by its note; another verb's result is something else, as is a folder with foreign
+        files"""
     if not os.path.lexists(folder):
         return
     if not is_result(folder, maker):
@@ -82,7 +82,7 @@ def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
 
 
 def check_writable(out: Path) -> None:
-    """Raise TactileError for a folder that cannot be made, or written; one that is missing stays so."""
+    """Raise TactileError for a folder that cannot be made or written; a missing one is not made."""
     with atomic.writing(out, advice="Name another --out, or allow writing"):
         atomic.probe(out)
 
@@ -118,7 +118,7 @@ def parse_frames(text: str) -> slice:
 
 
 def select(frames: slice, count: int) -> np.ndarray:
-    """Return the indices (n,) of the selected ones of `count` frames; raises TactileError where there is none."""
+    """Return the indices (n,) of the selected ones of `count` frames; raises TactileError for none."""
     chosen = np.arange(count)[frames]
     if not len(chosen):
         found = f"{frames_text(frames)} takes none of the {count} frames"

@@ -1,4 +1,4 @@
-"""The other direction: a gel's deformation to the skin of a BioTac, its force, and what its electrodes would read."""
+"""The reverse direction: from a gel's deformation to the BioTac's skin, its force, and its electrodes' counts."""
 
 from __future__ import annotations
 
@@ -35,10 +35,8 @@ def reverse(
     overwrite: bool = False,
 ) -> None:
     """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``ARRAYS``.
-
-    translator : whose networks lead from the skin to that gel; progress : called with (frames done, frames in all)
-    Raises TactileError for an input without that gel's displacement, and an output that is there or cannot be written.
-    """
+    translator : its networks lead from the skin to that gel; progress : called with (frames done, frames in all)
+    Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
     import h5py
 
     if os.path.lexists(out) and not overwrite:

@@ -1,4 +1,4 @@
-"""The figure of a contact sheet: its layout, and how each of its rows is drawn."""
+"""The figure of a contact sheet: its layout and its rows."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ PACKING = {"compress_level": 4}  # of a sheet without libdeflate: 1.2 MB in 0.14
 
 
 class SheetFigure:
-    """A figure that is filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
+    """A figure filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
 
     def __init__(
         self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, snapshots: bool = False
     ) -> None:
-        """Make an empty figure. snapshots : whether frames are shown over their numbers, having no time"""
+        """Make an empty figure. snapshots : true labels frames by number, as they have no time"""
         from matplotlib.figure import Figure
 
         self._over, self._heading = ("snapshot", "snapshot {:.0f}") if snapshots else ("time, s", "{:.2f} s")
@@ -92,7 +92,7 @@ class SheetFigure:
             self.top += WARNING_LINE
 
     def electrodes(self, time: np.ndarray, electrodes: np.ndarray, frames: np.ndarray) -> None:
-        """Draw lines of (T, 19) counts over (T,) s, and mark where the columns ``frames`` (k,) lie among them."""
+        """Draw (T, 19) counts over (T,) s, and mark the frames (k,) of the columns."""
         import matplotlib
 
         self.top += NUMBERS
@@ -120,7 +120,7 @@ class SheetFigure:
         self.top += EXPLAINED + GAP
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray) -> None:
-        """Draw lines of the fluid's pressure (T,) Pa over (T,) s: as translated, and as measured where it was."""
+        """Draw the fluid's pressure (T,) Pa over (T,) s, translated and, where known, measured."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
         if np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
@@ -164,7 +164,7 @@ class SheetFigure:
         self.top += Z_AXIS
 
     def _on_sheet(self, place: np.ndarray, column: int, z: tuple[float, float]) -> np.ndarray:
-        """Places (..., 2) mm from a row's left edge, and along the finger, of places (x, z) m on a column's map."""
+        """Convert places (x, z) m on a column's map to (..., 2) mm from a row's left edge, and along the finger."""
         pitch = (self.column_width + GAP) / self.column_width * (z[1] - z[0])
         from_left = self.camera.right_z * place[..., 1] - min(self.camera.right_z * np.array(z))
         return np.stack([1e3 * (column * pitch + from_left), 1e3 * place[..., 0]], axis=-1)
@@ -208,7 +208,7 @@ class SheetFigure:
         return axes
 
     def _row(self, height: float) -> Axes:
-        """Make the axes that all columns of a row share, without a border of their own; height : inches."""
+        """Make the axes that all columns of a row share, without a border; height : inches"""
         axes = self._axes(LEFT, self.columns * (self.column_width + GAP) - GAP, height)
         axes.spines[:].set_visible(False)
         axes.tick_params(length=2.5, labelsize=7)
@@ -216,7 +216,7 @@ class SheetFigure:
         return axes
 
     def _frame(self, axes: Axes, corner: np.ndarray, opposite: np.ndarray) -> Rectangle:
-        """Draw the border (4,) and the ground of one column between two corners (2,) of the axes; return the ground."""
+        """Draw border (4,) and background of one column between two corners (2,) of the axes; return the background."""
         from matplotlib.patches import Rectangle
 
         width, height = opposite - corner
@@ -250,7 +250,8 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write each column's force (k, 3) N and `trust`, as `trust_words.in_words` takes it, and a key to the maps."""
+        """Write each column's force (k, 3) N and `trust`, the arguments of `trust_words.in_words`, and a key to the
+        maps."""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]
@@ -281,12 +282,13 @@ def scale(*displacements: np.ndarray | None) -> float:
 
 
 def _shown(place: np.ndarray, beside: float) -> tuple[float, float]:
-    """Return what a row shows along one axis, m: all nodes' places (n,) m and a little beside, in tenths of a mm."""
+    """Return the range, m, that a row shows along one axis: all nodes' places (n,) m and a margin, in tenths of a
+    mm."""
     low, high = np.round(1e4 * np.array([place.min() - beside, place.max() + beside])) / 1e4
     return float(low), float(high)
 
 
 def _outline(gel: Lattice) -> np.ndarray:
-    """Closed outline (n, 2) = (x, z) m of a gel's surface: the border of its lattice."""
+    """Return the closed outline (n, 2) = (x, z) m of a gel's lattice."""
     grid = gel.grid(gel.rest)[..., [0, 2]]
     return np.concatenate([grid[0], grid[1:, -1], grid[-1, -2::-1], grid[-2::-1, 0]])

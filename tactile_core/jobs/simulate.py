@@ -3,11 +3,10 @@
 <out>/<number>_<values>.h5   each as `tactile simulate` makes it
 <out>/grid.json              the seed and values of each
 
-A grid is all combinations of `NAME=A:B:N`, N values evenly from A to B, or `NAME=V,V,...`. NAME is a field of the scene
-as its TOML has it, with numbers for places in lists (``recording.tilt_deg``, ``indenters.0.radius_mm``), or one of
-three that change the whole motion of the [recording]: ``force_n``, its greatest force, N, by which all are scaled;
-``x_mm`` and ``z_mm``, where it is pressed hardest, with which all points move.
-"""
+A grid is all combinations of `NAME=A:B:N`, N values evenly from A to B, or `NAME=V,V,...`. NAME is a field of the
+scene's TOML, with numbers for places in lists (``recording.tilt_deg``, ``indenters.0.radius_mm``), or one of three that
+change the whole motion of the [recording]: ``force_n`` scales all forces to this greatest one, N; ``x_mm`` and ``z_mm``
+move all points, so that the one of greatest force lies there."""
 
 from __future__ import annotations
 
@@ -44,7 +43,8 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """List all combinations, the last name's values changing fastest. Raises TactileError for a bad or doubled word."""
+    """List all combinations, the last name's values changing fastest. Raises TactileError for a bad or repeated
+    word."""
     axes: dict[str, list[Value]] = {}
     for word in words:
         name, mark, text = word.partition("=")
@@ -97,7 +97,7 @@ def name_of(values: dict[str, Value]) -> str:
 
 
 def with_values(scene: Scene, values: dict[str, Value], where: str) -> Scene:
-    """Return the scene with other values. Raises TactileError for a field it has not, or a value out of its range."""
+    """Return the scene with other values. Raises TactileError for an unknown field, or a value out of its range."""
     document = msgspec.to_builtins(scene)
     for name, value in values.items():
         if name in MOTION:
@@ -153,9 +153,9 @@ def simulate_grid(
     progress: Progress = lambda done, known: None,
     place: Callable[[Path], Place] = InProcess,
 ) -> None:
-    """Simulate all recordings of a `plan` into the folder ``out``.
-    progress : (tasks done, known so far); place : where the work is done, from the job's folder
-    The job is in ``<out>.parts`` until all is there. Raises TactileError for what cannot be done."""
+    """Simulate all recordings of a `plan` into the folder ``out``; the job is in ``<out>.parts`` until all are done.
+    progress : (tasks done, known so far); place : executor, by the job's folder
+    Raises TactileError for what cannot be done."""
     for sensor in PAIR:
         compliance_of(sensor)  # built once here, not by every worker at the same time
     with runs.completed(Path(out), job, place, progress) as folder:
@@ -171,11 +171,9 @@ def plan(
     electrodes: str = SHEET,
 ) -> Job[Simulate]:
     """Return the job: the [recording] of a scene for each combination of the values in ``grid``.
-
-    seed : of the first recording, each has one more than that before it; keep : words of ``scene_recording.outputs``
+    seed : of the first recording, each next one has one more; keep : words of ``scene_recording.outputs``
     electrodes : the law of their counts, of ``biotac_sheet.LAWS``
-    Raises TactileError for a bad scene, grid or place, before any work.
-    """
+    Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)
     scene, _, inputs, files = read_scene(scene_path, [name_of(one) for one in values])
     for one in values:

@@ -1,12 +1,11 @@
-"""Solve the contacts that the networks found on a gel, the same or another one, in place of the gel they translate.
+"""Solve the contacts that the networks found, on the same or another gel, in place of the gel they translate.
 
-What is taken from a translation: the place of the dent, the size of the force, the way that the deepest node moves, and
-the curvature of the dented patch. What is assumed: a ball presses in along that way and sticks to that node, with the
-friction of all contacts here (0.78). So a contact is solved without the object's own outline, which no network tells:
-flats, rings and edges come out round. Place and force keep the networks' errors; the surface under that load is exact
-but for the fast tier's own. Place, force and lean are of the plane that all gels share, so that a contact found on the
-DIGIT is solved on any gel with a descriptor, for which no networks need to be trained.
-"""
+From the translation come the place of the dent, the size of the force, the direction in which the deepest node moves,
+and the curvature of the dented patch. Assumed is a ball that presses in along that direction and sticks to that node,
+with the friction of all contacts here (0.78): flats, rings and edges come out round, as no network tells the object's
+outline. Place and force keep the networks' errors; the surface under that load has only the fast tier's own. Place,
+force and lean are of the plane that all gels share, so a contact found on the DIGIT is solved on any gel with a
+descriptor, without training."""
 
 from __future__ import annotations
 
@@ -32,27 +31,19 @@ OUTWARD = np.array([0.0, -1.0, 0.0])  # of the gel, which is nearly flat
 
 
 def check_installed() -> None:
-    """Raise TactileError where the library is missing that solves contacts."""
+    """Raise TactileError where scipy, which solving needs, is missing."""
     if importlib.util.find_spec("scipy") is None:
         raise TactileError("--gel solved", "scipy is not installed", "scipy", f"Install it: {advice('fem')}")
 
 
 def prepare(gel: str = TARGET) -> None:
-    """Read a gel's compliance, or build it (a minute, once), before a recording is begun."""
+    """Read a gel's compliance, or build it (a minute, once), before a recording begins."""
     check_installed()
     compliance_of(gel)
 
 
 def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET) -> dict[str, np.ndarray]:
-    """Replace the gel displacements of translated frames by solved contacts, each frame by itself.
-
-    arrays : by the names of frames.h5, T first; frames without contact are unchanged
-    gel : the sensor that is solved; found_on : the one on which the networks find contacts
-    Returns the arrays with ``traction_digit`` (T, M, 3) Pa added, zero in frames that were not solved. A frame without
-    a solution keeps the networks' displacement and is flagged ``GEL_NOT_SOLVED``.
-    Where `gel` differs from `found_on`, a frame without a solution is at rest, contacts beside the gel are flagged as
-    beyond it, the networks' latents are left out, and errors, which are not known, are NaN.
-    """
+    """Replace the gel displacements of translated frames by solved contacts, each frame by itself."""
     moved, flags, center = arrays["displacement_digit"], arrays["flags"].copy(), arrays["contact_center"]
     own = gel == found_on
     found = moved.copy() if own else np.zeros((len(moved), len(sensors.sensor_surface(gel).rest), 3), moved.dtype)
@@ -69,7 +60,8 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
 
 
 def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str) -> Iterator[tuple[int, BodyContact]]:
-    """Yield touching frames and their contacts, of gels (T, n, 3) m, places (T, 2) m and sizes of force (T,) N."""
+    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) m; size : (T,) N, of the
+    force"""
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
     deepest = np.einsum("tni,ni->tn", moved, normals).argmin(axis=1)
@@ -82,7 +74,7 @@ def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str)
 
 
 def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray]:
-    """Remove from frames solved on another gel the values that hold for the networks' gel alone."""
+    """Remove values that hold for the networks' gel alone from frames solved on another."""
     flags, (x, z) = arrays["flags"].copy(), arrays["contact_center"].T
     flags[sensors.shape_of(gel).outline_distance(x, z) <= 0] |= np.uint16(Flag.BEYOND_DIGIT)
     unknown = {name: np.full_like(arrays[name], np.nan) for name in ERRORS if name in arrays}
@@ -92,12 +84,10 @@ def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray
 def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, np.ndarray]:
     """Return arrays ``traction_digit`` (T, M, 3) Pa, ``traction_force`` (T, 3) N of translated frames.
 
-    arrays : by the names of frames.h5, T first; frames that were solved bring their traction, for the others it is
-        found from their displacement where they are in contact, and zero elsewhere. Its pattern and direction are the
-        displacement's, its size is that of the networks' force: on the gel a dent a tenth too shallow carries a fifth
-        too little, and of the two the force is nearer the truth (docs/convert.md)
-    gel : the sensor
-    """
+    arrays : by the names of frames.h5, T first. Solved frames bring their traction. For others in contact it is
+        derived: pattern and direction from the displacement, size from the networks' force, which is nearer the truth
+        (on the gel a dent a tenth too shallow carries a fifth too little: docs/convert.md). It is zero elsewhere
+    gel : the sensor"""
     displacement, touched = arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0])
     solved = arrays.get("traction_digit")
     traction = np.zeros(displacement.shape, np.float32) if solved is None else solved
@@ -113,9 +103,9 @@ def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, 
 
 
 def describe_miss(total: np.ndarray, force: np.ndarray, solved: bool = False) -> str:
-    """Say by how much tractions that add up to (T, 3) N miss the size of the force (T, 3) N that the networks estimate.
-    Their directions are not compared: the force is the one on the finger, whose pad is curved.
-    solved : whether gels were solved under that force, rather than translated beside it"""
+    """Describe how far the magnitude of tractions that add up to (T, 3) N is from that of the networks' force (T, 3) N.
+    Directions are not compared: the force is that on the finger, whose pad is curved.
+    solved : true if gels were solved under that force"""
     size, carried = accuracy.lengths(force), accuracy.lengths(total)
     pressed = size > 0
     if not pressed.any():

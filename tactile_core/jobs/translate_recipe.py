@@ -35,11 +35,10 @@ def make(
     every: int = 1,
 ) -> Translate:
     """Return the recipe of a job on these recordings; fields as of ``recipes.Translate``.
-
-    say : told what is approximate about the gel; weights, calibration : folder and file, None for those that ship
+    say : called with sentences on approximations of the gel; weights, calibration : folder and file, None for those
+        that ship
     preset : None for fast pictures, if any
-    Raises TactileError for options that do not go together or name what there is not.
-    """
+    Raises TactileError for options that do not go together, and for unknown names."""
     prepare.options().check()
     source = None if weights else readers.sensor_of_first(paths, prepare.columns)
     tools = convert.ToolOptions(weights, answer=answer, gel=gel, target=target, source=source)

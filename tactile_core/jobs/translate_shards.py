@@ -1,9 +1,8 @@
-"""Recordings to shards of translated frames: the signals of each are prepared once, then its shards are made of them.
+"""Recordings to shards of translated frames: each recording's signals are prepared once, then its shards are made.
 
-A shard is a checksummed HDF5 file of the layout of ``frames_file``, pictures included. Its attributes name the
-recording and its hash, the recipe's hash, and which shard of how many it is; its rows are frames
-`number * shard_frames` to those of the next.
-"""
+A shard is a checksummed HDF5 file in the layout of ``frames_file``, pictures included. Its attributes name the
+recording and its hash, the recipe's hash, its number and the number of shards; its rows are frames from `number *
+shard_frames` up to those of the next."""
 
 from __future__ import annotations
 
@@ -35,7 +34,7 @@ KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "trac
 
 
 def translated(frames: int, job: Job[Translate]) -> int:
-    """Return how many frames are translated of a recording of so many."""
+    """Return the number of translated frames of a recording of `frames` frames."""
     return -(-frames // job.recipe.every)
 
 
@@ -51,7 +50,7 @@ def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, b
 
 
 def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
-    """Translate a shard unless it is whole; returns whether it was made. Raises TactileError; OSError of the disk."""
+    """Translate a shard unless it is whole; returns true if it was made. Raises TactileError; OSError of the disk."""
     recipe, name = job.recipe, job.inputs[index].name
     pictures, pair = (job.calibration, recipe.preset, recipe.variant or None), (recipe.target, recipe.source)
     options = ToolOptions(job.weights, *pictures, recipe.answer, recipe.gel, *pair)
@@ -74,7 +73,7 @@ def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
 
 
 def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int) -> bool:
-    """Return true if a whole shard is shard `number` of recording `index`, alone under its name, with these frames."""
+    """Return true if a whole file is shard `number` of recording `index`, with these frames."""
     try:
         with open_plain(file) as found:
             return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
@@ -102,7 +101,7 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
 
 @functools.lru_cache(maxsize=2)
 def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
-    """Load the networks and the unit, once a process. Raises TactileError where they are not those of the job."""
+    """Load the networks and the unit, once a process. Raises TactileError where they are not the job's."""
     check_unit(options.calibration, unit_sha256)
     tools = convert.load_tools(options)
     if tools.translator.sha256 != sha256:

@@ -1,6 +1,8 @@
 """The picture of an untouched DIGIT: its LEDs' light on the coating and ambient light, or the user's own photograph.
-About half of what a real unit shows at rest is light that gel and acrylic hold: it lights the coating from all sides.
-Each LED has its own share of it, a smooth polynomial, that goes with the LED's power and the coating's albedo."""
+
+About half of what a real unit shows at rest is light scattered in gel and acrylic, which lights the coating from all
+sides. Each LED has its own share of it, a smooth polynomial, proportional to the LED's power and the coating's
+albedo."""
 
 from __future__ import annotations
 
@@ -24,9 +26,10 @@ MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Picture (H, W, 3) float32, grey levels, of the untouched gel, whose coating shows radiance (H, W, 3). The
-    calibration's photograph where it has one; it is scaled by the model where LEDs or albedo have changed since it was
-    taken. Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
+    """Picture (H, W, 3) float32, grey levels, of the untouched gel. radiance : (H, W, 3) of its coating
+
+    It is the calibration's photograph where there is one, scaled by the model where LEDs or albedo have changed since.
+    Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
     if not unit.photograph:
         return by_led(unit, radiance).sum(-1)
     photograph = read_photograph(unit.photograph, unit.camera).astype(np.float32)
@@ -39,7 +42,7 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Absolute difference, grey levels, between a picture at rest (H, W, 3) and the lights' own: mean and largest."""
+    """Mean and largest absolute difference, grey levels, between a picture at rest (H, W, 3) and the modelled one."""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
@@ -49,7 +52,7 @@ def _open_light(unit: Calibration) -> np.ndarray:
 
 
 def open_radiance(unit: Calibration) -> np.ndarray:
-    """Radiance (H, W, 3) of the untouched gel where nothing is in the LEDs' way, as nothing is on a smooth dome."""
+    """Radiance (H, W, 3) of the untouched gel without shadows, as on a smooth dome."""
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
     right, down = unit.camera.right.astype(np.float32)[None, :], unit.camera.down.astype(np.float32)[:, None]
     surface = Surface(right, down, height, *slopes(height, unit.camera))
@@ -57,15 +60,14 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Ambient light (3, H, W) float32, levels of each LED's band, that gel which is seen at heights (H, W) m has more
-    of than gel at height zero.
-    """
+    """Ambient light (3, H, W) float32, levels of each LED's band, of gel seen at heights (H, W) m less that at height
+    zero."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Levels (H, W, 3, 3), channel by LED, of radiance (H, W, 3) at rest and ambient light."""
+    """Grey levels (H, W, 3, 3), channel by LED, of the gel at rest: coating of radiance (H, W, 3) and ambient light."""
     right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
     ambient = np.zeros((*unit.camera.shape, 3))
     table = np.asarray(unit.ambient)
@@ -80,8 +82,9 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 def fit_ambient(
     picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
 ) -> tuple[tuple[float, ...], ...]:
-    """Fit the ambient light (3, n) by least squares, so that the unit's picture at rest is nearest to one (H, W, 3).
-    radiance : (H, W, 3) of the coating at rest; degree : of its polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE"""
+    """Fit the ambient light (3, n) by least squares, so that the modelled picture at rest is nearest to `picture` (H,
+    W, 3).
+    radiance : (H, W, 3) of the coating at rest; degree : of the polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE"""
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)
     left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)
@@ -91,14 +94,14 @@ def fit_ambient(
 
 
 def terms(most: int) -> Iterator[tuple[int, int]]:
-    """Powers (i, j) of right and down of a polynomial of degree ``most``, by i + j, then by j."""
+    """Exponents (i, j) of right and down of a polynomial of degree ``most``, by i + j, then by j."""
     for degree in range(most + 1):
         for j in range(degree + 1):
             yield degree - j, j
 
 
 def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
-    """Picture (H, W, 3) uint8 of an image file; raises TactileError for another file, or another size."""
+    """Read an image file as a picture (H, W, 3) uint8; raises TactileError for another file, or another size."""
     from PIL import Image
 
     expected = f"an image file of 8 bits a colour ({', '.join(FORMATS)})"

@@ -1,6 +1,7 @@
 """The camera's toe and shoulder: deep shadows and bright flanks keep a part of their light, and with it their hue.
-Linear light would take more from a shadow than the untouched gel shows there. Photographs never fall below a share of
-the picture at rest, and bright flanks approach white; between both ends the camera is linear (docs/calibration.md)."""
+
+By linear light a shadow would take more than the untouched gel shows there. Photographs never fall below a share of the
+picture at rest, and bright flanks approach white; between both ends the camera is linear (docs/calibration.md)."""
 
 from __future__ import annotations
 
@@ -15,8 +16,8 @@ LEAST = 1.0  # level, over which an end bends at least
 
 
 def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change (...), levels, that the camera shows of linear light's, and the slope between them.
-    rest : (...) levels of the untouched gel, which the camera shows as they are"""
+    """Return the change (...), levels, that the camera shows for a change of linear light, and the slope between them.
+    rest : (...) levels of the untouched gel, which are shown unchanged"""
     toe, fall, shoulder, rise = ends(rest)
     below, above = np.minimum(change - toe, 0), np.maximum(change - shoulder, 0)
     dark, bright = np.exp(below / fall), np.exp(-above / rise)
@@ -24,7 +25,7 @@ def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ends(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the changes (...) from a rest's levels at which toe and shoulder begin, each followed by its reach."""
+    """Return the changes (...) from a rest's levels at which toe and shoulder begin, each followed by its range."""
     rest = np.clip(rest, 0, LARGEST_LEVEL)
     toe, fall = np.float32(TOE - 1) * rest, np.maximum(np.float32(TOE - FLOOR) * rest, np.float32(LEAST))
     shoulder = np.maximum(np.float32(SHOULDER) - rest, np.float32(0))

@@ -1,9 +1,8 @@
 """Soft shadows that the gel casts in the light of one small LED: a march toward the light in polar rows.
 
-The march works on what the camera sees. The map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes
-lines to lines and the pinhole to infinity, so that the seen gel becomes a height field over the pixels, and its
-shadows those of an LED that has moved by the same map.
-"""
+The march works on the seen gel. The map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes lines to
+lines and the pinhole to infinity, so that the seen gel becomes a height field over the pixels, and its shadows are
+those of an LED moved by the same map."""
 
 from __future__ import annotations
 
@@ -27,10 +26,9 @@ _TABLE_STEPS = 256
 class ShadowCaster:
     """Visible share of one LED at each pixel over the gel.
 
-    The mapped field is sampled on rays that leave the LED's foot point, (angle, distance), where a march toward the
-    light is a shift along rows. Gel outside the picture is taken as flat, as high as the picture's edge. Raises
-    TactileError for an LED whose foot point lies in the picture, or that is as high as the camera.
-    """
+    The mapped field is sampled on rays from the LED's foot point, (angle, distance), where a march toward the light is
+    a shift along rows. Gel outside the picture is assumed flat, at the height of the picture's edge. Raises
+    TactileError for an LED whose foot point lies in the picture, or that is as high as the camera."""
 
     def __init__(self, camera: Camera, led: Led) -> None:
         self.led = led
@@ -65,9 +63,11 @@ class ShadowCaster:
         self._shape, self.polar_shape = camera.shape, (rows, columns)
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """LED radii that a unit of slope of the mapped line of sight is at the LED, across that line, (rows, columns).
-        A rise dw of the mapped line at the LED is a move of (1 - h / H)^2 (-right / H, -down / H, 1) dw in space, with
-        the mapped LED's right and down. Points lie at height zero here: that changes the angle by a few degrees."""
+        """Return (rows, columns): LED radii by which the mapped line of sight rises at the LED per unit of its slope.
+
+        A rise dw of the mapped line at the LED is a displacement (1 - h / H)^2 (-right / H, -down / H, 1) dw in space,
+        with the mapped LED's right and down; its part across the line counts. Points are taken at height zero, which
+        changes the angle by a few degrees."""
         led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
         rise = (1 - led[2] * inverse) ** 2 * np.array([-self.foot[0] * inverse, -self.foot[1] * inverse, 1.0])
         to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)
@@ -75,9 +75,9 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """Return the height of the LED's centre above the horizon, in LED radii, from -1 (hidden) to 1 (all seen).
-        height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may throw shadows Returns
-            sight (h, w) and the box of pixels it is for; it is 1 everywhere else."""
+        """Return the height of the LED's centre above the horizon, in LED radii, from -1 (hidden) to 1 (fully visible),
+        for a box of pixels (h, w), and that box; it is 1 everywhere else.
+        height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may cast shadows"""
         reach = self.reach(float(height[box].max()), float(height.min()))
         rows = _span(self.row[box], self.polar_shape[0] - 1)
         columns = _span(self.column[box], self.polar_shape[1] - 1, reach)
@@ -99,7 +99,7 @@ class ShadowCaster:
         return bilinear(sight, row, column), pixels
 
     def reach(self, highest: float, lowest: float) -> int:
-        """Columns that the longest shadow of such heights covers."""
+        """Return the columns that the longest shadow of such heights covers."""
         rise = self.foot[2] - highest
         slope = max(rise / float(self.distance[-1]) - 1 / float(self.radii[:, -1].min()), SMALLEST_SLOPE)
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
@@ -123,7 +123,7 @@ class ShadowCaster:
 
 @functools.cache
 def march_steps(reach: int) -> tuple[int, ...]:
-    """Return the steps of a march: each one at first, then every tenth of the way; what throws a shadow far is wide."""
+    """Return the steps of a march, columns: 1 at first, then a tenth of the way (a long shadow is wide)."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)
@@ -132,7 +132,7 @@ def march_steps(reach: int) -> tuple[int, ...]:
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
-    """Return rows and columns that enclose a mask's true part, ``margin`` further within (h, w); None for nothing."""
+    """Return rows and columns that enclose a mask's true part with a ``margin``, within (h, w); None for nothing."""
     box = []
     for axis in (1, 0):
         found = np.flatnonzero(mask.any(axis))
@@ -143,7 +143,7 @@ def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | Non
 
 
 def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
-    """Slice of two or more integers from 0 to ``highest`` that encloses the values wanted, `more` further up."""
+    """Slice of at least two integers from 0 to ``highest`` that encloses the wanted values, and `more` above."""
     first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
     last = min(int(np.ceil(wanted.max())) + more, highest)
     return slice(first, max(last, first + 1) + 1)
@@ -159,9 +159,9 @@ def disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` below its centre. Both
-    over the whole disc's area (circular segment): share 1/2 + (t sqrt(1 - t^2) + asin t) / pi, moment 2 (1 - t^2)^(3/2)
-    / (3 pi)."""
+    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` (t) below its centre,
+    both over the disc's area (circular segment): 1/2 + (t sqrt(1 - t^2) + asin t) / pi, and 2 (1 - t^2)^(3/2) / (3
+    pi)."""
     share, moment = disc_tables()
     place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
     return share.take(place), moment.take(place)

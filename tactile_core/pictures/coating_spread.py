@@ -1,6 +1,7 @@
-"""Light that goes sideways in the coating before it comes out: each place shows the mean of what falls round it. Paint
-scatters light some tenths of a millimetre far (docs/calibration.md says what photographs tell of it). A Gaussian over
-the picture stands for that, the same in every preset; it makes the rim of a print as soft as it is seen."""
+"""Light that spreads sideways in the coating: each place shows a mean of the light that falls around it.
+
+Paint scatters light by some tenths of a millimetre (measured on photographs: docs/calibration.md). A Gaussian over the
+picture stands for that in every preset; it gives a print's rim the softness of photographs."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
 
 
 class CoatingSpread:
-    """Evens out pictures of one camera with a Gaussian of a standard deviation, m; 0 leaves them as they are."""
+    """Gaussian filter for pictures of one camera; standard deviation in m, 0 for no filter."""
 
     def __init__(self, camera: Camera, deviation: float) -> None:
         self.none = deviation == 0
@@ -48,8 +49,8 @@ def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
 
 
 def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
-    """Length of the n runs of pixels along a side, and weights (count, n) of their sums at each pixel; deviation : px.
-    Runs first, then Gaussians on these, which interpolate as well: a fraction of the work."""
+    """Return the length n of runs of pixels along a side, and weights (count, runs) of their sums at each pixel.
+    deviation : px. Summing runs first costs a fraction of a full Gaussian, and interpolates as well."""
     step = max(int(deviation / FINE), 1)
     starts = step * np.arange(-(-count // step))
     ends = np.minimum(starts + step, count)
@@ -62,7 +63,7 @@ def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
 
 
 def _blocks(weights: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
-    """Cut weights (count, n) into blocks of pixels: which these are, the runs that have weight there, the weights."""
+    """Cut weights (count, n) into blocks: slices of pixels and of the runs with weight there, and the weights."""
     blocks = []
     for start in range(0, len(weights), BLOCK):
         part = weights[start : start + BLOCK]
@@ -73,7 +74,7 @@ def _blocks(weights: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
 
 
 def evened(values: np.ndarray) -> np.ndarray:
-    """Return the means of values (h, w) over 3 x 3 pixels; at the border the edge counts twice."""
+    """Return the means of values (h, w) over 3 x 3 pixels; border values repeat."""
     for axis in (0, 1):
         total = np.moveaxis(values.copy(), axis, 0)
         along = np.moveaxis(values, axis, 0)

@@ -11,14 +11,13 @@ from ..files.compiled import Loop
 def heights_above(  # noqa: ANN201
     coefficients, x, z, to_x, to_z, miss, start, step, tolerance, most_steps,  # noqa: ANN001
 ):  # fmt: skip
-    """Find heights (n,) float32 m of the gel points that have moved to places x, z (n,) m, and how many were not found.
+    """Find heights (n,) float32 m of the gel points displaced to places x, z (n,) m, and how many were not found.
 
-    The search of ``HeightMapper._source`` place by place, and the height where it ends, by the cubic B-splines of
-    ``geometry.cubic_spline.bspline_weights``, written out.
+    It is ``HeightMapper._source`` place by place, and the height at its end, by the cubic B-splines of
+    ``geometry.cubic_spline.bspline_weights`` written out.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
-    to_x, to_z, miss : (2, n), rows of the inverse Jacobian and by how much each place is missed at first
-    start, step : (2,) m, of the coefficients' grid
-    """
+    to_x, to_z, miss : (2, n), rows of the inverse Jacobian and the residual of each place at the start
+    start, step : (2,) m, of the coefficients' grid"""
     intervals = coefficients.shape[1] - 3, coefficients.shape[2] - 3
     heights, lost = np.empty(len(x), np.float32), 0
     u, v, found = np.empty(4), np.empty(4), np.empty(3, np.float32)

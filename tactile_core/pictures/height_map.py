@@ -1,11 +1,10 @@
-"""Displaced gel -> its heights under the camera's pixels.
+"""Heights of the displaced gel under the camera's pixels.
 
 A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
-indentation raises it. Zero is the plane ``camera.height_zero_y``, which touches the resting gel's lowest point, so
-the dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. The map follows
-sideways movement too: its value is that of the gel point that has moved there. It is a map of the gel, seen along its
-normal: pixels stand for the places on the plane of height zero where the camera sees them; perspective comes later.
-"""
+indentation raises it. Zero is the plane ``camera.height_zero_y``, which touches the resting gel's lowest point, so the
+dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. Sideways motion is
+included: each value is that of the gel point that has moved there. Pixels stand for places on the plane of height zero
+where the camera sees them, along the gel's normal; ``perspective`` comes later."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area
 
 @contextlib.contextmanager
 def folds_counted() -> Iterator[list[int]]:
-    """Count, for each map made inside that folds over itself, the places where it does; it is then not logged."""
+    """Count folds, place by place, for each map made inside the block, in place of a log entry."""
     folded: list[int] = []
     token = _folded.set(folded)
     try:
@@ -75,9 +74,11 @@ class HeightMapper:
         self.rest.flags.writeable = False
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """Heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3). Twice
-        differentiable where the surface does not fold; exactly ``rest`` where nothing moves. A point from beyond the
-        window counts as the window's edge. Raises TactileError for another shape or a value that is not finite."""
+        """Return heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
+
+        They are twice differentiable where the surface does not fold, and exactly ``rest`` where nothing moves. A point
+        from outside the window counts as its edge. Raises TactileError for another shape or a value that is not
+        finite."""
         displacement = np.asarray(displacement)
         expected = (len(self.surface.rest), 3)
         if displacement.ndim not in (2, 3) or displacement.shape[-2:] != expected:
@@ -115,7 +116,7 @@ class HeightMapper:
         return self.rest + down @ self._raised(move).astype(np.float32) @ right
 
     def _raised(self, move: np.ndarray) -> np.ndarray:
-        """Change of height (fine rows, fine columns) m at the nodes of the refined grid, which stay in place."""
+        """Change of height (fine rows, fine columns) m at the refined grid's nodes, which stay in place."""
         down, right = self.to_fine[0]
         if not move[..., [0, 2]].any():
             return down @ move[..., 1] @ right.T
@@ -127,7 +128,7 @@ class HeightMapper:
         return height.reshape(len(down), len(right)) - down @ self.rest_y @ right.T
 
     def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
-        """Heights (n,) m of the gel points that have moved to the refined grid's nodes, and how many were not found.
+        """Heights (n,) m of the gel points displaced to the refined grid's nodes, and how many were not found.
         move : (2, rows, columns) sideways displacement x, z at the window's nodes
         coefficients : (3, rows + 2, columns + 2), of its splines and the height's"""
         (down, right), (down_slope, right_slope) = self.to_fine
@@ -145,13 +146,12 @@ class HeightMapper:
     def _source(
         self, coefficients: np.ndarray, to_x: np.ndarray, to_z: np.ndarray, miss: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Rest places (n,) x, z m of gel points that moved to the refined grid's nodes, and how many were not found.
+        """Rest places (n,) x, z m of gel points displaced to the refined grid's nodes, and how many were not found.
 
-        Broyden's method (1965) for X + u(X) = x from X = x: Newton's first step, then the Jacobian's inverse is
-        corrected by what each step did, so that nothing is differentiated again.
+        Broyden's method (1965) for X + u(X) = x from X = x: Newton's first step, then rank-one updates of the inverse
+        Jacobian, so that nothing is differentiated again.
         coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
-        inverse; miss : (2, n) m, u at the start
-        """
+            inverse; miss : (2, n) m, u at the start"""
         target = self.fine_places
         source = target.copy()
         active, inverse = np.arange(target.shape[1]), np.stack([to_x, to_z])
@@ -171,7 +171,8 @@ class HeightMapper:
         return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Splines with coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, good to 0.1 nm a mm."""
+        """Evaluate splines with coefficients (k, rows, columns) at places (n,) m; (n, k) float32, within 0.1 nm a
+        mm."""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
@@ -210,7 +211,7 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
 
 
 def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
-    """Say which scale lets a picture whose pixels see (p,) m along an axis lie inside the nodes (n,) m."""
+    """Advise a scale that lets a picture whose pixels see (p,) m along an axis lie inside the nodes (n,) m."""
     room = 2e3 * min(seen.mean() - nodes[0], nodes[-1] - seen.mean())
     if room <= 0:
         return f"Its centre_{name}_mm lies outside"
@@ -219,13 +220,12 @@ def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:
-    """Convert a spline's matrix to float32, without what rounding would drop. Far from a node its weights fall below
-    the smallest normal float32, and processors are ten times slower at those."""
+    """Convert a spline's matrix to float32 without subnormal weights, at which processors are ten times slower."""
     return np.where(np.abs(matrix) > NEGLIGIBLE, matrix, 0).astype(np.float32)
 
 
 def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (2, n) each of the inverse of the 2 x 2 matrices I + du/dX, from du/dx and du/dz (2, rows, columns)."""
+    """Return rows (2, n) each of the inverse of I + du/dX, from du/dx and du/dz (2, rows, columns)."""
     a, c = 1 + by_x[0].ravel(), by_x[1].ravel()
     b, d = by_z[0].ravel(), 1 + by_z[1].ravel()
     determinant = np.maximum(a * d - b * c, SMALLEST_AREA)
@@ -253,8 +253,8 @@ def rest_height_map(camera: Camera | None = None) -> np.ndarray:
 
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
-    """Convert heights (H, W) or (T, H, W) m of a gel to float32, of a unit whose dome is higher or flatter at rest.
-    What a contact raises stays; the resting dome is that of the descriptor times the calibration's ``dome_scale``."""
+    """Convert heights (H, W) or (T, H, W) m to float32 of a unit with another dome: what a contact raises stays, the
+    resting dome is the descriptor's times the calibration's ``dome_scale``."""
     heights = np.asarray(heights, np.float32)
     if calibration.dome_scale == 1:
         return heights

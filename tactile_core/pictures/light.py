@@ -1,6 +1,6 @@
-"""Light of small LEDs on the gel that a camera sees: Lambert's cosine over the square of distance, and cast shadows.
-The one law of light for every picture: the fast one and calibrations see the gel in perspective, Mitsuba's rays without
-LLVM and the untouched gel at places in space. Any number of LEDs."""
+"""Light of small LEDs on the seen gel: Lambert's cosine over the squared distance, and cast shadows. All pictures use
+it: the fast one and calibrations on the gel in perspective, Mitsuba's rays without LLVM and the untouched gel at points
+in space. Any number of LEDs."""
 
 from __future__ import annotations
 
@@ -26,10 +26,9 @@ class Surface(NamedTuple):
     """Gel that pixels see, float32: at places (right s, down s, height), image frame, m, where s = 1 - height inverse.
 
     right : (1, W) or (H, W), down : (H, 1) or (H, W), height : (H, W), m
-    slope_right, slope_down : (H, W), of the height over right and down: the normal is along (-slopes, tilt), where
-        tilt = s - (right, down) . slopes inverse (from h(q) = height(q s))
-    inverse : 1/m, of the camera's apparent height, where right and down are those at which it sees the places; else 0
-    """
+    slope_right, slope_down : (H, W), of the height over right and down: the normal is along (-slopes, tilt), where tilt
+        = s - (right, down) . slopes inverse (from h(q) = height(q s))
+    inverse : 1/m, of the camera's apparent height, if right and down are where it sees the places; else 0"""
 
     right: np.ndarray
     down: np.ndarray
@@ -45,12 +44,10 @@ class Surface(NamedTuple):
 
 
 class Lit(NamedTuple):
-    """Light of L LEDs on a surface, nothing in their way, float32.
-
+    """Light of L LEDs on a surface without shadows, float32.
     near, tilt, length : (H, W), s and the third component and the length of the normal, see ``Surface``
     facing : (L, H, W) m, cosine times distance times the normal's length
-    square : (L, H, W) m2, of the distance; light : (L, H, W), relative to a coating that faces the LED at the origin
-    """
+    square : (L, H, W) m2, of the distance; light : (L, H, W), relative to a coating that faces the LED at the origin"""
 
     near: np.ndarray
     tilt: np.ndarray
@@ -93,27 +90,27 @@ def lambert(surface: Surface, positions: np.ndarray) -> Lit:
 
 
 def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
-    """Return the light of one LED, ``strength`` m2 its squared distance from the origin; else as in ``Lit``."""
+    """Return strength facing / (length square^1.5), the light of one LED; strength : m2, its squared distance from the
+    origin"""
     return facing / (square * np.sqrt(square) * length) * strength
 
 
 def open_light(surface: Surface, unit: Calibration) -> np.ndarray:
-    """Return the radiance (L, H, W) float32, levels, of a unit's LEDs on its coating, nothing in their way."""
+    """Return the radiance (L, H, W) float32, levels, of a unit's LEDs on its coating, without shadows."""
     light = lambert(surface, np.array([led.position for led in unit.leds])).light
     light *= unit.facing.astype(np.float32)[:, None, None]
     return light
 
 
 class Lamps:
-    """The LEDs of one camera's gel. Raises TactileError for those that ``ShadowCaster`` refuses."""
+    """The LEDs of one camera's gel. Raises TactileError for LEDs that ``ShadowCaster`` refuses."""
 
     def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
         self._casters = [ShadowCaster(camera, led) for led in leds]
         self._positions = np.array([led.position for led in leds])
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
-        """Return the light (L, H, W) float32, with shadows, on heights (H, W) m that pixels see; relative as ``Lit``'s.
-        An LED's shadows are soft: it is as wide as its radius."""
+        """Return the light (L, H, W) float32, with soft shadows, on heights (H, W) m that pixels see; see ``Lit``."""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):
@@ -125,13 +122,13 @@ class Lamps:
 
 
 def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, mapped: np.ndarray, edge: Box) -> None:
-    """Darken the light of LED k where gel of heights (H, W) m stands in its way; edge : where that may begin.
+    """Darken the light of LED k where gel of heights (H, W) m stands in its way.
 
     Of its disc the part above the horizon shines. With l the vector to the LED and e the unit vector upward across it,
     that part's centre is l + radius moment / share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan
     distance).
-    mapped : (H, W) m, the field on which shadows are cast, see ``cast_shadows``
-    """
+    mapped : (H, W) m, the field on which shadows are cast, see ``cast_shadows``; edge : box in which shadows may
+        begin"""
     sight, box = caster.sight(mapped, edge)
     facing, square = lit.facing[k][box], lit.square[k][box]
     share, moment = disc_share(sight)

@@ -1,4 +1,4 @@
-"""Dots of a gel in the camera's picture: they move and stretch with the surface that they are printed on."""
+"""Printed dots of a gel in the camera's picture: they move and stretch with the surface."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ LEAST_AREA = 1e-3  # px^2, of a dot seen from its edge: none is drawn
 
 
 class MarkerField:
-    """Dots of one unit under its camera; numbered as the picture is read, row by row from the upper left. Raises
-    TactileError for a unit without dots, or whose grid reaches beyond the even part of the gel's surface."""
+    """Dots of one unit under its camera, numbered row by row from the picture's upper left. Raises TactileError for a
+    unit without dots, or whose grid reaches beyond the even part of the gel's surface."""
 
     def __init__(self, unit: Calibration) -> None:
         if unit.markers is None:
@@ -44,7 +44,7 @@ class MarkerField:
         return np.stack(moved).astype(np.float32) if moved else np.zeros((0, *self.rest.shape), np.float32)
 
     def marks(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the share (H, W) float32 of the coating's light that the dots of a gel displaced by (M, 3) m leave."""
+        """Return the share (H, W) float32 of the coating's light that dots leave, on a gel displaced by (M, 3) m."""
         share = np.ones(self.unit.camera.shape, np.float32)
         middle, *rim = self._in_picture(displacement)
         # Columns: half of the dot's image along x and along z, px.
@@ -54,14 +54,14 @@ class MarkerField:
         return share
 
     def _in_picture(self, displacement: np.ndarray) -> np.ndarray:
-        """Places (5, n, 2) px, right and down, of the dots' middles and rims."""
+        """Return positions (5, n, 2) px, right and down, of the dots' middles and four points of their rims."""
         camera, mapper = self.unit.camera, self._mapper
         x, z, height = mapper.follow(displacement, self._x.ravel(), self._z.ravel())
         row, column = camera.to_pixel(x, z, height - (1 - self.unit.dome_scale) * self._dome)
         return np.stack([column, row], -1).reshape(*self._x.shape, 2)
 
     def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
-        """Darken the pixels (H, W) of one dot's ellipse by the part of each that it covers.
+        """Darken the pixels (H, W) of one dot's ellipse by the covered part of each.
         place : (2,) px, its middle; axes : (2, 2), from a unit disc to px"""
         area = abs(np.linalg.det(axes))
         if area < LEAST_AREA:

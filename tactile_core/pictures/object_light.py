@@ -1,6 +1,6 @@
-"""Light that comes through the coating from the object that touches it. Photographs show it as even over the whole
-contact, in an LED's light and in its shadow: it goes sideways in the object before it comes back (docs/calibration.md).
-It goes with each LED's power."""
+"""Light that comes through the coating from the object that touches it. Photographs show it even over the contact, in
+an LED's light and shadow alike, since it scatters in the object (docs/calibration.md); it is proportional to each LED's
+power."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ FLOOR = 5e-6  # m: gel that is dented less touches nothing, as in ``translation.
 
 
 def contact_share(risen: np.ndarray) -> np.ndarray:
-    """Return the share (H, W) float32, 0..1, of an object's light that pixels show; risen : (H, W) m, over the rest."""
+    """Return the share (H, W) float32, 0..1, of an object's light in each pixel; risen : (H, W) m, over the rest"""
     deepest = float(risen.max())
     if deepest < FLOOR:
         return np.zeros_like(risen)
@@ -22,6 +22,6 @@ def contact_share(risen: np.ndarray) -> np.ndarray:
 
 
 def object_light(unit: Calibration, risen: np.ndarray) -> np.ndarray:
-    """Return the radiance (3, H, W) float32, levels, of the object behind gel that has risen by (H, W) m."""
+    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by (H, W) m."""
     levels = (unit.through * unit.facing).astype(np.float32)
     return levels[:, None, None] * contact_share(risen)

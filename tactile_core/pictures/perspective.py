@@ -17,12 +17,11 @@ MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above where it does: 2 m
 
 
 class Perspective:
-    """The camera's view of height maps that lie about as the resting one.
+    """A camera's view of height maps near the resting one.
 
-    A pixel at q = (right, down) on the plane of height zero sees the point q s, s = 1 - h / apparent height, where
-    h = height(q s): the first such point from the camera. Presses of 1.5 mm are met to 1 um (tests).
-    rest : (H, W) float32, m, heights of the undeformed gel
-    """
+    A pixel at q = (right, down) on the plane of height zero sees the point q s, s = 1 - h / apparent height, where h =
+    height(q s): the first such point from the camera. Presses of 1.5 mm are found within 1 um (tests).
+    rest : (H, W) float32, m, heights of the undeformed gel"""
 
     def __init__(self, camera: Camera, rest: np.ndarray) -> None:
         self.camera = camera
@@ -44,7 +43,7 @@ class Perspective:
         self.start_nearest = _nearest(row, column, self.camera.width)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
-        """Heights (H, W) float32, m, seen by the pixels; height : (H, W) float32, m, under the pixels. Raises
+        """Return heights (H, W) float32, m, that the pixels see; height : (H, W) float32, m, under the pixels. Raises
         TactileError where the gel reaches the camera."""
         if height.max() >= HIGHEST_GEL * self.camera.apparent_height:
             found = f"{height.max() * 1e3:.1f} mm high"
@@ -69,7 +68,8 @@ class Perspective:
         return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
-        """Slope along the position p from the picture's middle, times |p| / apparent height, (H, W), and its least."""
+        """Return (slope along p) |p| / apparent height (H, W), p the place from the picture's middle; and its
+        minimum."""
         slope_right, slope_down = slopes(height, self.camera)
         slope_right *= self.right * self.inverse
         slope_down *= self.down * self.inverse
@@ -77,7 +77,7 @@ class Perspective:
         return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Fractional rows and columns of the map at the pixels' positions times near, within the map."""
+        """Return rows and columns of the map, fractional and within it, at the pixels' positions times `near`."""
         row, column = near * self.rows, near * self.columns
         row += self.middle[0]
         column += self.middle[1]
@@ -85,7 +85,8 @@ class Perspective:
         return row, np.clip(column, 0, 2 * self.middle[1], out=column)
 
     def _from_above(self, height: np.ndarray) -> np.ndarray:
-        """Find the seen heights along each ray from the highest level down: slower, and right where gel hides gel."""
+        """Find the heights (H, W) m that pixels see by a march along each ray from the highest level down: slower, but
+        right where gel hides gel."""
         high, low = np.float32(height.max() + 1e-6), np.float32(height.min() - 1e-6)
         above = np.full(self.camera.shape, high)
         below = np.full(self.camera.shape, low)
@@ -107,7 +108,7 @@ class Perspective:
 
 
 def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
-    """Indices into a flat map of the pixels nearest to places within it."""
+    """Return the flat indices of the pixels nearest to places within a map."""
     index = (row + np.float32(0.5)).astype(np.int32)
     index *= np.int32(width)
     index += (column + np.float32(0.5)).astype(np.int32)
@@ -115,7 +116,7 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of heights (H, W) m along the picture's right and down, second order, at its edges too."""
+    """Return the slopes of heights (H, W) m along the picture's right and down, second order, also at its edges."""
     right, down = camera.pixel_size
     return _differences(height, 1, right), _differences(height, 0, down)
 
@@ -153,20 +154,20 @@ def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 
 
 def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that looks up maps (H, W) of the gel at places on it, m, image frame."""
+    """Return a function that samples maps (H, W) of the gel at places on it, m, image frame."""
     step_right, step_down = camera.pixel_size
     row = down * np.float32(1 / step_down) + np.float32(camera.height / 2 - 0.5)
     return lookup(row, right * np.float32(1 / step_right) + np.float32(camera.width / 2 - 0.5), camera.shape)
 
 
 def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that looks up maps of a shape at fractional places, bilinear; beyond an edge, the edge."""
+    """Return a function that samples maps of a shape at fractional places, bilinear; edge values continue outside."""
     row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
     return lambda values: bilinear(values, row, column)
 
 
 def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Values at indices start, and a share of the way to the next one."""
+    """Interpolate between the values at indices start and the next, by a share."""
     left = flat.take(start)
     right = flat[1:].take(start)
     right -= left

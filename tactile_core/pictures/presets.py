@@ -19,8 +19,8 @@ SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, abou
 @dataclasses.dataclass(frozen=True)
 class Gather:
     """Resolution at which the gel's own light is gathered.
-    step : pixels between places; azimuths : directions round each
-    growth : of the steps outward, each that share of the way, one place at least; bounces : 1 or more"""
+    step : pixels between places; azimuths : directions around each
+    growth : of the steps outward, each that share of the distance, at least one place; bounces : 1 or more"""
 
     step: int
     azimuths: int
@@ -32,16 +32,14 @@ class Gather:
 class Preset:
     """Settings of a Mitsuba render.
 
-    points : that stand for each LED, a pass; spacing : m between vertices of the gel's mesh
-    bounce_step : by LLVM, pixels between the places that one bounce is gathered at; 0 leaves it out
+    points : number that stand for each LED, a pass; spacing : m between vertices of the gel's mesh
+    bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
     paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths a pixel; 0 for our own integrator
 
-    Without LLVM, where the coating is matte:
-    passes : pictures from other points and other places of each pixel, over which a picture is the mean; 1 looks at
-        each pixel's middle alone
-    gather : how finely the gel's own light is gathered; None leaves it out
-    window : whether rays bend as the window makes them
-    """
+    Without LLVM, on a matte coating:
+    passes : pictures from other points and other places of each pixel, which are averaged; 1 takes each pixel's middle
+    gather : resolution of the gel's own light; None leaves it out
+    window : true bends rays at the window"""
 
     name: str
     says: str
@@ -87,7 +85,7 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Read the results of ``measure_presets.py``: how, and by preset error in grey levels and ms by variant."""
+    """Return ms by variant and error, grey levels, of each preset, as ``measure_presets.py`` wrote them."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
@@ -100,11 +98,11 @@ def cheapest(error: float, variant: str) -> str:
 
 
 def describe_choice(name: str, error: float) -> str:
-    """Explain why a preset was picked for a bound."""
+    """Describe why a preset was chosen for a bound."""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 
 
 def _ms(ms: dict[str, float], variant: str) -> float:
-    """Time of a preset without Mitsuba, or by a variant, ms; one that was not measured counts as slowest."""
+    """Return the time of a preset, ms, without Mitsuba or by a variant; that of the slowest for an unmeasured one."""
     return ms.get("numpy", ms.get(variant, float("inf")))

@@ -1,4 +1,4 @@
-"""Pictures of height maps by a preset: the radiance that each LED gives, and the camera's picture of it."""
+"""Pictures of height maps by a preset: the radiance from each LED, and the camera's picture of it."""
 
 from __future__ import annotations
 
@@ -95,15 +95,15 @@ class Renderer:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
-        """Picture (H, W, 3) uint8 of heights (H, W) m; bit-equal to the background's where nothing changed.
-        marks : (H, W) share of light that dots leave, of ``dots.marks``; of a unit with dots they must be given"""
+        """Return the picture (H, W, 3) uint8 of heights (H, W) m; equal to the background where nothing changed.
+        marks : (H, W) share of light that dots leave, from ``marks``; required for a unit with dots"""
         if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
             return self._rest_picture.copy()
         return self.picture(self.radiance(height_map), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, ever less noisy; the last is that of a call. The preset
-        ``reference`` by LLVM has some, the others the last alone."""
+        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, less and less noisy; the last is that of a call. Only the
+        preset ``reference`` by LLVM yields more than one."""
         heights = self._heights(height_map, "height map")
         if not isinstance(self._light, GelLight):
             yield self.picture(self._spread_radiance(heights))
@@ -140,8 +140,8 @@ class Renderer:
         return self._completed(light, seen)
 
     def _completed(self, light: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """LEDs' radiance (3, H, W), and the ambient light of gel seen at heights (H, W) m, spread: (H, W, 3). With the
-        light of the object that touches it."""
+        """Return (H, W, 3): the LEDs' radiance (3, H, W), the ambient light of gel seen at heights (H, W) m and the
+        light of the touching object, spread by the coating."""
         spread = self._spread(light + raised_light(self.calibration, seen))
         if self.calibration.through:
             spread += object_light(self.calibration, seen - self.view.start)
@@ -151,12 +151,9 @@ class Renderer:
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
-
-        The change is bent by the camera's toe and shoulder (``camera_curve``).
-
-        noise : makes the camera's noise, as measured on the unit; None for none
-        marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them.
-        """
+        The change passes the camera's toe and shoulder (``camera_curve``).
+        noise : generator of the camera's noise, as measured on the unit; None for none
+        marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
         if self.dots is not None and marks is None:
             found = "a picture of heights alone, which do not say where the dots have moved"
             raise TactileError(
@@ -177,11 +174,11 @@ class Renderer:
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
     def correction(self) -> dict[str, float]:
-        """Return the levels by which the picture at rest differs from what the lights alone make: mean and largest."""
+        """Mean and largest difference, levels, between the picture at rest and the one modelled from the lights."""
         return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
-        """The unit's heights (H, W) float32 m, checked."""
+        """Return the unit's heights (H, W) float32 m, checked."""
         heights = camera_array(given, self.camera.shape, name)
         heights = of_unit(heights, self.calibration) if self._domed else heights
         check_reach(heights, self.calibration, name)
@@ -207,7 +204,7 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Convert values to float32; raises TactileError, by their name, for another shape or what is not finite."""
+    """Convert values to float32. Raises TactileError, with their name, for another shape or non-finite values."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
@@ -217,7 +214,7 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera, or as far the other way."""
+    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera, or as far below zero."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():

@@ -1,4 +1,4 @@
-"""What the pixels of a picture see besides light: heights, normals, contact and displacement, for compositing."""
+"""Fields of the points that a picture's pixels see, for compositing: heights, normals, contact, displacement."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""The two fingertips as data: surfaces, materials, electrodes; each constant is in its sensor's descriptor.
+"""The fingertips as data: surfaces, materials, electrodes. Each constant is in its sensor's descriptor.
 
-Frame shared by both sensors, that of the public meshes, metres: x along the finger, tip toward -x;
-y normal to the pad, contact side -y; z lateral. ``descriptor`` says what ``<name>/sensor.toml`` holds; a DIGIT unit's
-camera and lights are in its calibration, see ``calibration_file``.
-"""
+Frame shared by all sensors, that of the public meshes, metres: x along the finger, tip toward -x; y normal to the pad,
+contact side -y; z lateral. ``descriptor`` documents ``<name>/sensor.toml``; a DIGIT unit's camera and lights are in its
+calibration, see ``calibration_file``."""
 
 from __future__ import annotations
 
@@ -62,7 +61,7 @@ def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
 
 
 def from_maker(points: np.ndarray, sensor: str) -> np.ndarray:
-    """Transform points (n, 3) m of the frame of a fluid sensor's maker to the shared one (docs/sources.md, Frame)."""
+    """Transform points (n, 3) m from the frame of a fluid sensor's maker to the shared one (docs/sources.md, Frame)."""
     frame = skin_of(sensor).descriptor.frame
     x, y, z = np.asarray(points).T
     return np.column_stack([-x - frame.shift_x, z + frame.shift_y, frame.lateral_sign * y])
@@ -79,13 +78,13 @@ def digit_surface() -> Lattice:
 
 
 def sensor_surface(sensor: str) -> Lattice:
-    """The resting surface of a sensor that is there, as ``"biotac"`` or ``"digit"``."""
+    """The resting surface of a sensor by its name, such as ``"biotac"`` or ``"digit"``."""
     return shape_of(sensor).surface() if is_gel(sensor) else skin_of(sensor).skin_surface("outer")
 
 
 @functools.cache
 def rest_normals(sensor: str) -> np.ndarray:
-    """Return the unit outward normals (n, 3) of a sensor's resting surface; not to be written to."""
+    """Return the unit outward normals (n, 3) of a sensor's resting surface; read-only."""
     surface = sensor_surface(sensor)
     outward = node_normals(surface.rest, surface.faces)
     outward.flags.writeable = False
@@ -99,9 +98,8 @@ def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarr
 
 @functools.cache
 def thickness_at(sensor: str, node: int) -> float:
-    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal there. To the
-    flat back of a gel; through skin and fluid to the core, or to the finger's axis where the normal passes the core by.
-    Kept, for a path asks again at each step."""
+    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal: to the flat back
+    of a gel; through skin and fluid to the core, or to the finger's axis where the normal misses the core. Cached."""
     point = sensor_surface(sensor).rest[node]
     if is_gel(sensor):
         return shape_of(sensor).thickness_below(point)
@@ -109,7 +107,7 @@ def thickness_at(sensor: str, node: int) -> float:
 
 
 def is_gel(sensor: str) -> bool:
-    """Return true for a gel, false for skin and fluid, by the descriptor. Raises TactileError for no sensor's name."""
+    """Return true for a gel, false for skin and fluid. Raises TactileError for an unknown sensor."""
     return isinstance(describe(sensor), GelSensor)
 
 

@@ -1,10 +1,8 @@
 """Parameters of a DIGIT unit's pictures: camera, lights, colours, gel and background, in frozen dataclasses.
 
 A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance of each
-LED's light that the coating reflects. Each LED's light is a spectral band of its own; radiance in it is measured in
-grey levels of that colour's channel in the picture's middle. The fast picture and Mitsuba use the same
-parameters.
-"""
+LED's light reflected by the coating. Each LED's light is a spectral band of its own, measured in grey levels of that
+colour's channel in the picture's middle. The fast picture and Mitsuba use the same parameters."""
 
 from __future__ import annotations
 
@@ -25,11 +23,9 @@ MOST_LENGTH = 20e-3  # m of pitch or diameter: the gel itself is 18 x 25 mm
 @dataclasses.dataclass(frozen=True)
 class Markers:
     """A square grid of round dots on the coating, in the middle of the picture. Raises TactileError out of range.
-
     rows, columns : down the picture and to its right
     pitch, diameter : m, between neighbours' middles, and of a dot
-    albedo : share of the coating's light that a dot throws back, 0 black to 1 unseen
-    """
+    albedo : light that a dot scatters back over the coating's, 0 black to 1 invisible"""
 
     rows: int = number()
     columns: int = number()
@@ -70,10 +66,9 @@ class Coating:
     roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
     gloss : 0..1, size of highlights; not of diffuse
     metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
-    spread : m, standard deviation of how far light goes sideways in it, at most 2 mm; over the picture, in every preset
-    transmission : 0..1, light that comes back through it from a white object that touches it, as a share of what it
-        reflects itself where it faces the LED at the picture's middle
-    """
+    spread : m, standard deviation of light's sideways spread, at most 2 mm; applied to the picture, in every preset
+    transmission : 0..1, light that returns through it from a white object in contact, as a share of what the coating
+        itself reflects where it faces the LED at the picture's middle"""
 
     bsdf: str = DIFFUSE
     albedo: tuple[float, float, float] = number(default=(0.5, 0.5, 0.5))
@@ -117,7 +112,7 @@ LARGEST_LEVEL = 255.0  # of 8 bits
 @dataclasses.dataclass(frozen=True)
 class Response:
     """Matrix (channel, led) from radiance to the camera's grey levels, linear over the picture.
-    centre : (3, 3) levels a level in the picture's middle, a row a channel of the picture, a column an LED's colour
+    centre : (3, 3) levels a level in the picture's middle; rows are channels of the picture, columns LEDs' colours
     along_right, along_down : (3, 3) levels a level and metre of the plane of height zero"""
 
     centre: tuple[tuple[float, ...], ...] = number(length=3)
@@ -173,18 +168,17 @@ class Calibration:
     leds : red, green, blue
     response : the camera's response to each LED's light
     ambient : (3, 21) or (3, 36), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a
-        coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by
-        i + j, then by j
+        coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i +
+        j, then by j
     object_reflectance : 0 black to 1 white, of what touches the gel
-    ambient_rise : of each LED, share by which the ambient light's unit grows for each metre that gel stands higher
+    ambient_rise : of each LED, relative growth of the ambient light's unit for each metre of the gel's height
     coating : the paint on the gel
-    gel_index : refractive index of gel and acrylic, taken as equal
+    gel_index : refractive index of gel and acrylic, assumed equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
     markers : dots printed on the gel; None for none
-    photographed : LEDs and albedo when it was taken, which a file's are; None for a calibration's that never changed
-    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for
-    """
+    photographed : LEDs and albedo of the photograph, if they have changed since; None for the calibration's own
+    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for"""
 
     unit: str
     camera: Camera
@@ -235,9 +229,9 @@ class Calibration:
 
     @property
     def facing(self) -> np.ndarray:
-        """Radiance (3,) of each LED's light on a coating that faces it, levels. At the distance from the LED to the
-        picture's centre: a matte coating of albedo a shows a radiance r^2 / d^2 of a sphere of even brightness
-        (Lambert's law)."""
+        """Radiance (3,) of each LED's light on a coating that faces it, levels, at the distance from the LED to the
+        picture's centre: a matte coating of albedo a shows a r^2 / d^2 of the radiance of an even sphere (Lambert's
+        law)."""
         return self._lit([float(np.square(led.position).sum()) for led in self.leds])
 
     @property
@@ -246,7 +240,8 @@ class Calibration:
         return self.coating.transmission * self.object_reflectance
 
     def with_through(self, through: float) -> Calibration:
-        """Return the unit with that much light from the object; a coating that a white one needs lets more through."""
+        """Return the unit with this light from the object; the coating's transmission grows where even a white object
+        has less."""
         most = max(self.coating.transmission, through)
         coating = dataclasses.replace(self.coating, transmission=most)
         return dataclasses.replace(self, coating=coating, object_reflectance=through / most if most else 0.0)
@@ -277,7 +272,7 @@ class Calibration:
         return dataclasses.replace(self, leds=(red, green, blue), response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
-        """Return the same view in other pixels. Raises TactileError for another aspect ratio."""
+        """Return the same view at another size in pixels. Raises TactileError for another aspect ratio."""
         return dataclasses.replace(self, camera=self.camera.at_size(width, height))
 
 

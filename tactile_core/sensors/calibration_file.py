@@ -1,4 +1,4 @@
-"""Calibrations as readable TOML: one file a unit, lengths in mm, what each number means beside it. Unknown and missing
+"""Calibrations as readable TOML: one file a unit, lengths in mm, each number explained beside it. Unknown and missing
 fields are refused."""
 
 from __future__ import annotations
@@ -33,11 +33,10 @@ def load_calibration(
     path : written by ``tactile calibrate``, or by hand; its lengths are in mm, those of the result in m
     sensor : name of the sensor whose calibration it must be; None for any
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the file's
-    A background's photograph is looked for beside the file. Raises TactileError naming file and field for what cannot
-    be read, is unknown, missing or out of its range, and for a file of another sensor.
+    A background's photograph is searched beside the file. Raises TactileError naming file and field for an unreadable
+    file, a field that is unknown, missing or out of range, and for a file of another sensor.
 
-    >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))
-    """
+    >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))"""
     if object_reflectance is not None:
         return dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
     if path is None:
@@ -156,7 +155,7 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
 
 def to_toml(unit: Calibration) -> str:
-    """Format a calibration, numbers with six digits; a photograph is named as it lies beside the file."""
+    """Format a calibration, numbers with six digits; a photograph is named relative to the file."""
     camera, coating, response = unit.camera, unit.coating, unit.response
     sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"
     ambient = "\n".join(f"{colour} = {toml_value(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))

@@ -29,15 +29,14 @@ LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a c
 class Camera:
     """A pinhole camera that looks at the coating along -y, from inside the gel, over the picture's middle.
 
-    It stands where refraction by gel and acrylic makes it appear. A gel point appears at its central projection onto
-    the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
+    Its position is the apparent one, after refraction by gel and acrylic. A gel point appears at its central projection
+    onto the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
     width, height : pixels
     px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
     apparent_height : m, height of the pinhole above the plane of height zero
-    right_z, down_x : +1 or -1, the way z goes to the right and x goes down the picture
-    sensor : whose gel it looks at
-    """
+    right_z, down_x : +1 or -1, the direction of z to the right and of x down the picture
+    sensor : whose gel it looks at"""
 
     width: int = number("px")
     height: int = number("px")
@@ -88,8 +87,8 @@ class Camera:
         return self.height, self.width
 
     def at_size(self, width: int, height: int) -> Camera:
-        """Return the same view in other pixels; raises TactileError for another aspect ratio or fewer than 3 pixels.
-        Width and height may each be a share's of this picture's less a part of a pixel: the view is then cut by it."""
+        """Return the same view at another size in pixels; raises TactileError for another aspect ratio or fewer than 3
+        pixels. Width and height may differ from an exact share by part of a pixel, which cuts the view."""
         if not -self.height < width * self.height - height * self.width < self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)

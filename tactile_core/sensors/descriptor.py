@@ -30,14 +30,14 @@ def _folders() -> dict[str, Path]:
 
 
 def passed_over(name: str) -> tuple[Path, ...]:
-    """Return the user's folder that is ignored because a shipped sensor has the same name; None where there is none."""
+    """Return the user's folders that are ignored because a shipped sensor has the same name."""
     own, ships = os.environ.get(OWN), FOLDER / name
     folder = Path(own or FOLDER) / name
     return (folder,) if (folder / FILE).is_file() and (ships / FILE).is_file() and not folder.samefile(ships) else ()
 
 
 def _advice() -> str:
-    """Say how a sensor becomes known, and what is odd about the folder that is to hold the user's own."""
+    """Advise how to make a sensor known, and what is wrong with the folder meant for the user's own."""
     own = os.environ.get(OWN)
     if own and (Path(own) / FILE).is_file():
         return f"${OWN} is {own}, a sensor's own folder: name the folder that holds it"
@@ -52,9 +52,9 @@ def names() -> tuple[str, ...]:
 
 
 def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
-    """Return the sensor that is read and the gel whose nodes a file's keys name; None where they name no two sensors.
-    what : that is of them, in words. Raises TactileError for a sensor that is not known here, and for two that are not
-    one of each kind."""
+    """Return the sensor that is read and the gel whose nodes a file's keys name; None where they do not name two
+    sensors.
+    what : the file's content, in words. Raises TactileError for an unknown sensor, and for two of the same kind."""
     of = sorted(key.removesuffix(NODES) for key in keys if key.endswith(NODES))
     if len(of) != 2:
         return None
@@ -78,7 +78,7 @@ def describe(name: str) -> Fluid | GelSensor:
 
 
 def of_kind(name: str, form: type[_S]) -> _S:
-    """Read the descriptor of a sensor of one kind, ``Fluid`` or ``GelSensor``. Raises TactileError for another's."""
+    """Read the descriptor of a sensor of one kind, ``Fluid`` or ``GelSensor``. Raises TactileError for the other."""
     found = describe(name)
     if not isinstance(found, form):
         kinds = {form: kind for kind, form in KINDS.items()}
@@ -87,7 +87,7 @@ def of_kind(name: str, form: type[_S]) -> _S:
 
 
 def read(folder: Path) -> Fluid | GelSensor:
-    """Read a folder's descriptor. Raises TactileError naming file and field that is missing, unknown or wrong."""
+    """Read a folder's descriptor. Raises TactileError naming file and field for a missing, unknown or wrong one."""
     return read_toml(folder / FILE, lambda content: _sensor(content, folder), "a sensor's descriptor")
 
 

@@ -1,10 +1,9 @@
 """Convert between an electrode's impedance and counts, and between the changes of units with different rest counts.
 
-Each electrode forms a voltage divider with a load, over which counts are read, so that they fall as its film thins
-(SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). With the impedance grown by a factor g since rest that is
-COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest. Of Z, the
-film's part grows as the film thins; its contact with the fluid resists in series and stays, which units share.
-"""
+Each electrode forms a voltage divider with a load across which counts are read, so that they fall as its film thins
+(SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). Where the impedance Z grows by a factor g from rest, E =
+COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest. Only the
+film's part of Z grows as the film thins; the contact resistance in series stays, equal for all units."""
 
 from __future__ import annotations
 
@@ -29,14 +28,14 @@ def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
 
 
 def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19) after the films' part of impedances alone grew by factors from rest counts (19,)."""
+    """Return the counts (..., 19) after the films' part alone of impedances grew by factors from rest counts (19,)."""
     return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
     """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,). A
-    unit at 3,500 counts responds to a contact with seven tenths, one at 2,800 with one and a half times the change of
-    one at 3,300."""
+    unit at 3,500 counts responds to a contact with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5
+    times."""
     return _converted(change, rest, to)
 
 
@@ -46,13 +45,13 @@ def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) 
 
 
 def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
-    """Convert changes of a unit at counts rest to one at counts to: the film's part of the impedance grows alike."""
+    """Convert changes of a unit at counts rest to one at counts to, with equal growth of the film's impedance."""
     rest, to = np.clip(rest, *_RESTS), np.clip(to, *_RESTS)
     return of_films(_film(rest + change) / _film(rest), to) - to
 
 
 def _film(counts: np.ndarray | float) -> np.ndarray:
-    """Return the film's impedance over the load, below 0 where counts are higher than any film leaves them."""
+    """Return the film's impedance over the load; below 0 for counts that are higher than any film allows."""
     return COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES
 
 
@@ -67,11 +66,10 @@ def of_typical_film(
     """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one with typical films.
 
     thickness : of its films at rest, over a typical unit's; conductivity : its fluid's, over that at rest
-    The same movement u of the skin over a film h makes the impedance grow by g = h / (h - u), so that over a typical
-    film of h / thickness it grows by 1 / (1 - thickness (1 - 1 / g)): each electrode by itself. Against the conducting
-    sheet (111 simulated contacts) 7, 9, 12 and 14 % of the change are left at .8, .6, .45 and .33, where 28, 72, 136
-    and 246 % are without.
-    """
+    A movement u of the skin over a film h makes the impedance grow by g = h / (h - u); over a typical film of h /
+    thickness the same u makes it grow by 1 / (1 - thickness (1 - 1 / g)), for each electrode by itself. Compared with
+    the conducting sheet (111 simulated contacts), 7, 9, 12 and 14 % of the change remain as error at .8, .6, .45 and
+    .33, and 28, 72, 136 and 246 % without the conversion."""
     rest = np.clip(rest, *_RESTS)
     still = film_impedance(rest)
     thinned = 1 - still / (film_impedance(rest + change) * conductivity)

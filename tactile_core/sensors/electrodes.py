@@ -23,11 +23,9 @@ SP_COLUMNS = ("id", "core_x", "core_y", "core_z", "skin_x", "skin_y", "skin_z", 
 @dataclasses.dataclass(frozen=True)
 class Places:
     """Electrodes of a sensor, mm in its maker's frame.
-
     sensing : (n, 3), electrodes that are read
-    rest_counts : (n,), of a typical unit without contact; NaN where none has been seen
-    excitation : (m, 3), those that feed the current
-    """
+    rest_counts : (n,), of a typical unit without contact; NaN where unknown
+    excitation : (m, 3), those that feed the current"""
 
     sensing: np.ndarray
     rest_counts: np.ndarray
@@ -36,9 +34,8 @@ class Places:
 
 @functools.cache
 def places_of(name: str) -> Places:
-    """The electrodes of a sensor, from the table that its descriptor names. The table lies beside the descriptor, or in
-    ``$TACTILE_SENSORS/<name>/``. Raises TactileError for a sensor without electrodes, and for a table that is missing
-    or bad."""
+    """Read the electrodes of a sensor, from the table of its descriptor, beside it or in ``$TACTILE_SENSORS/<name>/``.
+    Raises TactileError for a sensor without electrodes, and for a table that is missing or bad."""
     found, path = of_kind(name, Fluid), table_of(name)
     table = found.electrodes.places
     if not path.is_file():
@@ -74,7 +71,8 @@ def contacts_of(name: str) -> np.ndarray | None:
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the rise (P,) float64 Pa of fluid pressure in these contacts, or None. Raises without electrodes."""
+    """Load the fluid's pressure rise (P,) float64 Pa in these contacts, or None. Raises TactileError without
+    electrodes."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 
@@ -88,9 +86,9 @@ def _table(sensor: Fluid, file: str) -> np.ndarray | None:
 
 
 def read_places(path: Path) -> Places:
-    """Read a table of ``COLUMNS``; electrodes without counts at rest are those of the excitation. Or bsadr/biotac's own
-    table of a BioTac SP, ``SP_COLUMNS``, where those have numbers below zero. Raises TactileError naming file and
-    row."""
+    """Read a table of ``COLUMNS``; electrodes without counts at rest are the excitation's. Or read bsadr/biotac's own
+    table of a BioTac SP, ``SP_COLUMNS``, where the excitation's have numbers below zero. Raises TactileError naming
+    file and row."""
     rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:
         return _read_sp(path, rows[1:])
@@ -112,7 +110,7 @@ def read_places(path: Path) -> Places:
 
 
 def _read_sp(path: Path, rows: list[list[str]]) -> Places:
-    """Electrodes by their numbers; those of the excitation have -1, -2, ..."""
+    """Sort electrodes by their numbers; those of the excitation have -1, -2, ..."""
     places: dict[int, tuple[float, ...]] = {}
     for at, row in enumerate(rows, start=2):
         try:

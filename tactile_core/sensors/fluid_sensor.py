@@ -15,28 +15,26 @@ FALLS, RISES = POLARITIES = ("falls", "rises")
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """The maker's frame in the shared one, in m. x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign
-    y_maker"""
+    """Transformation from the maker's frame to the shared one, in m.
+    x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign y_maker"""
 
     shift_x: float = number("mm")
     shift_y: float = number("mm")
     lateral_sign: int = number(above=-2, below=2)
 
     def __post_init__(self) -> None:
-        """Raise TactileError for a side of +z that is none."""
+        """Raise TactileError for a sign of z other than +1 or -1."""
         if not self.lateral_sign:
             raise TactileError("frame, lateral_sign", "0", "1 or -1")
 
 
 @dataclasses.dataclass(frozen=True)
 class Skin:
-    """A skin round an axis along x, from a table of its radii. Lengths in m, angles in rad.
-
+    """A skin around an axis along x, from a table of its radii. Lengths in m, angles in rad.
     profile : table of stations x and angles, with the radii of outer skin, inner skin and core
     axis_y : of the axis (y, z) = (axis_y, 0); tip_x, base_x : between them the skin is a cylinder
     outer_poles, inner_poles : x where the meridians meet the axis, tip and base
-    pad_half_angle : of the part that unrolls, to either side of the lowest line
-    """
+    pad_half_angle : of the part that unrolls, to either side of the lowest line"""
 
     profile: str = file_beside()
     axis_y: float = number("mm")
@@ -48,7 +46,7 @@ class Skin:
     thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
 
     def __post_init__(self) -> None:
-        """Raise TactileError for stations that do not go from the tip, toward -x, to the base."""
+        """Raise TactileError for stations that do not run from the tip (-x) to the base."""
         (outer_tip, outer_base), (inner_tip, inner_base) = self.outer_poles, self.inner_poles
         along = outer_tip, inner_tip, self.tip_x, self.base_x, inner_base, outer_base
         if not all(low < high for low, high in itertools.pairwise(along)):
@@ -59,13 +57,11 @@ class Skin:
 
 @dataclasses.dataclass(frozen=True)
 class Core:
-    """The rigid core that holds the skin where it lies on it.
-
-    attached : m, inner points this close to the core are glued to it
-    tip_cap_x, base_cap_x : m, beyond which all are
-    contact_x, contact_half_angle : m and rad, part of the table that says how near the skin is to the core
-    facing_half_angle : rad, of the part of the skin that may come to press on it
-    """
+    """The rigid core, to which the skin is bonded in places.
+    attached : m, inner nodes this close to the core are bonded to it
+    tip_cap_x, base_cap_x : m, beyond which all are bonded
+    contact_x, contact_half_angle : m and rad, part of the surface for which the distance to the core is tabulated
+    facing_half_angle : rad, of the part of the skin that may touch the core"""
 
     attached: float = number("mm", above=0)
     tip_cap_x: float = number("mm")
@@ -88,7 +84,8 @@ class SkinLattice:
 
 @dataclasses.dataclass(frozen=True)
 class FluidFilm:
-    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, still known"""
+    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, smallest valid
+    film"""
 
     conductivity: float = number("s_per_m", above=0)
     interface: float = number("ohm", above=-1)
@@ -97,13 +94,11 @@ class FluidFilm:
 
 @dataclasses.dataclass(frozen=True)
 class Electrodes:
-    """The electrodes on the core. places : table of names, places and counts at rest, see ``electrodes``; radius : m
-
-    count : of those that are read, which signals are as wide as
-    contacts : counts that simulated contacts change by, which show a recording's polarity and faults; empty where the
-        networks alone bring such
-    contact_pressures : Pa that the fluid's pressure rises by in the same contacts; empty where that is not known
-    """
+    """The electrodes on the core.
+    places : table of names, places and counts at rest, see ``electrodes``; radius : m; count : number that are read
+    contacts : table of counts that simulated contacts change, which show a recording's polarity and faults; empty where
+        only the networks bring such
+    contact_pressures : table of the fluid's pressure rise, Pa, in the same contacts; empty where unknown"""
 
     places: str = file_beside()
     count: int = number(above=0, below=MOST_ELECTRODES)
@@ -125,7 +120,8 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where both share x"""
+    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where both have the
+    same x"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")

@@ -15,7 +15,8 @@ ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex t
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The outline on the plane, even in z, m. tip : half circle (round) or square; corner_radius : of square ends"""
+    """The outline on the plane, symmetric in z, m. tip : half circle (round) or square; corner_radius : of square
+    ends"""
 
     half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     tip_x: float = number("mm")
@@ -37,7 +38,7 @@ class Body:
 @dataclasses.dataclass(frozen=True)
 class Dome:
     """The height of a gel over its back. profile : table of heights
-    degree_along, degree_across : of the polynomials through the table, in x, and in the square of z
+    degree_along, degree_across : of the fitted polynomials, in x, and in the square of z
     margin : m, outer edge of the table that is left out"""
 
     profile: str = file_beside()
@@ -48,7 +49,7 @@ class Dome:
 
 @dataclasses.dataclass(frozen=True)
 class GelLattice:
-    """Nodes of a gel's surface: an even window, m, and how many nodes lead from its edges to the outline."""
+    """Nodes of a gel's surface: an even window, m, and the number of nodes from its edges to the outline."""
 
     window_x: tuple[float, float] = number("mm")
     window_z: tuple[float, float] = number("mm")

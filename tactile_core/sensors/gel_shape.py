@@ -1,4 +1,4 @@
-"""A gel's shape by its descriptor: outline, dome and the lattice of its surface, on which its mesh is built."""
+"""A gel's shape from its descriptor: outline, dome and the lattice of its surface, on which its mesh is built."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth. Least squares
-        of the profile table by Chebyshev polynomials along and even powers across (a table of a faceted mesh, hence the
-        smoothing); the thickness everywhere where there is no [dome]."""
+        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth. It is the
+        thickness without a [dome]; else a least squares fit to the profile table (of a faceted mesh, hence the
+        smoothing) by Chebyshev polynomials along and even powers across."""
         x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
         edge = np.clip(1 - self.outline_distance(x, z) / self._body.edge_width, 0, 1)
         dome = self.descriptor.dome
@@ -103,7 +103,8 @@ class GelShape:
         return np.full(np.shape(z), self.tip_x)
 
     def _corner_block(self, steps_x: np.ndarray, steps_z: np.ndarray) -> np.ndarray:
-        """Points (rows, columns, 2) from the window's tip corner (z > 0) to the arc, at fractions 0..1 each way."""
+        """Points (rows, columns, 2) from the window's tip corner (z > 0) to the arc, at fractions 0..1 in each
+        direction."""
         corner = np.array([self._lattice.window_x[0], self._lattice.window_z[1]])
         # where the row of the corner meets the arc, and where its column does
         angle_a = np.arctan2(self._half_width_at(corner[:1])[0], corner[0] - self.arc_x)

@@ -16,9 +16,9 @@ _AROUND = 72  # angles of a station, every 5 degrees
 
 
 def read_radii(path: Path) -> np.ndarray:
-    """Read a skin's stations (n, 72, 5): x, angle and radii of outer skin, inner skin and core, mm and degrees. Radii
-    are nan where a ray missed. Raises TactileError for a table whose stations do not go round the axis in even steps,
-    or whose outer skin is missing where it goes round elsewhere: an open profile."""
+    """Read a skin's stations (n, 72, 5): x, angle and radii of outer skin, inner skin and core, mm and degrees; NaN
+    where a ray missed. Raises TactileError for angles that are not even around the axis, and for an outer skin with
+    gaps."""
     rows = _table(path, _RADII)
     angles = -180 + 360 / _AROUND * np.arange(_AROUND)
     if len(rows) % _AROUND or not (rows[:, 1].reshape(-1, _AROUND) == angles).all():

@@ -1,4 +1,4 @@
-"""Model the electronics between the electrodes and the numbers in a file: rest, gains, drift, noise, the converter."""
+"""The electronics between the electrodes and the numbers in a file: rest, gains, drift, noise, converter."""
 
 from __future__ import annotations
 
@@ -16,12 +16,11 @@ NOISE = 1.5  # counts, standard deviation of the noisiest real recordings: trans
 class Wiring:
     """Electronics between the film over an electrode and the number in a file; raises TactileError out of range.
 
-    rest_spread : counts; each electrode rests at ``REST_COUNTS`` and up to this much more or less (assumed)
+    rest_spread : counts; each electrode rests at ``REST_COUNTS`` plus or minus up to this (assumed)
     gain_error : 1, standard deviation of the logarithm of each electrode's gain (assumed none)
     drift : counts/s; each electrode drifts evenly at up to this rate (88 counts in an hour: docs/sources.md)
     noise : counts, standard deviation in each frame (0.7 to ``NOISE`` in real recordings: docs/sources.md)
-    tared : whether the count at rest is taken off, as in files that keep changes alone
-    """
+    tared : true subtracts the count at rest, as in files that hold changes alone"""
 
     rest_spread: float = 150.0
     gain_error: float = 0.0
@@ -40,18 +39,16 @@ class Wiring:
 
 
 def converted(counts: np.ndarray) -> np.ndarray:
-    """Round counts to whole ones and hold them within the converter's 12 bits."""
+    """Round to whole counts and clip to the converter's 12 bits."""
     return np.clip(np.round(counts), 0, COUNT_MAX)
 
 
 def readings(change: np.ndarray, time: np.ndarray, wiring: Wiring, seed: int) -> np.ndarray:
     """Return the readings of the 12-bit converter, (T, 19) int16 counts, for changes (T, 19) counts at times (T,) s.
 
-    Changes are those of a unit that rests at ``REST_COUNTS``; this one reads them by its own rest, as its
-    divider does. Rounded and held within 0..4095, then less the count at rest where ``wiring.tared``. Rest, gain, drift
-    and noise are drawn from streams of their own: a recording goes on as it began when it is made longer, and one
-    defect changes without the others.
-    """
+    Changes are those of a unit that rests at ``REST_COUNTS``; they are converted to this unit's rest (divider), rounded
+    and clipped to 0..4095, less the count at rest if ``wiring.tared``. Rest, gain, drift and noise have separate random
+    streams: a longer recording begins with the same values, and one defect changes without the others."""
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]
     electrodes = change.shape[1]
     rest = REST_COUNTS + np.round(streams[0].uniform(-wiring.rest_spread, wiring.rest_spread, electrodes))

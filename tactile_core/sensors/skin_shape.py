@@ -1,4 +1,4 @@
-"""A fluid sensor's shape by its descriptor: skin and core as structured surfaces, from the table of their radii."""
+"""A fluid sensor's shape from its descriptor: skin and core as structured surfaces, from the table of their radii."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROUNDING = 0.5e-3  # m, by which the corner of a flat inner cap, where the tabl
 
 @functools.cache
 def skin_of(name: str) -> SkinShape:
-    """The shape of the skin of a sensor that is there. Raises TactileError for one that has none."""
+    """Return the shape of a sensor's skin. Raises TactileError for a sensor without one."""
     return SkinShape(of_kind(name, Fluid))
 
 
@@ -37,7 +37,7 @@ class SkinShape:
 
     @functools.cached_property
     def angles(self) -> np.ndarray:
-        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, from -pi up."""
+        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, rising from -pi."""
         pad = np.linspace(-self.pad_angle, self.pad_angle, self._lattice.pad_intervals + 1)
         back = np.linspace(self.pad_angle, 2 * np.pi - self.pad_angle, self._lattice.back_intervals + 1)[1:-1]
         back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
@@ -45,7 +45,7 @@ class SkinShape:
 
     @functools.cached_property
     def table(self) -> dict[str, np.ndarray]:
-        """x (n,) m, theta (72,) rad and radii (n, 72) m of outer skin, inner skin and core, made even in theta."""
+        """x (n,) m, theta (72,) rad and radii (n, 72) m of outer skin, inner skin and core, symmetric in theta."""
         rows = read_radii(self.descriptor.folder / self._skin.profile)
         mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
         radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
@@ -82,12 +82,12 @@ class SkinShape:
     @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
         """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin. Stations run from the tip pole to the
-        base pole (both included, each one point repeated over the columns); outer and inner points of one station and
-        column face each other through the skin."""
+        base pole, each pole one point repeated over the columns; outer and inner points of one station and column face
+        each other."""
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
-        """The stations of ``skin_grid`` at any angles (columns,) rad: (stations, columns, 3) m."""
+        """Nodes (stations, columns, 3) m of ``skin_grid`` at any angles (columns,) rad."""
         x, r = np.moveaxis(_around(self._meridians(layer), theta), 1, 0)
         x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
         r[[0, -1]] = 0
@@ -131,8 +131,8 @@ class SkinShape:
 
     @functools.cache  # noqa: B019
     def skin_surface(self, layer: str = "outer") -> Lattice:
-        """The outer (or inner) skin at rest: rows from tip to base, columns round the axis, then the two poles. The
-        inner skin's triangles point away from the solid too, into the fluid."""
+        """The outer (or inner) skin at rest: rows from tip to base, columns around the axis, then the two poles.
+        Triangles point away from the solid, those of the inner skin into the fluid."""
         grid = self.skin_grid(layer)
         stations, columns = grid.shape[:2]
         rows = stations - 2

@@ -1,4 +1,5 @@
-"""Fields of a sensor's files: their units and ranges, and how TOML becomes dataclasses. For Blender, with numpy alone.
+"""Fields of a sensor's files: units, ranges, and conversion from TOML to dataclasses; for Blender, with numpy alone.
+
 A field's name ends in its unit; in Python it has the name without it, in SI units. Decimals are shifted to SI units
 before they are rounded to floats, so that 20.06 mm is the number 20.06e-3 exactly."""
 
@@ -49,9 +50,8 @@ def number(
     may_miss: bool = False,
     length: int | None = None,
 ) -> Any:
-    """Declare a number, or a list of them: its unit in the file, and the open interval in which it lies there.
-    default : in Python; may_miss : whether a file may leave it out for that; length : of lists whose type does not
-        say"""
+    """Declare a number, or a list of numbers: its unit in the file, and its open interval in that unit.
+    default : in Python; may_miss : true if a file may leave it out; length : of lists whose type has none"""
     meta = {"unit": unit, "above": above, "below": below, "may_miss": may_miss, "length": length}
     return dataclasses.field(default=default, metadata=meta)
 
@@ -76,7 +76,7 @@ class Material:
 
 
 def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, advice: str = "") -> _T:
-    """Return what ``made`` makes of a file's content, decimals as written. Raises TactileError with the field."""
+    """Return ``made(content)`` for a file's content, decimals as written. Raises TactileError with the field."""
     try:
         content = tomllib.loads(read_toml_text(file), parse_float=Decimal)
     except OSError as error:
@@ -90,7 +90,7 @@ def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, a
 
 
 def read_table(form: type[_T], content: Any, where: str = "", **others: Any) -> _T:
-    """Convert a table, at `where` of a file, and `others` to a dataclass, SI units. Raises TactileError."""
+    """Convert the table at `where` of a file, and `others`, to a dataclass in SI units. Raises TactileError."""
     if not isinstance(content, dict):
         raise TactileError(where, repr(content), "a table")
     types = typing.get_type_hints(form)

@@ -1,4 +1,4 @@
-"""Measures of a sensor surface, and the unrolling of the BioTac's pad onto the DIGIT's plane."""
+"""Normals and areas of a sensor's surface, and the unrolling of the BioTac's pad onto the DIGIT's plane."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def node_areas(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Area (n,) m2 that belongs to each node: a third of each triangle around it."""
+    """Area (n,) m2 of each node: a third of each adjacent triangle."""
     corners = nodes[faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
     return np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(nodes))
@@ -38,7 +38,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def rolled_x(sensor: str) -> np.ndarray:
-    """Unrolled x (stations,) m of each station: arc length along the pad's lowest line from where x is shared."""
+    """Unrolled x (stations,) m: arc length along the pad's lowest line from the common point."""
     skin = skin_of(sensor)
     origin = skin.descriptor.unrolling.origin_x
     line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles))]
@@ -47,16 +47,16 @@ def rolled_x(sensor: str) -> np.ndarray:
 
 
 def rolled_grid(sensor: str) -> np.ndarray:
-    """Unrolled places (rows, columns, 2) = (x, z) m of the skin's lattice, also of its back."""
+    """Unrolled places (rows, columns, 2) = (x, z) m of the skin's lattice, its back included."""
     skin = skin_of(sensor)
     across = skin.descriptor.unrolling.radius * skin.angles
     return np.stack(np.broadcast_arrays(rolled_x(sensor)[1:-1, None], across), -1)
 
 
 def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
-    """Positions (n_nodes, 2) = (x, z) m of the nodes of a fluid sensor's surface, unrolled onto the DIGIT's plane. The
-    finger rolls on the plane: z = R theta across, arc length of the lowest line along (docs/sources.md). NaN for nodes
-    on the back, beyond 90 degrees, and for the poles, which never touch the plane."""
+    """Places (n_nodes, 2) = (x, z) m of a fluid sensor's nodes, unrolled onto the DIGIT's plane: z = R theta across,
+    arc length of the lowest line along (docs/sources.md). NaN for nodes on the back, beyond 90 degrees, and for the
+    poles."""
     skin = skin_of(sensor)
     on_pad = np.abs(skin.angles)[None, :, None] <= skin.pad_angle + 1e-9
     rolled = np.where(on_pad, rolled_grid(sensor), np.nan)
@@ -70,9 +70,8 @@ def _skin_axes(sensor: str) -> np.ndarray:
 
 
 def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.ndarray]:
-    """Find the place on a fluid sensor's resting skin that corresponds to an unrolled point (x, z) m. Returns the
-    surface point (3,) m and the outward unit normal there (3,). The point is clamped to the pad: unrolled x between the
-    poles, angle within 90 degrees."""
+    """Find the point (3,) m and outward unit normal (3,) of a fluid sensor's resting skin at an unrolled place (x, z)
+    m. The place is clamped to the pad: unrolled x between the poles, angle within 90 degrees."""
     skin = skin_of(sensor)
     stations, angles, radius = rolled_x(sensor), skin.angles, skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
@@ -85,7 +84,7 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nearest places on a surface to points (n, 3): face index (n,), barycentric weights (n, 3), place (n, 3) m.
-    Ericson, Real-Time Collision Detection, 5.1.5, by projection on the plane and on the three edges."""
+    Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
     faces, weights, places = [], [], []
     a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
     for point in points:

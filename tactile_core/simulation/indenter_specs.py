@@ -1,5 +1,5 @@
-"""The indenters that a scene can name: one struct a kind, millimetres in, metres out. Structs of shapes that their
-sizes describe come from the shapes' own files; meshes and groups stand here."""
+"""The indenters that a scene can name: one struct a kind, millimetres in, metres out. Structs of simple shapes are made
+from the shapes' own files; meshes and groups are defined here."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A shape that its sizes describe: the struct of each ``SceneForm`` has the form's kind and fields."""
+    """A shape given by its sizes; the struct of each ``SceneForm`` has the form's kind and fields."""
 
     name: str
 
@@ -73,7 +73,7 @@ else:
 
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Part of a group: moved along the group's axes, then its lower end is ``z_mm`` above the plane of contact."""
+    """Part of a group: moved along the group's axes; its lower end is ``z_mm`` above the plane of contact."""
 
     body: Single
     x_mm: float = 0.0
@@ -82,14 +82,14 @@ class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     turn_deg: float = 0.0
 
     def build(self) -> tuple[Indenter, Pose]:
-        """Build the indenter, in metres, and its pose in the group, turned about z."""
+        """Build the indenter, in metres, and its pose in the group, rotated about z."""
         c, s = np.cos(np.deg2rad(self.turn_deg)), np.sin(np.deg2rad(self.turn_deg))
         apex = np.array([self.x_mm, self.y_mm, self.z_mm]) * 1e-3
         return self.body.build(), Pose(apex, np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
 
 
 class SeveralSpec(msgspec.Struct, tag="several", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """Several bodies that press as one; the lowest of them has z_mm = 0."""
+    """Several bodies pressed as one; the lowest has z_mm = 0."""
 
     name: str
     parts: Annotated[list[PartSpec], Meta(min_length=1, max_length=64)]
@@ -103,7 +103,8 @@ IndenterSpec = Single | SeveralSpec
 
 
 def with_files_of(folder: pathlib.Path, spec: IndenterSpec) -> IndenterSpec:
-    """Return the spec with mesh files of the scene's folder. Raises TactileError for one missing or outside of it."""
+    """Return the spec with mesh files of the scene's folder. Raises TactileError for a file missing or outside of
+    it."""
     if isinstance(spec, SeveralSpec):
         parts = [msgspec.structs.replace(part, body=with_files_of(folder, part.body)) for part in spec.parts]
         return msgspec.structs.replace(spec, parts=parts)

@@ -29,13 +29,13 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 def press_rows(
     scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
-    """The contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest depth.
+    """Return the contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest
+    depth.
 
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
-    with its slide, at the force it had reached, by the same way on both sensors. A scene with ``depth_steps`` pairs
+    with its slide, at the force it had reached, along the same path on both sensors. A scene with ``depth_steps`` pairs
     contacts of the same depth in place of those of the same force.
-    electrodes : their law, of ``biotac_sheet.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``
-    """
+    electrodes : their law, of ``biotac_sheet.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)
@@ -55,7 +55,7 @@ def press_rows(
 
 
 def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tuple[int, Indenter]:
-    """Draw a press's body and its number: one of the scene's, or, behind all of these, one of its own."""
+    """Draw a press's body and its number: one of the scene's, or (the last number) a random one."""
     which = int(random.integers(len(scene.indenters)))
     if spec.random_bodies and random.uniform() < spec.random_bodies:
         return len(scene.indenters), random_body(random)
@@ -65,7 +65,7 @@ def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tup
 def _on_both(
     indenter: Indenter, place: Placement, spec: PairSpec, steps: Iterator[Step], pair: tuple[str, str]
 ) -> Iterator[tuple[Step, Solution, Solution]]:
-    """Yield each step's contacts on both sensors, to the greatest depth or until an edge sinks in."""
+    """Yield each step's contacts on both sensors, up to the greatest depth or until an edge penetrates."""
     steps, *for_each = itertools.tee(steps, 3)
     on_source, on_target = (
         _press(sensor, indenter, place, spec, own) for sensor, own in zip(pair, for_each, strict=True)
@@ -88,14 +88,14 @@ def _press(
 
 
 def _steps_of_depth(random: np.random.Generator, spec: PairSpec) -> Iterator[Step]:
-    """Depths evenly apart, from a random start."""
+    """Yield evenly spaced depths from a random start."""
     least, most, start = 1e-3 * spec.depth_min_mm, 1e-3 * spec.depth_max_mm, random.uniform()
     for step in range(spec.depth_steps):
         yield Step(depth=least + (most - least) * (step + start) / spec.depth_steps)
 
 
 def _steps_of_force(random: np.random.Generator, spec: PairSpec) -> Iterator[Step]:
-    """Growing forces, without an end unless the press slides."""
+    """Yield growing forces, without end unless the press slides."""
     force = spec.force_min_n * spec.force_ratio ** random.uniform()
     begin = int(random.integers(_SLIDE_FROM, _SLIDE_TO)) if random.uniform() < spec.slide_share else None
     heading, length = random.uniform(0, 2 * np.pi), 1e-3 * spec.slide_max_mm * random.uniform()
@@ -110,14 +110,14 @@ def _steps_of_force(random: np.random.Generator, spec: PairSpec) -> Iterator[Ste
 
 
 def paired(scene: Scene) -> PairSpec:
-    """Return how a scene's presses are drawn. Raises TactileError for a scene without pairs."""
+    """Return the scene's distribution of presses. Raises TactileError for a scene without pairs."""
     if scene.pairs is None:
         raise TactileError("scene, pairs", "none", "a table [pairs]")
     return scene.pairs
 
 
 def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET) -> Placement:
-    """Draw the place and tilt of a press: evenly over the gel inside its rim, leaning evenly over directions."""
+    """Draw the place and tilt of a press: uniform over the gel inside its rim, tilt in a uniform direction."""
     shape = sensors.shape_of(target)
     while True:
         x = random.uniform(shape.tip_x, shape.base_x)
@@ -153,6 +153,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if nodes (n,) bool of the source reach beside what rolls onto the gel, which has no such contact."""
+    """Return true if the contact, nodes (n,) bool of the source, extends beyond the part that rolls onto the gel."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

@@ -51,10 +51,10 @@ KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's s
 
 @dataclass(frozen=True)
 class Pairs:
-    """Paired contacts, C of them. Displacements stay in the file's whole numbers; times their scale they are metres.
+    """Paired contacts, C of them. Displacements are the file's integers; times their scale they are metres.
 
-    Fields are named after the pair that ships; of another ``pair``, source and target, they hold what theirs are, and
-    signals are as wide as the source has electrodes.
+    Fields are named after the pair that ships; for another ``pair`` they hold its source and target, and signals have
+    as many columns as the source has electrodes.
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
     scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
     force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
@@ -63,8 +63,7 @@ class Pairs:
     contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
     slide : (C, 2) float32 m
     indenter : (C,) int16                            attributes : of the file, as text
-    sha256 : of the content, whatever the HDF5 layout
-    """
+    sha256 : of the content, whatever the HDF5 layout"""
 
     displacement_biotac: np.ndarray
     displacement_digit: np.ndarray
@@ -97,7 +96,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Split:
-    """Row numbers of the contacts to train on, to choose by, and to report on; no press is in two of them."""
+    """Row numbers of the contacts for training, validation and test; no press is in two of them."""
 
     train: np.ndarray
     validation: np.ndarray
@@ -159,7 +158,8 @@ def _named(pair: tuple[str, str]) -> dict[str, str]:
 def _dataset(
     file: h5py.File, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
 ) -> np.ndarray:
-    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
+    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all datasets in the
+    file"""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
         raise TactileError(place, "no such dataset", f"the datasets {', '.join(names.values())}", ADVICE)
@@ -198,7 +198,7 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
 
 
 def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:
-    """The attribute `names` is a JSON list of texts, and has one for each number of `indenter`."""
+    """Check that the attribute `names` is a JSON list of texts, with one for each number of `indenter`."""
     place = f"{os.fspath(path)}, attribute indenters"
     try:
         found = json.loads(names)
@@ -222,7 +222,8 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts 80/10/10 by press, so that none has a neighbour elsewhere. Raises TactileError below five."""
+    """Split contacts 80/10/10 by press, which keeps similar ones together. Raises TactileError for under five
+    presses."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"

@@ -1,5 +1,5 @@
-"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks, and the file's card. The
-card holds counts, hash and histograms, small enough to keep beside the code."""
+"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks, and its card: counts,
+hash and histograms, small enough to keep beside the code."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _TILTS_DEG = tuple(range(0, 46, 5))
 
 
 def card(path: str | os.PathLike, source: str = SOURCE, target: str = TARGET) -> dict:
-    """Return counts, hash and histograms of a file of pairs; without its name, which its maker chooses."""
+    """Return counts, hash and histograms of a file of pairs, without its name."""
     import h5py
 
     with h5py.File(path) as file:
@@ -69,7 +69,7 @@ _READ = ("force", "place", "slide", "press", "indenter")
 
 
 def _histogram(values: np.ndarray, edges: tuple[float, ...]) -> dict[str, list]:
-    """Counts between edges; what lies beyond the last counts in the last."""
+    """Return counts between edges; the last includes what lies beyond."""
     counts, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
     return {"edges": list(edges), "counts": counts.tolist()}
 
@@ -80,8 +80,8 @@ def _plain(value: object) -> object:
 
 def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
     """Return the unit of each dataset that is written; the leading axis counts contacts. Datasets are named after the
-    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, of what is
-    written beside"""
+    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, datasets to
+    add"""
     fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
     return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
@@ -92,7 +92,7 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """How contacts were made: scene's text, indenters' names, seed, electrodes' law, sensors, words of ``KEEPABLE``."""
+    """Origin of contacts: scene's text, indenters' names, seed, electrodes' law, sensors, words of ``KEEPABLE``."""
 
     scene: str
     indenters: list[str]
@@ -103,7 +103,7 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks in order into one HDF5 file, cut to ``count`` contacts. Raises TactileError where it cannot be."""
+    """Join blocks in order into one HDF5 file of ``count`` contacts. Raises TactileError where that fails."""
     import h5py
 
     try:

@@ -1,6 +1,6 @@
-"""Draw the bodies of presses at random: what a finger meets is seldom one of the indenters that a scene lists. Sizes
-are even in their logarithm, so that a small ball is as likely as a large one. All ranges are assumed: from what a
-fingertip can tell from a point to what it cannot tell from a plane."""
+"""Draw the bodies of presses at random, beyond the indenters that a scene lists. Sizes are log-uniform, so that a small
+ball is as likely as a large one; all ranges are assumed, from bodies that a fingertip takes for a point to those it
+takes for a plane."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ _MM = 1e-3
 
 
 def random_body(random: np.random.Generator) -> Indenter:
-    """Draw a ball, block, wedge, cylinder, ring or a group of balls, turned about the axis that it is pressed along."""
+    """Draw a ball, block, wedge, cylinder, ring or a group of balls, rotated about the axis along which it is
+    pressed."""
     shape = _SHAPES[random.choice(len(_SHAPES), p=_SHARES)]
     return shape(random) if shape in (_ball, _balls) else _turned(random, shape(random))
 
@@ -28,7 +29,7 @@ def _ball(random: np.random.Generator) -> Indenter:
 
 
 def _block(random: np.random.Generator) -> Indenter:
-    """A bar, a brick or a plate."""
+    """Draw a bar, a brick or a plate."""
     sizes = _between(random, 2, 60), _between(random, 2, 60), _between(random, 10, 20)
     return Box(sizes, min(_between(random, 0.2, 2), 0.45 * min(sizes)))
 
@@ -53,7 +54,7 @@ def _ring(random: np.random.Generator) -> Indenter:
 
 
 def _balls(random: np.random.Generator) -> Indenter:
-    """Two or three balls whose lowest points lie in one plane: a rough or a double contact."""
+    """Draw two or three balls whose lowest points lie in one plane: a rough or a double contact."""
     parts = []
     for _ in range(random.integers(2, 4)):
         apex = np.array([*random.uniform(-4, 4, 2), 0.0]) * _MM

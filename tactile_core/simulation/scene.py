@@ -23,7 +23,7 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Distribution of paired contacts: places even over the gel, tilts over a cone, force growing by a ratio."""
+    """Distribution of paired contacts: places uniform over the gel, tilts in a cone, force growing by a ratio."""
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
@@ -40,7 +40,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A moment of a recorded motion: where the indenter is on the DIGIT's (unrolled) plane, and how hard it presses."""
+    """A point of a recorded motion: the indenter's place on the DIGIT's (unrolled) plane, and its force."""
 
     time_s: Annotated[float, Meta(ge=0, le=600)]
     x_mm: float
@@ -90,7 +90,7 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
 
 
 def check(file: str | os.PathLike, scene: Scene) -> None:
-    """Raise TactileError for what the fields' types do not say: finite numbers, names, growing times."""
+    """Raise TactileError for what the fields' types do not check: finite numbers, names, growing times."""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))
@@ -132,7 +132,7 @@ def _numbers(value):  # noqa: ANN001, ANN202 (any nesting of dict, list and numb
 
 
 def to_toml(scene: Scene) -> str:
-    """Write a scene as TOML text, with every field, defaults too."""
+    """Write a scene as TOML text, with every field, also defaults."""
     document = msgspec.to_builtins(scene)
     lines = [f"{key} = {_value(document[key])}" for key in ("format", "name", "description")]
     for spec in document["indenters"]:

@@ -33,18 +33,17 @@ _FIELDS = ("displacement", "traction")  # of a sensor
 
 
 def outputs() -> dict[str, Sensor]:
-    """Return what a file may hold beside time, force and, with a gel, the contact's centre; and whose each is."""
+    """Return the optional outputs of a file (always there: time, force and, with a gel, the contact's centre) with the
+    sensor of each."""
     fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
     return {"electrodes": ELECTRODES_OF, **fields}
 
 
 class _Frame(NamedTuple):
-    """Hold the outputs kept of a frame.
-
+    """Kept outputs of a frame.
     moved, pressed : by sensor, displacement (n, 3) float32 m and traction (n, 3) float32 Pa
     force : (3,) N; pressure : Pa, rise of the fluid's
-    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the first gel
-    """
+    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the first gel"""
 
     moved: dict[Sensor, np.ndarray]
     pressed: dict[Sensor, np.ndarray]
@@ -67,15 +66,14 @@ def simulate_recording(
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
-    The motion is linear between the scene's points. Each frame is a press of its own, straight to its force with the
-    scene's friction, so rolling and sliding differ in nothing: no frame drags what the one before has moved.
-    progress : called with (frames done, frames).
-    keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default.
-    loaded : a scene and its text in place of the file's, which is then named in messages alone.
-    electrodes : the law of their counts, of ``biotac_sheet.LAWS``.
-    Raises TactileError for a scene without a recording, one that presses harder than the linear model may be asked,
-    or tractions of another tier than the fast one.
-    """
+    The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
+    scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
+    progress : called with (frames done, frames)
+    keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default
+    loaded : a scene and its text in place of the file's, whose name then only serves messages
+    electrodes : the law of their counts, of ``biotac_sheet.LAWS``
+    Raises TactileError for a scene without a recording, forces beyond the linear model's range, and tractions of
+    another tier than the fast one."""
     scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
     used = sensors_of(keep)
@@ -130,7 +128,7 @@ def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
 
 
 def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
-    """Raise TactileError for tractions that the tier does not give on the surface's own nodes."""
+    """Raise TactileError for tractions where the tier has none on the surface's own nodes."""
     for sensor, tier in tiers.items():
         if f"traction_{sensor}" in keep and tier != "fast":
             found = f"of the {tier} tier, whose forces act on the nodes of its own mesh"
@@ -138,7 +136,7 @@ def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
 
 
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Sequence[Sensor] = ()) -> None:
-    """Raise TactileError for a point that presses beside one of the gels; without any, beside what the DIGIT covers."""
+    """Raise TactileError for a point beside one of the gels; without gels, beside what the DIGIT covers."""
     for (number, point), gel in itertools.product(enumerate(spec.points, 1), gels or (TARGET,)):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3, sensor=gel):
             shape = sensors.shape_of(gel)
@@ -165,7 +163,7 @@ def _solve(
     where: str, indenter: Indenter, place: Placement, force: float, friction: float, used: Collection[Sensor],
     tiers: Mapping[Sensor, Tier],
 ) -> dict[Sensor, Solution]:  # fmt: skip
-    """The contacts of a frame by sensor; none where nothing presses."""
+    """Return the contacts of a frame by sensor; none where nothing presses."""
     found = {}
     for sensor in used if force > 0 else ():
         try:
@@ -180,7 +178,7 @@ def _solve(
 
 
 def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -> _Frame:
-    """Extract what is kept of a frame's contacts. The force is the first sensor's, of the BioTac where it is solved."""
+    """Return what is kept of a frame's contacts. The force is the first sensor's: the BioTac's where it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))
@@ -191,7 +189,7 @@ def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -
 
 
 def _field(solved: Mapping[Sensor, Solution], keep: Collection[str], name: str) -> dict[Sensor, np.ndarray]:
-    """A field (n, 3) float32 of a solution by the sensors of which it is kept; zero where nothing presses."""
+    """Return a solution's field (n, 3) float32 by sensor, where it is kept; zero where nothing presses."""
     kept = [sensor for sensor in sensors_of(keep) if f"{name}_{sensor}" in keep]
     if not solved:
         return {sensor: np.zeros(sensors.sensor_surface(sensor).rest.shape, np.float32) for sensor in kept}
@@ -209,13 +207,13 @@ def pdc_counts(pressure: np.ndarray) -> np.ndarray:
 
 
 def _wiring(spec: RecordingSpec) -> Wiring:
-    """The scene's defects; its drift is given from the first to the last frame."""
+    """Return the scene's defects; its drift is the total from the first to the last frame, here counts/s."""
     lasts = spec.points[-1].time_s - spec.points[0].time_s
     return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
-    """Fields as far as they are kept, force, and the centre of pressure where a gel is solved."""
+    """Return kept fields, force and, where a gel is solved, the centre of pressure."""
 
     def stacked(fields: Sequence[dict[Sensor, np.ndarray]]) -> dict[Sensor, np.ndarray]:
         return {sensor: np.stack([field[sensor] for field in fields]) for sensor in fields[0]}

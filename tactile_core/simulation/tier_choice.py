@@ -21,7 +21,8 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier for a bound. error : um rms that 95 of 100 contacts stay below; ms : a contact; share : depth reached"""
+    """Tier for a bound; error : um rms that 95 of 100 contacts stay below; ms : a contact; share : of the reached
+    depth"""
 
     tier: Tier
     error: float
@@ -47,7 +48,7 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
 
 
 def _up_to(tier: str, sensor: str, share: float) -> float:
-    """The largest error, um, of any depth up to this one: a press passes through all of them."""
+    """Return the largest error, um, of all depths up to this one, which a press passes through."""
     below = [each["depth_share_to"] for each in measured()["tiers"][tier][sensor]["bins"]]
     depths = [each for each in below if each < share] + [share]
     return 1e6 * max(expected_error(tier, sensor, depth)[0] for depth in depths)
@@ -73,7 +74,7 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """Return a scene's depth over the thickness by the fast tier, or the most where that is not known."""
+    """Return a scene's depth over the thickness by the fast tier, or the largest tabulated one where unknown."""
     if not stored(sensor).bytes:
         return DEPTH_LIMIT
     share = 0.0

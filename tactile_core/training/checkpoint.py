@@ -23,11 +23,9 @@ ADVICE = "Remove the file to start again, or train into another folder"
 @dataclass
 class State:
     """State of a training.
-
-    identity : what must be the same for the training to go on: data, seed, options, versions
-    stage, epoch : the next to run           log : rows (stage, epoch, train, validation)
-    arrays : weights and optimiser
-    """
+    identity : what must be equal to resume it: data, seed, options, versions
+    stage, epoch : the next to run; log : rows (stage, epoch, train, validation)
+    arrays : weights and optimiser"""
 
     identity: dict
     stage: int = 0
@@ -50,8 +48,8 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
 
 
 def read(path: str | os.PathLike, identity: dict) -> State:
-    """Read the state in the file, or return the state of a start if there is none. raises: TactileError if the file is
-    damaged, or belongs to another training"""
+    """Read the state in the file, or return an initial one without a file. Raises TactileError for a damaged file or
+    another training's."""
     if not os.path.exists(path):
         return State(identity)
     try:

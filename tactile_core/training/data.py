@@ -1,4 +1,4 @@
-"""Training contacts as a step of training sees them: signals as a sensor reads them, surfaces, forces."""
+"""Training contacts as a training step needs them: signals as a sensor reads them, surfaces, forces."""
 
 from __future__ import annotations
 
@@ -20,13 +20,12 @@ from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, to
 
 @dataclass(frozen=True)
 class Batch:
-    """A few contacts as a step of training sees them.
+    """A batch of contacts.
 
-    rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) what SVB reads
-    biotac, digit : (B, K) what the mesh encoders read           force : (B, 3) N
+    rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) SVB's input
+    biotac, digit : (B, K) inputs of the mesh encoders           force : (B, 3) N
     pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
-    signed : (B,) rows, SILENT where the signal has lost its sign: such a signal fits several places
-    """
+    signed : (B,) rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
 
     rows: np.ndarray
     signed: np.ndarray
@@ -39,8 +38,8 @@ class Batch:
 
 
 class Contacts:
-    """Contacts with their split and both surfaces. SILENT is the number of no contact, C + i of contact i in a mirror.
-    electrodes : how many a signal has; rest : (e,) counts that their changes are those of
+    """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i.
+    electrodes : how many a signal has; rest : (e,) counts of the unit that changes are from
     device : where batches go; the contacts themselves stay in the host's memory"""
 
     def __init__(
@@ -61,11 +60,11 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """Return the rows and, behind them, the share of silent samples."""
+        """Return the rows followed by the share of silent samples."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """Draw the contacts of an epoch, in its order: contacts of the split or their mirror images, and silence."""
+        """Draw an epoch's contacts in order: contacts of the split or their mirror images, and silent samples."""
         rows = rng.permutation(self.with_silence(self.split.train))
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)
@@ -92,7 +91,7 @@ class Contacts:
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows (B,) of the pairs, 0 for silent ones, and which (B,) are mirrored."""
+        """Return the rows (B,) of the pairs, 0 for silent samples, and which (B,) are mirrored."""
         contacts = len(self.pairs.press)
         return np.maximum(rows, 0) % contacts, rows >= contacts
 
@@ -108,15 +107,13 @@ def measured(
 ) -> np.ndarray:  # fmt: skip
     """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes, and whether they are rectified.
 
-    Rectified changes are given with the sign of a thinning film, as the networks read them.
-
-    Gain error a channel, noise, whole counts, the ends of 12 bits. The rest lies near that of a typical unit
-    (``rest_counts``, (19,)) and between whole counts, as the mean of many readings does.
-    unit : share of frames read as a real unit is known: its gains spread more, its rest is off
-    rectified : share of frames that lose their sign. They stand for recordings of unknown units, whose tare cannot be
-        mended once folded: gains spread more, rest is off, channels may be missing
-    Both are off by a share of the signal's size too, as no simulated contact is quite like a real one.
-    """
+    Rectified changes have the sign of a thinning film, as the networks read them. Simulated are a gain error for each
+    channel, noise, whole counts and the ends of 12 bits. The rest lies near that of a typical unit (``rest_counts``,
+    (19,)) and between whole counts, as the mean of many readings does.
+    unit : share of frames with a real unit's uncertainty: wider gains, an error of the rest
+    rectified : share of frames that lose their sign, as from unknown units whose tare cannot be corrected after
+        rectifying: wider gains, an error of the rest, missing channels
+    Both have an error proportional to the signal's size too, as no simulated contact is quite like a real one."""
     folded = rng.random((len(change), 1)) < rectified
     gain = 1.0 + options.gain * rng.standard_normal(change.shape)
     rest = rest_counts + rng.random(change.shape)

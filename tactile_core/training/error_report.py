@@ -1,4 +1,4 @@
-"""Report the errors of a training on presses it never saw, and its loss curves."""
+"""Report a training's errors on presses it never saw, and its loss curves."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks on the test presses, their signals read with the training's noise."""
+    """The exported networks on the test presses, with the training's noise on the signals."""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
         self.networks, self.contacts, self.bodies, self.seed = networks, contacts, bodies, seed
@@ -53,7 +53,7 @@ class Measure:
 
 
 def error_rows(measure: Measure, model: Model) -> list[Row]:
-    """Make all rows of the card: each step of the chain, the chain, the direct network, each beside its baseline."""
+    """Return all rows of the card: each step of the chain, the chain, the direct network, each beside its baseline."""
     pairs, rows = measure.contacts.pairs, measure.rows
     columns = translation_metrics(measure.networks, pairs, rows, measure.change, measure.bodies)
     columns |= direct_columns(model, measure)
@@ -66,7 +66,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Return the errors of the direct network, the bar that the chain must reach."""
+    """Return the errors of the direct network, which the chain must beat."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:
@@ -81,7 +81,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """Make the rows of SVB: its reconstruction's rms over electrodes against the signal as read, mean over contacts."""
+    """Return SVB's rows: rms over electrodes of its reconstruction against the noisy signal, mean over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
@@ -110,7 +110,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return the quantiles at QUANTILES, their levels, of `silence`: what lies below them is no contact."""
+    """Return the quantiles at QUANTILES of `silence`: results below them are no contact."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 
@@ -120,8 +120,8 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified apart.
-    Rectified signals scatter more: quantiles of both together would hide what is strange among signed ones."""
+    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified
+    separately. Rectified signals scatter more, and would hide unusual signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
         signal = contacts.read(
@@ -133,7 +133,7 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `card.fit_bounds` on the validation presses, signed and rectified apart; silence : the card's."""
+    """Fit `card.fit_bounds` on the validation presses, signed and rectified separately; silence : the card's."""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():

@@ -1,4 +1,4 @@
-"""Export a trained model to the weights folder: rounding, hashes, the distance to training signals, the card."""
+"""Export a trained model to the weights folder: rounded tensors, hashes, statistics of training signals, the card."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ UNITS = {
 def export(
     model: Model, contacts: Contacts, parts: dict[str, np.ndarray], bodies: Bodies, seed: int, folder: Path
 ) -> dict:  # fmt: skip
-    """Write one safetensors file a network and the card; returns the card.
-    parts : tensors of the network that tells two contacts apart
-    The errors in the card are those of the files: they are computed by `networks.py` from the rounded weights."""
+    """Write one safetensors file a network and the card; returns the card. The errors in the card are those of the
+    files: `networks.py` computes them from the rounded weights.
+    parts : tensors of the network that separates two contacts"""
     model.cpu()
     with torch.no_grad():
         for parameter in model.parameters():
@@ -77,7 +77,7 @@ def export(
 
 
 def _rest_entry(contacts: Contacts) -> dict[str, list[float]]:
-    """Return the counts at rest that changes are those of, where the sensor's own table does not hold them."""
+    """Return the rest counts that changes are from, for a sensor whose own table has none."""
     known = places_of(contacts.pairs.pair[0]).rest_counts
     return {} if np.isfinite(known).all() else {REST: [round(float(value), 2) for value in contacts.rest]}
 
@@ -141,9 +141,9 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
 
 
 def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
-    """Compute the fluid's pressure, (1,) Pa, for each count of the electrodes' summed changes read without their sign.
-    It is the median over training contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) a law of
-    one number does better than networks, large and small (docs/train.md)."""
+    """Return the fluid's pressure, (1,) Pa, for each count of the electrodes' summed rectified changes: the median over
+    training contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) this law of one number does
+    better than networks, large and small (docs/train.md)."""
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
     signal = contacts.read(rows, np.random.default_rng([seed, 7]), rectified=1.0)
@@ -153,12 +153,12 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
-    """Return the numpy networks before there is a card."""
+    """Return the numpy networks before a card exists."""
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in tensors}})
 
 
 def versions(device: torch.device) -> dict[str, str]:
-    """Return versions that the numbers depend on besides data, seed and options."""
+    """Return versions that the numbers depend on, besides data, seed and options."""
     return {
         "device": label(device),
         "tactile": __version__,

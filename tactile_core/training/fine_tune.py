@@ -1,9 +1,8 @@
-"""Fine-tuning of S2MPN on a real sensor's recording that says where and how hard it was touched.
+"""Fine-tuning of S2MPN on a real sensor's recording that is labelled with places and forces.
 
 Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent and the force, three
-numbers of the contact's state; it says nothing of the dent's shape, for which the latent is held near what it was, on
-the recording's own signals and on the typical simulated signals that ship with the weights.
-"""
+numbers of the contact's state. It says nothing of the dent's shape: the latent is held near its former value, on the
+recording's own signals and on the typical simulated signals that ship with the weights."""
 
 from __future__ import annotations
 
@@ -51,11 +50,9 @@ BAD = Flag.SATURATED | Flag.DEAD_CHANNEL
 @dataclass(frozen=True)
 class LabelledRecording:
     """Frames in contact, F of them.
-
-    change : (F, 19) float32 counts          rectified : whether their sign is lost
-    place : (F, 2) float32, as the first two numbers of a DIGIT latent           force : (F,) float32 N, magnitude
-    split : of the frames, by press          dropped : sentences on what was left out
-    """
+    change : (F, 19) float32 counts; rectified : true if they have lost their sign
+    place : (F, 2) float32, as the first two numbers of a DIGIT latent; force : (F,) float32 N, magnitude
+    split : of the frames, by press; dropped : sentences on what was left out"""
 
     change: np.ndarray
     rectified: bool
@@ -68,10 +65,9 @@ class LabelledRecording:
 def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> LabelledRecording:
     """Read a recording with contact places and forces (Narang et al.: contact_loc, force_vec) for the gel's frame.
 
-    Places are taken to be SynTouch's frame of the electrodes (docs/sources.md), in m or mm as their size shows; of
-    forces only the magnitude counts, whatever their frame. Places are unrolled onto the gel.
-    Raises TactileError: no labels, places that are not on the skin, too few contacts.
-    """
+    Places are assumed in SynTouch's frame of the electrodes (docs/sources.md), in m or mm by their size, and are
+    unrolled onto the gel; of forces only the magnitude is used, whatever their frame. Raises TactileError: no labels,
+    places that are not on the skin, too few contacts."""
     recording = read(path)
     position, forces = recording.position, recording.force
     if position is None or forces is None:
@@ -102,7 +98,8 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """Places (F, 2) on the gel's lattice, in its units, of contacts (F, 3); and which lie off the pad (F,)."""
+    """Return places (F, 2) on the gel's lattice, in its units, of contacts (F, 3) m; and a mask (F,) of those off the
+    pad."""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
@@ -127,7 +124,7 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
 
 
 def _presses(used: np.ndarray) -> np.ndarray:
-    """Press number (F,) of each frame: runs of contact, or equal parts where there are too few runs."""
+    """Return the press number (F,) of each frame: runs of contact, or equal parts where runs are too few."""
     runs = np.cumsum(np.diff(used, prepend=used[0]) > 1)
     return runs if runs[-1] + 1 >= BLOCKS else np.arange(len(used)) * BLOCKS // len(used)
 
@@ -147,12 +144,11 @@ def fine_tune(
     progress: Progress | None = None,
     overwrite: bool = False,
 ) -> list[Row]:
-    """Write weights whose S2MPN was fine-tuned on the recording; returns the rows before and after on kept presses.
+    """Write weights with S2MPN fine-tuned on the recording; returns the rows before and after on held-out presses.
 
-    out_folder/weights is what ``tactile convert --weights`` takes; its card says what the fine-tuning was made of.
-    Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder
-    that holds weights already.
-    """
+    out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of. Raises
+    TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that holds
+    weights already."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)
@@ -181,7 +177,7 @@ def fine_tune(
 def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
-    """The network's tensors, rounded as they are written, at the epoch that was best on the validation presses."""
+    """Return the network's tensors, rounded as they are written, of the best epoch on the validation presses."""
     sizes = nets.sizes[net]
     module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
     module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
@@ -193,7 +189,7 @@ def _train(
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:
-        """Compute the misses of place and force, and the change of the shape, over some frames."""
+        """Compute the errors of place and force, and the change of the shape, over some frames."""
         state = module.contact(latent[rows])
         found = module.given(latent[rows], state)
         miss = (state[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
@@ -228,7 +224,8 @@ def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
-    """Median miss of place and force on the presses kept for it; baseline: always the training's median."""
+    """Return rows of the median error of place and force on held-out presses; baseline: always the training's
+    median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
     latent = nets.encode_signal(data.change[test], data.rectified)
@@ -246,7 +243,7 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
-    """Write the weights folder: all files of the source but the tuned one, and the card with a note of it, last."""
+    """Write the weights folder: all files of the source but the tuned one, and last the card with a note on it."""
     for name in [*(f"{net}.safetensors" for net in card["nets"] if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)

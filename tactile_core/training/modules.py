@@ -63,9 +63,9 @@ class Residual(nn.Module):
 
 
 class ContactPosterior(nn.Module):
-    """S2MPN or R2MPN: what a signal's latent leaves open about the contact, and the BioTac's latent once it is known. A
-    mixture of Gaussians over the contact's state (a mixture density network, Bishop 1994) and a network that gives the
-    latent of the BioTac's dent from the signal and a state. A shape thus is never averaged over places and depths."""
+    """S2MPN or R2MPN: the posterior of a contact given a signal's latent, and the BioTac's latent given both. A mixture
+    of Gaussians over the contact's state (mixture density network, Bishop 1994) and a network from signal and state to
+    the latent of the BioTac's dent: shapes are never averaged over places and depths."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
         super().__init__()
@@ -124,8 +124,8 @@ class Vae(nn.Module):
         return self.posterior(x)[0]
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Draw a latent from the posterior of x (reparameterised); also its KL divergence from N(0, 1), mean over B.
-        Kingma and Welling 2014, appendix B."""
+        """Draw a latent from the posterior of x (reparameterised); also return its KL divergence from N(0, 1), mean
+        over B (Kingma and Welling 2014, appendix B)."""
         mean, logvar = self.posterior(x)
         noise = torch.randn(mean.shape, generator=generator).to(mean.device)  # the same numbers on any device
         divergence = 0.5 * (mean**2 + logvar.exp() - 1.0 - logvar).sum(-1).mean()
@@ -135,10 +135,9 @@ class Vae(nn.Module):
 class MeshVae(Vae):
     """MVB or MVD: a latent is the place of the dent and a code of its shape in the frame that moves with it.
 
-    The place is read off the mesh, not learned; the decoder and the networks that start from a latent take it, beside
-    it, what the whole cell of the place leaves (`placed`), without which a shape on a lattice is not known.
-    surface : what ties places to cells, coefficients to fields
-    """
+    The place is measured on the mesh, not learned. The decoder, and networks that start from a latent, also get the
+    remainder of the place after rounding to cells (`placed`), which a shape on a lattice depends on.
+    surface : converts places to cells and coefficients to fields"""
 
     def __init__(self, surface: SurfaceCodec, latent: int, width: int, blocks: int) -> None:
         modes = surface.modes.shape[1]
@@ -151,7 +150,7 @@ class MeshVae(Vae):
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Sample like `Vae.sample`; the place is not noisy."""
+        """Sample like `Vae.sample`, without noise on the place."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
@@ -180,8 +179,8 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
-    """Make SVB: 20-256-128-64 to the latent, mirrored, on compressed signals (ACROSS: docs/sources.md, Networks). The
-    twentieth input, the last, says whether the signals are rectified."""
+    """Make SVB: 20-256-128-64 to the latent, and back, on compressed signals (ACROSS: docs/sources.md, Networks). The
+    last of 20 inputs says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 
@@ -192,8 +191,8 @@ def compress(signal: Tensor) -> Tensor:
 
 
 def initialise(module: nn.Module, generator: torch.Generator) -> None:
-    """Draw all weights from the generator: uniform in +-1/sqrt(inputs), torch's own range for Linear. The layers that
-    end a branch start at zero, so that a residual MLP starts as its linear skip."""
+    """Draw all weights from the generator: uniform in +-1/sqrt(inputs), torch's own range for Linear. Layers that end a
+    branch start at zero, so that a residual MLP starts as its linear skip."""
     for name, layer in module.named_modules():
         if isinstance(layer, nn.Linear):
             bound = 1.0 / math.sqrt(layer.in_features)

@@ -1,4 +1,4 @@
-"""Options of a training, all of them written into the card, and the device that it runs on."""
+"""Options of a training, which are written into its card, and the device that it runs on."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ _REPEATABLE = ("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
 class Options:
     """Sizes and lengths of a training. On one core the defaults take 23 minutes for 50,000 contacts.
 
-    latent_* : numbers a latent holds; of a mesh's, two are the place of the dent
+    latent_* : numbers in a latent; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
     components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
-    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make
-        simulated contacts better, not real recordings (docs/train.md)
-    parts_steps : batches of the network that tells two contacts apart, times `effort`: errors on presses kept apart
-        hardly fall after it
+    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make simulated contacts
+        better, not real recordings (docs/train.md)
+    parts_steps : batches, times `effort`, of the network that separates two contacts; more hardly lower its error on
+        held-out presses
     beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
-    astray : weight of a translated place's distance on the DIGIT from the true one, in cells, against the same loss
-    noise : counts, standard deviation of the reading; gain : share, standard deviation a channel (docs/sources.md)
-    unit : share of training samples that keep their sign and are read as a real unit is known, its rest found from
-        recordings that are in contact throughout: unit_gain, standard deviation of the logarithm of a channel's gain,
-        unit_offset, counts, of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
-    misfit : of samples read as a real unit is known and of rectified ones, share of the whole signal's size that each
-        channel is off by besides. The simulated contacts nearest to real slides leave .3 of it, .07 a channel
-        (commit d537259); 0.1 was chosen against 0.05 (docs/train.md)
-    rectified : share of training samples that lose their sign (assumed). Of these, and assumed but for the first:
-        rectified_gain, standard deviation of the logarithm of a channel's gain (0.5: what a real unit's gains differ
-        from the simulated ones by), rectified_offset, counts, of the tare before the fold, rectified_missing, share of
-        channels that read nothing
+    astray : weight of the distance, in cells, of a translated place on the DIGIT from the true one, against the same
+        loss
+    noise : counts, standard deviation of the reading; gain : relative standard deviation a channel (docs/sources.md)
+    unit : share of signed training samples with a real unit's uncertainty, whose rest is found from recordings in
+        contact throughout. unit_gain : standard deviation of the logarithm of a channel's gain; unit_offset : counts,
+        of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
+    misfit : error of each channel, as a share of the whole signal's size, in these samples and rectified ones. The
+        simulated contacts nearest to real slides leave .3 of the signal, .07 a channel (commit d537259); 0.1 was chosen
+        against 0.05 (docs/train.md)
+    rectified : share of training samples that lose their sign (assumed). Of these: rectified_gain, standard deviation
+        of the logarithm of a channel's gain (0.5: a real unit's against the simulated one); rectified_offset, counts,
+        of the tare before rectifying (assumed); rectified_missing, share of channels without reading (assumed)
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
-    mirrored : share of training samples that are mirrored, both sensors being even in z
-    without : names of indenters that are kept from the training; without_below_x : m, as much of the pad beyond x
-    left_out : stages that are not run; their networks stay as they were drawn
-    weight_decay : of AdamW; rectified_decay : of R2MPN (rectified signals are over-fitted else)
+    mirrored : share of mirrored training samples, as both sensors are symmetric in z
+    without : names of indenters left out of the training; without_below_x : m, contacts left out beyond this x of the
+        pad
+    left_out : stages that are not run; their networks keep their initial weights
+    weight_decay : of AdamW; rectified_decay : of R2MPN, which over-fits rectified signals otherwise
     rate : largest learning rate
-    checkpoint_seconds : least time between two checkpoints; does not change the result
-    """
+    checkpoint_seconds : least time between two checkpoints; does not change the result"""
 
     latent_signal: int = 16
     latent_biotac: int = 128
@@ -105,11 +105,11 @@ class Options:
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))
 
     def decay(self, net: str) -> float:
-        """Weight decay of a network."""
+        """Return the weight decay of a network."""
         return self.rectified_decay if net.startswith("R2MPN") else self.weight_decay
 
     def settings(self) -> dict[str, object]:
-        """Return all options that change the result, as JSON gives them back."""
+        """Return all options that change the result, as JSON reads them back."""
         settings = asdict(self) | {"without": list(self.without), "left_out": list(self.left_out)}
         settings.pop("checkpoint_seconds")
         return settings

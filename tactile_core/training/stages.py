@@ -53,7 +53,8 @@ class Model(nn.Module):
         return biotac, self.to_target(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) and contact's state (B, STATE) to latent_source, and the surprise (B,) at the state."""
+        """Map signal (B, 20) and the contact's state (B, STATE) to latent_source, and to -log density (B,) of that
+        state."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
@@ -64,7 +65,7 @@ class Model(nn.Module):
         return self.M2MPN(self.MVB.placed(latent_source))
 
     def to_target(self, state: Tensor, latent_source: Tensor) -> Tensor:
-        """Map a contact's state (B, STATE) and its latent_source to latent_target, whose place is the state's."""
+        """Map a contact's state (B, STATE) and its latent_source to latent_target at the state's place."""
         return torch.cat([state[:, :PLACE], self.across(latent_source)[:, PLACE:]], -1)
 
     def back(self, latent_target: Tensor) -> Tensor:
@@ -85,7 +86,7 @@ class Model(nn.Module):
         return self.error(torch.cat([latent, left, size, seen[:, -1:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20) to the latent of `direct_decoder`, bypassing the physical latents."""
+        """Map signal (B, 20) to the latent of `direct_decoder`, without the mesh latents."""
         return self.direct(compress(signal))
 
 
@@ -102,7 +103,7 @@ class Stage:
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the signal's reconstruction, as read, over its mean square, and KL."""
+    """Loss of the noisy signal's reconstruction over its mean square, and KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
     change = signal[:, :-1]
@@ -111,21 +112,20 @@ def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def mvb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the BioTac's reconstructed displacement, and KL."""
+    """Loss of the BioTac's reconstructed displacement, and KL."""
     latent, divergence = model.MVB.sample(batch.biotac, generator)
     return model.MVB.loss(latent, batch.rows) + options.beta * divergence
 
 
 def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the DIGIT's reconstructed displacement, and KL."""
+    """Loss of the DIGIT's reconstructed displacement, and KL."""
     latent, divergence = model.MVD.sample(batch.digit, generator)
     return model.MVD.loss(latent, batch.rows) + options.beta * divergence
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. By
-    likelihood alone a contact is never estimated fainter than it may be. SVB learns along: it keeps of a signal then
-    what separates contacts."""
+    """Negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. SVB is trained
+    along, to keep what separates contacts. (Likelihood alone gives no bias to fainter contacts.)"""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
     found, surprise = model.given(batch.signal, batch.state)
@@ -133,14 +133,14 @@ def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the map from the BioTac's latent to the DIGIT's, both means of frozen autoencoders."""
+    """Loss of the map from the BioTac's latent to the DIGIT's, both means of frozen autoencoders."""
     with torch.no_grad():
         biotac, target = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     return latent_loss(model.across(biotac), target)
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Compute the mean square errors of place and code, each over its mean square."""
+    """Mean square errors of place and code, each over its mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
@@ -150,13 +150,13 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 
 
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly.
+    """Loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly (docs/sources.md,
+    Networks).
 
-    docs/sources.md, Networks, has the number. Shapes are held against the truth where the contact truly is, places by
-    themselves: a dent beside its place would be paid for with being faint. The gel's place is the state's, which the
-    signal's surprise has learned. The autoencoders' own losses stay in at half, so that latents keep their meaning and
-    meshes can be encoded. What the signal says of the contact is learned before and stays as it is.
-    """
+    Shapes are compared at the contact's true place, and places separately: a dent beside its place would otherwise be
+    made fainter to reduce the error. The gel's place is the state's, trained by its likelihood before and fixed here.
+    The autoencoders' own losses stay in at half weight, so that latents keep their meaning and meshes can be
+    encoded."""
     biotac, _ = model.given(batch.signal, batch.state)
     digit, across = model.to_target(batch.state, biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
@@ -170,7 +170,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the force, from the BioTac's latent, a mesh's or estimated from signal and contact."""
+    """Loss of the force from the BioTac's latent, of a mesh or estimated from signal and contact."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
@@ -181,8 +181,8 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Compute the loss of the fluid's pressure, on the head's scale, from the signal as read with its sign. Relative
-    errors in its place biased uncertain pressures low: the estimates for slides were a sixth lower still."""
+    """Loss of the fluid's pressure, on the head's scale, from the noisy signal with its sign. (Relative errors in its
+    place biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
     signed = batch.signal[:, -1:] == 0
     error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return (signed * error.square()).sum() / signed.sum().clamp(min=1)
@@ -194,7 +194,7 @@ def length(vectors: Tensor) -> Tensor:
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of log largest node error: the mean absolute deviation, which is least at the median."""
+    """Mean absolute deviation of the log largest node error, whose minimum is the median."""
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)
@@ -209,7 +209,7 @@ def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
 
 
 def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of the way back: DIGIT mesh to BioTac mesh, BioTac mesh to the signal as read."""
+    """Loss of the reverse direction: DIGIT mesh to BioTac mesh, BioTac mesh to the noisy signal."""
     with torch.no_grad():
         biotac, digit = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     signed = batch.signal[:, -1:] == 0
@@ -224,7 +224,7 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
 
 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Compute the loss of one network from signal to DIGIT, which the chain must beat."""
+    """Loss of one network from signal to DIGIT, which the chain must beat."""
     found, decoder = model.directly(batch.signal), model.direct_decoder
     return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.signed)
 

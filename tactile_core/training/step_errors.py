@@ -23,7 +23,7 @@ Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number a contact; 
 
 @dataclass(frozen=True)
 class Bodies:
-    """The gel's surface, as the DIGIT's, and where the skin's nodes come to lie on its plane, (N, 2) m."""
+    """The gel's surface, and the unrolled places (N, 2) m of the skin's nodes on its plane."""
 
     digit: Lattice
     unrolled: np.ndarray
@@ -45,9 +45,8 @@ def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: 
     """Return the errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
-    (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); the other way ``D2B`` (DIGIT mesh to BioTac mesh), and
-    ``B2S``, ``D2S`` (meshes to signal). Metrics: see `mesh_columns`; ``baseline_*`` are those of no displacement.
-    """
+    (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
+    ``D2S`` (meshes to signal). Metrics: see `mesh_columns`; ``baseline_*`` are those of no displacement."""
     return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
 
 
@@ -109,8 +108,8 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Return the largest node errors, m, of signal to BioTac mesh and to DIGIT mesh, and what the error head expects.
-    ``x_m`` is that of the contact's middle on the gel; NaN where the answer moves no node by ``silent`` m."""
+    """Return the largest node errors, m, of signal to BioTac mesh and to DIGIT mesh, and the error head's estimates.
+    ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
@@ -176,7 +175,8 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """Make a row for each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
+    """Return a row for each metric over the contacts in these rows that press without sliding, averaged as
+    `in_bins`."""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []
@@ -190,7 +190,7 @@ def metric_rows(
 
 
 def is_median(name: str) -> bool:
-    """Return true if a metric is summarised by its median: distances of places and shares of forces and peaks."""
+    """Return true if a metric is summarised by its median: distances, and relative errors of forces and peaks."""
     return name.endswith(MEDIANS)
 
 
@@ -210,7 +210,7 @@ def metric_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and mask over ``rows`` of contacts with rows of their own: light, of each depth, deeper, sliding."""
+    """Yield name and mask over ``rows`` of subsets with rows of their own: light, of each depth, deeper, sliding."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -1,4 +1,4 @@
-"""Represent one sensor's displacements for training: in the nodes' own frames, in coefficients, with a loss."""
+"""One sensor's displacements for training: in the nodes' own frames, as coefficients, with a loss."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ SAME = 1e-4  # rad: angles closer than this are one
 
 
 def image_of_nodes(frame: ContactFrame) -> np.ndarray:
-    """Mirror image (n,) of each node; nodes behind the lattice (poles) are their own. Raises ValueError for a lattice
-    whose columns have no images."""
+    """Return each node's mirror image (n,); nodes behind the lattice (poles) are their own. Raises ValueError for a
+    lattice whose columns have no images."""
     columns, angle = np.arange(frame.columns), frame.turn[: frame.columns].astype(float)
     image = columns[::-1]
     if angle.any():  # columns stand round an axis, where the first is its own image if it lies behind
@@ -34,13 +34,13 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 @functools.cache
 def image_of_electrodes(sensor: str = SOURCE) -> np.ndarray:
-    """Mirror image (19,) of each electrode."""
+    """Return each electrode's mirror image (19,)."""
     at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 
 
 def across(vectors: np.ndarray) -> np.ndarray:
-    """Return the vectors (..., 3) as the mirror shows them; overwrites them."""
+    """Mirror vectors (..., 3) in z, in place; returns them."""
     vectors[..., Z] *= -1
     return vectors
 
@@ -58,14 +58,14 @@ Fields = Callable[[np.ndarray], Tensor]  # row numbers (B,) -> (B, size) in mill
 
 
 class SurfaceCodec:
-    """Displacements of one sensor, the frame that moves over them and their linear bases, in the host's memory.
+    """Displacements of one sensor, their moving frame and linear bases, in the host's memory.
 
     data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i mirrored
-    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of what ``wide`` leaves
+    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of the remainder after
+        ``wide``
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
-    total : (C,) m2, sum of squared displacements; moving : (C,) nodes that move, at least FEWEST
-    baseline : m, loss of no displacement, mean over training contacts
-    """
+    total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
+    baseline : m, loss of no displacement, mean over training contacts"""
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,
@@ -95,7 +95,7 @@ class SurfaceCodec:
         return self.data.shape[1]
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
-        """Displacements (B, n, 3) float32 of contacts, in whole units and in the nodes' own frames."""
+        """Displacements (B, n, 3) float32 of contacts, in ``unit`` m and in the nodes' own frames."""
         values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
@@ -114,7 +114,8 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """Input of the near basis: it fades toward the window's edge, where decoded gel would have a step."""
+        """Return the near basis's input, faded toward the window's edge, where decoded gel would otherwise have a
+        step."""
         fade = torch.from_numpy(self.frame.fade())
         return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
 
@@ -143,18 +144,18 @@ class SurfaceCodec:
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, of places (B, 2) from those of the contacts; silent ones have none."""
+        """Return the mean distance, in cells, of places (B, 2) from the contacts'; silent samples count 0."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute the mean of contacts' rms error over moving nodes, for (B, K + K') coefficients round cells (B, 2).
+        """Return the mean over contacts of the rms error over moving nodes, 1 for no displacement, of coefficients (B,
+        K + K') around cells (B, 2).
 
-        1 for no displacement. The root is taken contact by contact, as in the metric we report: deep contacts do not
-        drown shallow ones. The bases being orthonormal, an error in coefficients is one of nodes; what no coefficients
-        reach is added, and only the product of errors in both bases is left out (near fields hold next to nothing of
-        the wide ones, from which they are what is left).
-        """
+        The root is taken contact by contact, as in the reported metric, so that deep contacts do not dominate shallow
+        ones. The bases are orthonormal, so an error in coefficients is one of nodes; the part outside both bases is
+        added. Only the product of errors in both bases is neglected (near fields are nearly orthogonal to wide ones,
+        being their remainder)."""
         at, touched, device = np.maximum(rows, 0), touching(rows), modes.device
         with torch.no_grad():
             true = self._at_cells(at, cell) * touched
@@ -163,7 +164,8 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, in RAM."""
+        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, on the
+        host."""
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
@@ -175,7 +177,7 @@ class SurfaceCodec:
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
-        """Coefficients (B, K + K') m of contacts in windows round other cells (B, 2) than their own."""
+        """Coefficients (B, K + K') m of contacts in windows around cells (B, 2) other than their own."""
         metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
@@ -188,7 +190,7 @@ class SurfaceCodec:
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Displacements (C, n, 3) int16 in the nodes' own frames; where none is turned the (large) data themselves."""
+    """Rotate displacements (C, n, 3) int16 into the nodes' own frames; no copy where nothing rotates."""
     if not frame.turn.any():
         return data
     local = np.empty_like(data)
@@ -198,7 +200,7 @@ def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
 
 
 def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
-    """Values of all rows, a part at a time into one place: parts kept apart would leave memory in pieces."""
+    """Compute values of all rows in parts, written into one array: separate parts would fragment memory."""
     parts = _parts(len(rows))
     first = values(rows[parts[0]])
     found = first.new_empty(len(rows), *first.shape[1:])
@@ -218,8 +220,8 @@ def touching(rows: np.ndarray) -> Tensor:
 
 
 def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
-    """Return the orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size). Not centred:
-    no displacement has the coefficients zero. Rounded to float16, the dtype it is shipped in.
+    """Return orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size). They are not
+    centred, so that no displacement has zero coefficients, and rounded to float16, the shipped dtype.
     rows : contacts to use"""
     size = fields(rows[:1]).shape[1]
     modes = min(modes, len(rows), size)

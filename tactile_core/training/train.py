@@ -1,6 +1,7 @@
-"""Training from a pairs file to a weights folder, from top to bottom: data, model, stages, export, report. The same
-pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order, its noise
-and its posterior samples from generators seeded with (seed, stage, epoch), on one thread."""
+"""Training from a pairs file to a weights folder: data, model, stages, export, report.
+
+The same pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order,
+its noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread."""
 
 from __future__ import annotations
 
@@ -53,14 +54,13 @@ def train(
 ) -> dict:
     """Train the five networks and the force estimate; returns the card.
 
-    Writes out_folder/weights/<net>.safetensors and card.json (what `networks.load` reads), log.csv, loss.png; while it
-    runs, checkpoint.npz, from which the next call with the same arguments goes on.
+    Writes out_folder/weights/<net>.safetensors and card.json (for `networks.load`), log.csv, loss.png; meanwhile
+    checkpoint.npz, from which the next call with the same arguments continues.
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
     frame : sensor, half a window's cells -> the frame that moves over its surface
     device : of `options.DEVICES`; contacts stay in the host's memory, networks and batches go there
-    raises: TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used
-    """
+    Raises TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used."""
     options, out, where = options or Options(), Path(out_folder), device_of(device)
     pairs = read_pairs(pairs_path)
     split = without(split_presses(pairs.press, seed, pairs_path), pairs, options, pairs_path)
@@ -122,9 +122,10 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 
 @contextmanager
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
-    """Make the folder, for one training at a time; what ends with an error leaves none that is new and empty. Raises
-    TactileError if it cannot be made, is being written, or already holds weights: a checkpoint beside them is of a
-    training that was killed after it wrote them, and goes on."""
+    """Make the folder, for one training at a time; after an error a new folder that is empty is removed.
+
+    Raises TactileError if it cannot be made, is being written, or already holds weights. (Weights beside a checkpoint
+    are of a training that was killed after it wrote them, and can be continued.)"""
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
         (out / "weights").mkdir(parents=True, exist_ok=True)
@@ -145,7 +146,7 @@ def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
 
 @contextmanager
 def deterministic() -> Iterator[None]:
-    """Use one thread and deterministic algorithms inside, the caller's settings after."""
+    """Use one thread and deterministic algorithms inside the block."""
     threads, strict = torch.get_num_threads(), torch.are_deterministic_algorithms_enabled()
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
@@ -209,7 +210,7 @@ def share_done(options: Options, state: checkpoint.State) -> float:
 def epoch_losses(
     stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
 ) -> list[Callable[[], torch.Tensor]]:
-    """Return one function a step: called in order, each gives the loss of its batch."""
+    """Return one function a step; called in order, each returns the loss of its batch."""
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))

@@ -1,6 +1,7 @@
-"""Train the network that tells the signals of two contacts apart, on sums of two simulated ones. Contacts far apart
-bend the skin each for itself, so that the electrodes answer about as to the sum of both; the fluid, which both press,
-is left out. A sum has no first and second: the error is that of the better order."""
+"""Train the network that separates the signals of two contacts, on sums of two simulated ones.
+
+Contacts far apart bend the skin independently, so the electrodes respond about as to the sum of both (the fluid, which
+both press, is neglected). A sum has no first and second: the error is that of the better order."""
 
 from __future__ import annotations
 
@@ -43,7 +44,7 @@ def train_parts(
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Train on the split's training presses; returns tensors as `networks.py` names them.
-    rest : (e,) counts that changes are those of, of a sensor. The same arguments give the same numbers."""
+    rest : (e,) counts of the unit that changes are from. The same arguments give the same numbers."""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)
     initialise(network, generator)
@@ -69,7 +70,8 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the network's sizes: changes on two scales -> half the parts' difference, and how likely there are two."""
+    """Return the network's sizes: changes on two scales -> half the parts' difference, and the logit of two
+    contacts."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 
@@ -79,8 +81,8 @@ def network_input(change: Tensor) -> Tensor:
 
 
 def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -> Tensor:
-    """Compute the squared error of the parts of those that have two, and the cross entropy of whether there are two.
-    read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero where there is one"""
+    """Return the squared error of the parts in samples of two, and the cross entropy of their number.
+    read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero for one contact"""
     found, two = network(network_input(read)), second.abs().amax(-1) > 0
     half = found[:, :-1] * read.square().sum(-1, keepdim=True).sqrt() * PARTED
     parts = read / 2 + half, read / 2 - half
@@ -99,7 +101,7 @@ def _drawn(
     presses: Presses, rows: np.ndarray, options: Options, rest: np.ndarray, image: np.ndarray,
     random: np.random.Generator,
 ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
-    """Draw a batch, half of it sums of two contacts: as read, and the true changes of both."""
+    """Draw a batch, half of it sums of two contacts: the readings, and the true changes of both."""
     first, second = random.choice(rows, (2, TRIES * BATCH // 2))
     apart = np.linalg.norm(presses.place[first] - presses.place[second], axis=1)
     ratio = presses.force[first] / presses.force[second]

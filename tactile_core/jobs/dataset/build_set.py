@@ -42,8 +42,8 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclass(frozen=True)
 class Asked:
-    """Options of a data set. layouts : names of ``export.layouts``; place : executor of a job's tasks in its folder
-    say : told sentences; bar : (name, unit) -> context of a callback (done, in all)"""
+    """Options of a data set; layouts : names of ``export.layouts``; place : executor of tasks, by a job's folder
+    say : callback for sentences; bar : (name, unit) -> context of a callback (done, in all)"""
 
     layouts: Sequence[str]
     place: Callable[[Path], runs.Place]
@@ -94,7 +94,7 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
 
 
 def _check_out(out: Path) -> None:
-    """Raise TactileError where the result cannot be written, or would replace what no data set of ours is."""
+    """Raise TactileError where the result cannot be written, or would replace a folder that is no data set of ours."""
     with atomic.writing(out):
         atomic.probe(out)
     if not (out / REPORT).exists() and not (out / JOBS).is_dir():
@@ -104,7 +104,7 @@ def _check_out(out: Path) -> None:
 
 
 def _counted(recipe: Recipe, found: Collected) -> list[str]:
-    """Say what is in the parts, and what of the recipe fits none of the files."""
+    """Return sentences on the sizes of train and test, with a warning where nothing is held out."""
     splits = Counter(file.split for file in found.files)
     units = len(found.units())
     lines = [f"{len(found.files)} files of {units} units or hands: {splits[TRAIN]} train, {splits[TEST]} test"]
@@ -117,7 +117,7 @@ def _counted(recipe: Recipe, found: Collected) -> list[str]:
 def _translated(
     recipe: Recipe, unit: str, files: list[File], sensor: SensorFile | None, out: Path, asked: Asked
 ) -> Finished:
-    """Translate a unit's recordings as a job, or go on with it."""
+    """Translate a unit's recordings as a job, or resume it."""
     paths = [file.path for file in files]
     place = out / JOBS / (file_name(unit) or ALL)
     with runs.opened(place, None):
@@ -144,7 +144,7 @@ def _translated(
 def _joined(
     recipe: Recipe, parts: list[tuple[str, list[File], Finished]], aside: dict[str, str], out: Path
 ) -> Finished:
-    """Put the jobs of all units together as one, labelled; train comes before test."""
+    """Join the jobs of all units as one, labelled; train comes before test."""
     recordings: list[Recorded] = []
     warnings: dict[str, list[str]] = {}
     content = hashlib.sha256()
@@ -175,13 +175,14 @@ def _joined(
 
 
 def _labels(path: str, file: File) -> dict[str, str]:
-    """Labels of a recording from its file's name, and which finger of a hand it is."""
+    """Return a recording's labels, from its file's name, and the finger of a hand."""
     section = chosen(path).section
     return file.labels | ({} if section == "unit" else {"finger": section})
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
-    """Numbers measured beside a recording, a text a frame: force in N where its file is there, columns of its own."""
+    """Return numbers measured beside a recording, as one text a frame: force in N from its file, columns of its own
+    file."""
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():
@@ -197,7 +198,7 @@ def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
 
 
 def _export(source: Finished, layout: str, out: Path, asked: Asked) -> None:
-    """Write a layout, unless it is there of these recordings and labels; never over a folder of others."""
+    """Write a layout, unless `out` holds it, made from this job; it replaces only a folder of this layout."""
     try:
         held = json.loads(read_small(out / export.NOTE))
         if held["job"] == source.id:

@@ -1,4 +1,4 @@
-"""Recordings of a data set's folder, with the labels that their names hold and the part they are in."""
+"""Find the recordings in a data set's folder, with the labels in their names, and their part (train or test)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class File:
 
 @dataclass(frozen=True)
 class Collected:
-    """Files of a data set, sorted by path. others : how many fit no pattern; unfit : path -> why it is left out"""
+    """Files of a data set, sorted by path; others : number that fit no pattern; unfit : path -> why it is left out"""
 
     files: tuple[File, ...]
     others: int
@@ -43,7 +43,7 @@ class Collected:
 
 
 def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
-    """Find a data set's files in a folder, without links and `out`. Raises TactileError where nothing fits."""
+    """Find a data set's files in a folder, but for links and `out`. Raises TactileError where nothing fits."""
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]
@@ -84,7 +84,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:
-    """Compile a pattern of paths; it may lie at any depth, and a label holds no folder's border."""
+    """Compile a pattern of paths, at any depth; a label does not cross a folder."""
     parts = FIELD.split(pattern)
     text, held = re.escape(parts[0]), set()
     for field, after in zip(parts[1::2], parts[2::2], strict=True):
@@ -102,7 +102,7 @@ def _encodes(name: str) -> bool:
 
 
 def _split(recipe: Recipe, labels: dict[str, str]) -> str:
-    """Part that a recording is in; by a hash of the label's value where the recipe names none for testing."""
+    """Return a recording's part; without values named for testing, by a hash of the label's value."""
     if recipe.split.by not in labels:
         return TRAIN
     value = labels[recipe.split.by]
@@ -112,7 +112,7 @@ def _split(recipe: Recipe, labels: dict[str, str]) -> str:
 
 
 def beside(folder: Path, name: str, file: File) -> Path:
-    """Return the path of a file beside a recording, there or not. Raises TactileError for one outside the folder."""
+    """Return the path of a file beside a recording, existing or not. Raises TactileError for one outside the folder."""
     path = file.path.parent / filled(name, file.labels)
     if not path.resolve().is_relative_to(folder.resolve()):
         raise TactileError(path, "outside the data set's folder", "a file inside it")

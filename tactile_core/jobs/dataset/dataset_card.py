@@ -1,4 +1,4 @@
-"""The card of a data set (its sources, guesses, what survives, whose it is), and its page to look at."""
+"""The card of a data set (sources, estimates, how much of each label survives, licence), and its page."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def card_of(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
-    """Write the card as Markdown. rows : what survives, None where scikit-learn is missing."""
+    """Return the card as Markdown; rows : survival of labels, None without scikit-learn"""
     of = recipe.source
     sections = {
         f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
@@ -63,7 +63,7 @@ def card_of(
 
 
 def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
-    """Say first what a user must know before all else."""
+    """Yield the first lines of the card: what a user must know before all else."""
     notes = [_plain(note) for note in recipe.notes]
     guesses = _mean(summaries, lambda one: one.guesses, touched=True)
     if guesses > GUESSED:
@@ -74,12 +74,12 @@ def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterabl
 
 
 def _plain(text: str) -> str:
-    """Return a text of others as one line that Markdown does not read as its own."""
+    """Return a text from outside as one line that Markdown does not interpret."""
     return " ".join(text.split()).replace("<", "&lt;").replace("|", "/").replace("`", "'")
 
 
 def _verdict(task: str, by: dict[str, Row]) -> str:
-    """Say how much of a label survives: less than chance allows, less than in the electrodes, or all of it."""
+    """Describe how much of a label survives: no more than chance, less than in the electrodes, or all of it."""
     nulls = (RAW, survival.RANDOM, survival.ALWAYS)
     best = max((row for name, row in by.items() if name not in nulls), key=lambda row: row.right)
     source = max(by[RAW], by[survival.RANDOM], key=lambda row: row.right)
@@ -123,7 +123,7 @@ def _labels(summaries: list[Summary]) -> Iterable[str]:
 
 
 def _span(counts: Counter[str]) -> str:
-    """Say where the values of a label lie, of which all are numbers; "" for others."""
+    """Describe the range of a label whose values are all numbers; "" for others."""
     try:
         numbers = [float(text) for text in counts if text != "(none)"]
     except ValueError:
@@ -146,7 +146,7 @@ def _trust(summaries: list[Summary]) -> Iterable[str]:
 
 
 def _warnings(source: Finished) -> Iterable[str]:
-    """One warning of each kind, the commonest first; a kind is a sentence without its numbers and file."""
+    """Yield one warning of each kind, the commonest first; kinds ignore numbers and file names."""
     kinds: dict[str, list[str]] = {}
     for texts in source.warnings.values():
         for text in texts:
@@ -180,7 +180,7 @@ def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touche
 
 
 def page_of(recipe: Recipe, summaries: list[Summary], progress: Callable[[int, int], None]) -> str:
-    """Write the page: every recording as a strip of pictures, in one HTML file that needs nothing else."""
+    """Return the page: every recording as a strip of pictures, in one self-contained HTML file."""
     choices: dict[str, set[str]] = {}
     articles = []
     for number, one in enumerate(summaries, start=1):

@@ -1,4 +1,4 @@
-"""A recipe for a data set of one's own, guessed from the names of its files, with words on what to fill in."""
+"""Guess a recipe for one's own data set from the names of its files, with advice on what to fill in."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def write(out: Path, folder: Path) -> None:
 
 
 def _patterns(paths: list[str]) -> list[str]:
-    """Guess patterns, the commonest first: of names of one shape, the pieces that differ become labels."""
+    """Guess patterns, the commonest first: in names of the same shape, the parts that differ become labels."""
     alike: dict[tuple[str, ...], list[list[str]]] = {}
     for path in paths:
         stem, ending = os.path.splitext(path)
@@ -78,7 +78,7 @@ def _patterns(paths: list[str]) -> list[str]:
 
 
 def _pattern(names: list[list[str]]) -> str:
-    """Return the pattern of names that are cut into as many pieces each."""
+    """Return the pattern of names that are cut into equally many parts."""
     fields = (f"{{label{number}}}" for number in itertools.count(1))
     columns = list(zip(*names, strict=True))
     varied = [column for column in columns if len(set(column)) > 1]

@@ -1,4 +1,4 @@
-"""Recipe of a data set, one TOML file: which files of a folder are its recordings, of which units, and their labels."""
+"""Recipe of a data set, a TOML file: which files of a folder are recordings, of which units, with which labels."""
 
 from __future__ import annotations
 
@@ -33,10 +33,9 @@ class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Calibration of the units.
 
     by : label whose values are units; "" where all recordings are of one unit, or of one hand
-    found : adapt, rest, gains and film from all recordings of the unit; rest, its rest alone from the file `rest`;
-        none, each recording by itself
-    rest : file of the untouched finger, in which {label} stands for the label's value
-    """
+    found : "adapt" estimates rest, gains and film from all recordings of the unit; "rest" reads its rest from the file
+        `rest`; "none" treats each recording by itself
+    rest : file of the untouched finger, in which {label} stands for the label's value"""
 
     by: str = ""
     found: Literal["adapt", "rest", "none"] = "none"
@@ -53,12 +52,12 @@ class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def kept(self) -> str:
-        """Return the label whose values stay together where what survives is measured; "" for none."""
+        """Return the label whose values are held out together when survival is measured; "" for none."""
         return self.apart or self.by
 
 
 class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Origin of the data. licence : what is stated of it, and where."""
+    """Origin of the data; licence : as stated, and where."""
 
     title: str
     url: str = ""
@@ -69,14 +68,13 @@ class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Recipe of a data set.
 
-    files : paths of recordings below the folder, at any depth; {label} stands for any text, which becomes the label.
-        The first pattern that fits a file counts
+    files : patterns of paths below the folder, at any depth; {label} stands for any text, which becomes the label. The
+        first pattern that fits a file counts
     sensor : that made the recordings, biotac or biotac_sp
-    tasks : labels that a user of the set would learn to tell; force : file of newtons beside a recording, where it is
-        there; values : columns of numbers of the recordings' files, which become labels too
-    every : frames of which one is translated; snapshots : whether frames do not follow each other
-    notes : first lines of the card
-    """
+    tasks : labels to learn; values : columns of numbers of the recordings' files, which become labels too
+    force : file of newtons beside a recording, used where it exists
+    every : translate one of so many frames; snapshots : true where frames do not follow each other in time
+    notes : first lines of the card"""
 
     format: str
     source: Source
@@ -94,7 +92,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def columns(self) -> ColumnMap | None:
-        """Map of the files' columns, if they need one."""
+        """Return the map of the files' columns, if they need one."""
         return self.prepare.columns
 
 
@@ -149,7 +147,7 @@ def _check(recipe: Recipe, file: Path) -> None:
 
 
 def filled(name: str, labels: dict[str, str]) -> str:
-    """Put labels into a file's name. Raises TactileError for a label that the recording has not."""
+    """Put labels into a file's name. Raises TactileError for a label that the recording lacks."""
     for label in FIELD.findall(name):
         if label not in labels:
             raise TactileError(name, f"{{{label}}}, which is no label", ", ".join(labels) or "no label", ADVICE)

@@ -1,4 +1,4 @@
-"""The units of a data set: which of their files can be read, and the calibration found from these."""
+"""Find a data set's readable files, and calibrate its units from them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ UNFIT = re.compile(r"[^A-Za-z0-9_-]")  # of a unit's name in that of its files
 
 
 def file_name(unit: str) -> str:
-    """Name a unit's files: its name where that is plain, else with a hash that keeps it apart from others."""
+    """Name a unit's files: its own name if plain, else with a hash, which keeps names apart."""
     plain = UNFIT.sub("_", unit)[:60]
     return plain if plain == unit else f"{plain}-{hashlib.sha256(unit.encode()).hexdigest()[:8]}"
 
 
 def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, str]]:
-    """Return the files of the set's sensor, and path -> why others are none; to be adapted to, each is read whole."""
+    """Return the readable files of the set's sensor, and path -> why others are left out; each file is read whole if
+    the unit is adapted."""
     good, aside = [], {}
     for file in files:
         path = str(file.path)
@@ -54,9 +55,9 @@ def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, s
 def calibrated(
     recipe: Recipe, files: list[File], folder: Path, out: Path, weights: str | None, say: Callable[[str], None]
 ) -> SensorFile | None:
-    """Return the unit's calibration, found as the recipe says; None where each recording is read by itself.
-    out : file that keeps it; one of the same recordings, rest and recipe is taken as it is
-    Raises TactileError for a rest that is missing or not the same for all files, and where nothing is found."""
+    """Return the unit's calibration, found as the recipe says; None where each recording is treated by itself.
+    out : file that keeps it, reused for the same recordings, rest and recipe
+    Raises TactileError for a rest that is missing or differs between files, and where nothing is found."""
     how = recipe.unit
     if how.found == "none":
         return None

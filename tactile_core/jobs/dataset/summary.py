@@ -1,4 +1,4 @@
-"""What each recording of a data set shows in all: shares, typical values, and the numbers that labels are told by."""
+"""Summary of each recording of a data set: shares, typical values, and the features that classifiers of labels read."""
 
 from __future__ import annotations
 
@@ -22,14 +22,13 @@ ARRAYS = {RAW: ("electrodes",), NUMBERS: ("force", "contact_center", "pressure")
 
 @dataclass(frozen=True)
 class Summary:
-    """A recording in all.
+    """Summary of a recording.
 
-    touched, guesses : shares of its frames, of those touched; flagged : share of frames by flag
-    explained, confidence, force : medians over touched frames, force in N; NaN without contact
+    touched : share of its frames in contact; guesses : share of those; flagged : share of frames by flag
+    explained, confidence, force : medians over frames in contact, force in N; NaN without contact
     labels : label -> its text, "" where it changes within the recording
-    features : what -> (n, k) numbers of its n examples: a recording is one, by its changes since its first 0.1 s, or
-        each frame of snapshots; told : task -> (n,) labels of the examples
-    """
+    features : kind -> (n, k) numbers of n examples: the whole recording, by its changes since its first 0.1 s, or each
+        frame of snapshots; told : task -> (n,) labels of the examples"""
 
     recording: Recorded
     touched: float
@@ -43,7 +42,7 @@ class Summary:
     told: dict[str, np.ndarray] = field(default_factory=dict)
 
     def numbers(self) -> dict[str, Any]:
-        """Return what a report holds of it; None for what is not known."""
+        """Return its numbers for a report; None for unknown ones."""
         known = {"touched": self.touched, "guesses": self.guesses, "explained": self.explained,
                  "confidence": self.confidence, "force_n": self.force}  # fmt: skip
         rounded = {name: round(value, 4) if np.isfinite(value) else None for name, value in known.items()}
@@ -52,7 +51,7 @@ class Summary:
 
 
 def summarise(source: Finished, tasks: Sequence[str], progress: Callable[[int, int], None]) -> list[Summary]:
-    """Look through all recordings; tasks : labels that are to be told."""
+    """Summarise all recordings; tasks : labels to learn"""
     found = []
     for number, one in enumerate(source.recordings, start=1):
         found.append(_summary(one, tasks))
@@ -92,14 +91,14 @@ def _summary(one: Recorded, tasks: Sequence[str]) -> Summary:
 
 
 def _changes(values: np.ndarray, first: int) -> np.ndarray:
-    """Means of a recording's parts less that of its first frames, one after another."""
+    """Return the means of a recording's parts minus that of its first frames, concatenated."""
     parts = [part for part in np.array_split(values, PARTS) if len(part)]
     means = [parts[min(number, len(parts) - 1)].mean(axis=0) for number in range(PARTS)]
     return np.concatenate([mean - values[:first].mean(axis=0) for mean in means])
 
 
 def _squares(picture: np.ndarray) -> np.ndarray:
-    """Mean colours (SQUARES x 3,) of a picture's squares, 0 to 255."""
+    """Mean colours (SQUARES x 3,), 0 to 255, of a picture's squares."""
     down, across = (size // count for size, count in zip(picture.shape, SQUARES, strict=False))
     cut = picture[: down * SQUARES[0], : across * SQUARES[1]].astype(np.float32)
     return cut.reshape(SQUARES[0], down, SQUARES[1], across, 3).mean(axis=(1, 3)).ravel()

@@ -1,4 +1,4 @@
-"""What of a label survives the translation: the strongest classifier of one family on signals, numbers and pictures."""
+"""How much of a label survives the translation: the best support vector machine on signals, numbers and pictures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ MOST, FEWEST = 1000, 12  # examples of a task; with fewer nothing is shown (assu
 
 @dataclass(frozen=True)
 class Row:
-    """Share of examples told right. task : label; by : what it is told by; error : standard error; examples, classes"""
+    """Accuracy of a classifier; task : label; by : kind of features; error : standard error; examples, classes :
+    numbers"""
 
     task: str
     by: str
@@ -29,12 +30,12 @@ class Row:
     classes: int
 
     def numbers(self) -> dict[str, Any]:
-        """Return the row as a report holds it."""
+        """Return the row for a report."""
         return vars(self) | {"right": round(self.right, 4), "error": round(self.error, 4)}
 
 
 def installed() -> bool:
-    """Return whether scikit-learn is there and works."""
+    """Return true if scikit-learn is installed and works."""
     try:
         import sklearn.svm  # noqa: F401
     except ImportError:
@@ -43,8 +44,8 @@ def installed() -> bool:
 
 
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
-    """Tell a label by each kind of numbers, with whole groups of recordings left out.
-    apart : label whose values are left out together; without it single recordings (of snapshots, tenths of each)
+    """Classify a label by each kind of features, with whole groups of recordings held out.
+    apart : label whose values are held out together; "" holds out single recordings (of snapshots, tenths of each)
     Needs scikit-learn. Returns no row where the label has one value or too few examples."""
     told = [(one, one.told[task]) for one in summaries if task in one.told]
     labels = np.concatenate([texts for _, texts in told]) if told else np.array([])
@@ -69,7 +70,7 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
 
 
 def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
-    """Name (count,) the group of each example, which is left out with the others of it."""
+    """Name the group (count,) of each example, which is held out as a whole."""
     if apart in one.told:
         return one.told[apart]
     name = one.recording.name
@@ -78,7 +79,7 @@ def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
 
 
 def _right(values: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> float:
-    """Share of examples that a support vector machine tells right, its width and strictness chosen within training."""
+    """Accuracy of a support vector machine, its width and penalty chosen within the training examples."""
     from sklearn.model_selection import GridSearchCV, GroupKFold
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

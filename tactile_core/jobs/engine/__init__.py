@@ -1,12 +1,11 @@
-"""Process many recordings on many processes and machines: a job folder whose files are its only state.
+"""Process many recordings in many processes and machines: a job folder whose files are its only state.
 
-<job>/job.json                    what is to be made: inputs and their hashes, weights, options
+<job>/job.json                    what to make: inputs and their hashes, weights, options
 <job>/prepared/<recording>.h5     signals of one recording, ready for the networks; see ``prepared_signals``
 <job>/shards/<recording>-%06d.h5  translated frames, numbered within their recording; see ``translate_shards``
-<job>/aside/<task>.json           what could not be done, and why; the next run tries it again <job>/manifest.json
-all shards and their hashes, once the job is done
+<job>/aside/<task>.json           a task that failed, and why; the next run tries it again
+<job>/manifest.json               all shards and their hashes, once the job is done
 
-Each file appears whole or not at all and carries the hash of its content (``checksummed``), so whatever is killed,
-whoever runs it again makes only what is missing. A task says what to make, not by whom: ``tasks.run`` is called by
-local processes (``local``) and by Dask workers (``dask_cluster``), and gives the same bytes everywhere.
-"""
+Each file appears whole or not at all and carries the hash of its content (``checksummed``), so after any interruption
+another run makes only what is missing. A task says what to make, not by whom: ``tasks.run`` is called by local
+processes (``local``) and by Dask workers (``dask_cluster``), and gives the same bytes everywhere."""

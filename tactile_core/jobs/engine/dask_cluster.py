@@ -1,9 +1,8 @@
 """Dask workers on any machines that see the same job folder under the same path.
 
-Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. So a scheduler that is
-started here for a queue speaks TLS, with keys made for this run alone; ``tcp://`` to other machines has to be asked
-for. ``tls://`` takes the certificates that Dask's own settings ``distributed.comm.tls`` name.
-"""
+Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. So a scheduler started
+here for a queue speaks TLS, with keys made for this run alone; ``tcp://`` to other machines must be asked for.
+``tls://`` takes the certificates of Dask's own settings ``distributed.comm.tls``."""
 
 from __future__ import annotations
 
@@ -41,12 +40,12 @@ class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Cluster:
-    """A Dask scheduler's workers. address : its own, or a `QueueFile`'s; say : told when tasks wait for a worker"""
+    """A Dask scheduler's workers; address : its own, or a `QueueFile`'s; say : called when tasks wait for a worker"""
 
     def __init__(
         self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
     ) -> None:
-        """Raise TactileError for a bad address or file, and for other machines without TLS unless `insecure`."""
+        """Raises TactileError for a bad address or file, and for other machines without TLS unless `insecure`."""
         self._say, self._insecure = say, insecure
         if address.startswith(("tcp://", "ucx://")) and not _here(address):
             self._without_tls(address)
@@ -65,13 +64,13 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield the replies as they come, as long as `count` says that some are awaited."""
+        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
         while count():
             future = self._next()
             yield self._tasks.pop(future.key)[0], self._reply(future)
 
     def _next(self) -> Any:
-        """The next future that is done."""
+        """Return the next future that is done."""
         patience = PATIENCE
         while True:
             try:
@@ -98,7 +97,7 @@ class Cluster:
 
     @contextmanager
     def _answering(self) -> Iterator[None]:
-        """Turn what the library raises once its scheduler is gone, a dozen types, into a TactileError."""
+        """Turn the library's many errors after the loss of its scheduler into a TactileError."""
         try:
             yield
         except Exception as error:
@@ -116,7 +115,8 @@ class Cluster:
         return self
 
     def _started(self, stack: ExitStack) -> Any:
-        """A context manager of a queue's cluster: by TLS with keys of this run, in the job's folder until its end."""
+        """Return the context manager of a queue's cluster, with TLS keys of this run in the job's folder until its
+        end."""
         options = {"worker_extra_args": ["--no-dashboard"], **self._queue.options}
         options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0", **options.get("scheduler_options", {})}
         if self._insecure:
@@ -127,14 +127,14 @@ class Cluster:
         return _closing(_start(self._queue, options))
 
     def _without_tls(self, where: str) -> None:
-        """Warn of a scheduler without TLS. Raises TactileError where nobody has accepted that."""
+        """Warn of a scheduler without TLS. Raises TactileError unless that was accepted."""
         found = "no TLS: Dask's messages run code, and whoever reaches the scheduler or listens can send them"
         if not self._insecure:
             raise TactileError(where, found, "tls://", "In a network that is yours alone, add --insecure")
         self._say(f"warning: {where}: {found}")
 
     def _connected(self, place: Any) -> Any:
-        """A client of the scheduler. Raises TactileError where none answers."""
+        """Return a client of the scheduler. Raises TactileError where none answers."""
         from distributed import Client, Security
 
         for name in (
@@ -167,7 +167,8 @@ def _read(address: str) -> QueueFile:
 
 @contextmanager
 def _closing(cluster: Any) -> Iterator[Any]:
-    """Close it at the end. Its library asserts that each job has been closed; on a busy machine some are late."""
+    """Close the cluster at the end. The library asserts that each job has been closed, which may be late on a busy
+    machine."""
     try:
         yield cluster
     finally:
@@ -184,7 +185,7 @@ def _here(address: str) -> bool:
 
 
 def _one_time_keys() -> Any:
-    """Make a key and certificate that nobody else has. Raises TactileError where the library for it is missing."""
+    """Make a key and certificate for this run. Raises TactileError where the library for it is missing."""
     from distributed import Security
 
     try:
@@ -195,7 +196,7 @@ def _one_time_keys() -> Any:
 
 
 def _start(wanted: QueueFile, options: dict[str, Any]) -> Any:
-    """A cluster whose workers are jobs of a queue. Raises TactileError for options it does not know."""
+    """Return a cluster whose workers are jobs of a queue. Raises TactileError for unknown options."""
     import dask
     import dask_jobqueue
 
@@ -220,15 +221,14 @@ def wait() -> float:
 
 @functools.cache
 def loop() -> Any:
-    """Start a tornado loop that runs in a thread as long as this process. Dask starts one by itself, but gives up after
-    10 s whatever its settings are: too little on a machine that is very busy (seen). Raises TactileError where it does
-    not start."""
+    """Start a tornado loop in a thread that lasts as long as this process. (Dask's own gives up after 10 s whatever its
+    settings, too little on a very busy machine.) Raises TactileError where it does not start."""
     from tornado.ioloop import IOLoop
 
     began, found = threading.Event(), []
 
     async def run() -> None:
-        """Tell the loop, then keep it running for good."""
+        """Signal that the loop runs, then keep it running."""
         found.append(IOLoop.current())
         began.set()
         await asyncio.Event().wait()

@@ -1,4 +1,4 @@
-"""Inputs of a job with names and hashes: recordings that the user names (files, folders, globs, ``@list``), scenes."""
+"""Inputs of a job with names and hashes: scenes, and recordings by file, folder, glob or ``@list``."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wren
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Recording of a job. name : of its files, different for each; path : absolute; sha256, bytes : of its content"""
+    """Recording of a job; name : unique, of its files; path : absolute; sha256, bytes : of its content"""
 
     name: str
     path: str
@@ -42,8 +42,8 @@ class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def find(words: Sequence[str], out: Path) -> list[Path]:
-    """Return the recordings that `words` name, in that order, each once; files in the folder `out` are ignored. Raises
-    TactileError for a word that names nothing, and for a glob that would go through a folder again and again."""
+    """Return the recordings that `words` name, in that order, each once, without those in the folder `out`. Raises
+    TactileError for a word that names nothing, and for a glob that would visit a folder again and again."""
     own = out.resolve()
     within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
     found: dict[Path, None] = {}
@@ -58,7 +58,7 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
 
 
 def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield each path or glob, those of lists among them, and its source: "list.txt, line 3, " or nothing."""
+    """Yield each path or glob, also those in lists, and its source: "list.txt, line 3, " or ""."""
     for word in words:
         if word.startswith("@"):
             for number, line in _lines(Path(word[1:])):
@@ -68,7 +68,7 @@ def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
-    """Return the recordings of a path or glob. within : those in a folder."""
+    """Yield the recordings of a path or glob. within : lists those in a folder"""
     there = os.path.lexists(word) or not glob.has_magic(word)
     for path in [word] if there else _globbed(word):
         real = os.path.realpath(path)
@@ -79,7 +79,7 @@ def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
 
 
 def _globbed(word: str) -> list[str]:
-    """Expand a glob, sorted by name; one that may look into the same folders again and again is refused."""
+    """Expand a glob, sorted by name; refuse one that may visit the same folders again and again."""
     parts = word.replace(os.sep, "/").split("/")
     wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:
@@ -89,7 +89,7 @@ def _globbed(word: str) -> list[str]:
 
 
 def _lines(file: Path) -> list[tuple[int, str]]:
-    """Paths of a list file, one a line, and their lines; blank lines and those that begin with # are passed over."""
+    """Return the paths in a list file with their line numbers, without blank lines and those that begin with #."""
     try:
         text = read_small(file)
         if "\0" in text:
@@ -105,7 +105,7 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 
 
 def _of_folder(folder: Path) -> Iterator[Path]:
-    """Yield the recordings in a folder and below it, by name, without linked folders; warn of closed ones."""
+    """Yield the recordings in a folder and below it, by name, without linked folders; warn of unreadable ones."""
     if _is_bag(folder):
         yield folder
         return
@@ -124,7 +124,7 @@ def passed_over(error: OSError) -> None:
 
 
 def _is_bag(folder: Path) -> bool:
-    """Return true if a folder is a ROS 2 bag; one that may not be read is none."""
+    """Return true if a folder is a ROS 2 bag; false for one that may not be read."""
     return os.path.isfile(folder / MARK)
 
 
@@ -160,7 +160,7 @@ def content_hash(path: Path) -> tuple[str, int]:
 
 
 def check_unchanged(one: Input) -> None:
-    """Raise TactileError where an input's content is another than when the job was made."""
+    """Raise TactileError where an input's content has changed since the job was made."""
     if content_hash(Path(one.path)) != (one.sha256, one.bytes):
         found = "another content than when the job was made"
         raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")

@@ -1,4 +1,4 @@
-"""``job.json``: what a job is to make. It never changes after it is written; all else follows from it."""
+"""``job.json``: what a job makes. It never changes after it is written; all else follows from it."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, d
 
     @functools.cached_property  # every shard names it, and with 10,000 inputs it takes 10 ms
     def id(self) -> str:
-        """Hash of all that decides the shards; the same inputs elsewhere have the same."""
+        """Hash of all that decides the shards; equal for equal inputs elsewhere."""
         named = [[one.name, one.sha256] for one in self.inputs]
         content = json.dumps([named, msgspec.to_builtins(self.recipe)], sort_keys=True)
         return hashlib.sha256(content.encode()).hexdigest()
@@ -61,7 +61,7 @@ def write(folder: Path, job: Job) -> None:
 
 
 def check_empty(folder: Path, advice: str) -> None:
-    """Raise TactileError for a folder, without a job, that holds files of another program; hidden files are ignored."""
+    """Raise TactileError for a folder without a job that holds another program's files; hidden files are ignored."""
     others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if others:
         raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)
@@ -82,7 +82,7 @@ def read_to_run(folder: Path) -> Job:
 
 
 def read(folder: Path) -> Job:
-    """Read the job of a folder, of any version. Raises TactileError for none, or for one that is damaged."""
+    """Read the job of a folder. Raises TactileError for no job, and for one that is damaged or of another version."""
     file = folder / FILE
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job[Recipe])

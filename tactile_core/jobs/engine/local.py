@@ -1,4 +1,4 @@
-"""Processes on this machine: one thread here watches over each, and starts another when one dies."""
+"""Processes on this machine; a thread here supervises each, and starts another when one dies."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Start = Callable[[], "subprocess.Popen[str]"]
 
 class Local:
     """Pool of `workers` processes for the job in `folder`, each with one thread.
-    restart : tasks that one does before it is replaced; command : starts one, the folder's name is added"""
+    restart : number of tasks after which one is replaced; command : starts one, the folder's name is added"""
 
     def __init__(
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None
@@ -46,7 +46,7 @@ class Local:
         self._todo.put(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield the replies as they come, as long as `count` says that some are awaited."""
+        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
         while count():
             found = self._done.get()
             if isinstance(found, BaseException):
@@ -101,7 +101,7 @@ class Local:
 
 
 def _search_path() -> str:
-    """Search path on which a worker finds this package under its name, which is a long one inside Blender."""
+    """Return a search path on which a worker finds this package under its name, which is a long one in Blender."""
     root = Path(__file__).parents[__package__.count(".") + 1]
     return os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
 
@@ -116,7 +116,7 @@ class _Worker:
         self.cause = ""
 
     def ask(self, task: dict[str, Any]) -> dict[str, Any] | None:
-        """Send a task to a process and return its reply; None where the process died, `cause` says how."""
+        """Send a task to a process and return its reply; None where the process died, with the reason in `cause`."""
         if self._process is None:
             self._process, self._served = self._start(), 0
         line = ""
@@ -147,7 +147,7 @@ class _Worker:
 
 
 class InProcess:
-    """The place of a job that needs no other process."""
+    """Executor that does a job's tasks in this process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._todo = folder, deque[Task]()
@@ -157,7 +157,7 @@ class InProcess:
         self._todo.append(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield the replies as they come, as long as `count` says that some are awaited."""
+        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
         while count():
             task = self._todo.popleft()
             yield task, msgspec.convert(tasks.run(str(self._folder), msgspec.to_builtins(task)), Reply)

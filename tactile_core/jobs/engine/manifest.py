@@ -25,11 +25,9 @@ FORMAT = "tactile-batch-1"
 @dataclasses.dataclass
 class Status:
     """Progress of a job.
-
     recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
-    frames : of the prepared recordings; bytes : about those of their shards, 0 if not known
-    aside : task -> why it could not be done
-    """
+    frames : of the prepared recordings; bytes : estimate of their shards, 0 if unknown
+    aside : task -> why it could not be done"""
 
     recordings: int
     prepared: int = 0
@@ -46,7 +44,7 @@ class Status:
 
 
 def status(folder: Path, job: Job) -> Status:
-    """Return the progress of a job. Reads names and lengths, no content: `damaged` checks that."""
+    """Return the progress of a job, by names and lengths of files; `damaged` checks their content."""
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):
@@ -73,7 +71,7 @@ def _aside(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """List a job's files that are not as written, by its manifest also those missing. progress : (done, in all)"""
+    """List a job's files that are damaged, or missing by its manifest. progress : (done, in all)"""
     shards = [shard for recording in _read(folder) for shard in recording.shards]
     listed = {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
@@ -88,12 +86,12 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
 
 def warnings(folder: Path) -> dict[str, list[str]]:
-    """Return the warnings of each recording that has some, by the manifest."""
+    """Return each recording's warnings, by the manifest, without recordings that have none."""
     return {recording.name: recording.warnings for recording in _read(folder) if recording.warnings}
 
 
 def _read(folder: Path) -> list[_Recording]:
-    """Recordings of a manifest; none where there is no manifest, or one that cannot be read."""
+    """Return the manifest's recordings; none for a missing or unreadable manifest."""
     try:
         return msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest).recordings
     except (OSError, ValueError, RecursionError, TactileError):
@@ -145,7 +143,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # disk, quota, the system's li
 
 
 def refused(folder: Path, job: Job, error: OSError) -> TactileError:
-    """Return the error for what the system refused to write; a full disk or a removal is the job folder's affair."""
+    """Return the error for an OSError of writing; for a full disk or a removal it names the job folder."""
     if not jobs.exists(folder):
         return TactileError(folder, "was removed while the job ran", "the job's folder", "Begin it again")
     reason = error.strerror or str(error)
@@ -157,7 +155,7 @@ def refused(folder: Path, job: Job, error: OSError) -> TactileError:
 
 
 def _needed(folder: Path, job: Job) -> str:
-    """Say how much space is still needed: by the size of the shards made so far, or as their kind of job expects."""
+    """Describe how much space is still needed, by the size of the shards made so far or their kind's estimate."""
     state = status(folder, job)
     sizes = [file.stat().st_size for file in (folder / jobs.SHARDS).glob("*.h5")]
     left, unseen = state.shards - state.there, state.recordings - state.prepared

@@ -1,14 +1,13 @@
-"""Recipes, one struct a kind of job: everything that decides a shard's bytes besides the input itself.
+"""Recipes, one struct for each kind of job: all that decides a shard's bytes besides the input itself.
 
 Each kind is done by a module of ``jobs``, `MODULES`, which has
-``prepare_input(folder, job, index)``  does what an input needs before its shards; returns how many shards it has, as
-    far as is known, and whether anything was made
+``prepare_input(folder, job, index)``  prepares an input; returns the number of its shards, as far as known, and whether
+anything was made
 ``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
-``inspect_input(folder, job, index)``  what the files tell of an input, None before its first task was done
-``GROWS``  whether `prepare_input` is to be asked again when all its shards are there
+``inspect_input(folder, job, index)``  returns facts of an input, by its files; None before its first task was done
+``GROWS``  true if `prepare_input` is to be called again when all its shards are there
 
-Both doing functions raise TactileError for what cannot be done, OSError where the disk cannot be written.
-"""
+The first two raise TactileError for what cannot be done, OSError where the disk cannot be written."""
 
 from __future__ import annotations
 
@@ -59,9 +58,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
-    answer : which contact a frame is answered by; gel : the networks', or the contact solved on the target
-    source, target : the sensors; every : frames of the recording of which one is translated
-    """
+    answer : options of the estimated contact; gel : the networks' gel, or the contact solved on the target
+    source, target : the sensors; every : translate one of so many frames of the recording"""
 
     keep: list[str]
     weights: str
@@ -95,7 +93,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to one recording for each input, which has its own values; see ``jobs.simulate``.
-    seed : of the first; each has one more than that before it; values : name -> value, an input each
+    seed : of the first; each next one has one more; values : name -> values, one an input
     keep : words of ``scene_recording.outputs``"""
 
     seed: int
@@ -130,9 +128,9 @@ MODULES: dict[Any, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class InputFacts:
-    """Facts known of an input. shards : their number; frames : of a recording
-    warnings : reads those to report, which takes longer than the rest; TactileError where the input is damaged
-    bytes : about, of all its shards; 0 where that is not known before they are there"""
+    """Facts of an input; shards : their number; frames : of a recording
+    warnings : function that reads the warnings, which takes longer; TactileError where the input is damaged
+    bytes : estimate for all its shards; 0 where unknown before they exist"""
 
     shards: int
     frames: int = 0

@@ -1,4 +1,4 @@
-"""A job from beginning to end, wherever its tasks are done."""
+"""Run a job from beginning to end, with any executor."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Place(Protocol):
         """Submit a task; `results` gives its reply."""
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield the replies as they come, as long as `count` says that some are awaited."""
+        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
 
     def __enter__(self) -> Self: ...
 
@@ -38,7 +38,7 @@ class Place(Protocol):
 
 @dataclasses.dataclass
 class Outcome:
-    """Outcome of a run. made, kept : shards; aside : why, for each task that could not be done."""
+    """Outcome of a run; made, kept : numbers of shards; aside : why, for each task that could not be done."""
 
     made: int = 0
     kept: int = 0
@@ -47,7 +47,7 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder, making it if needed, and clear what killed runs left. Raises TactileError if taken."""
+    """Lock the job's folder, made if needed, and clear what killed runs left. Raises TactileError if it is locked."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,7 +69,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 
 def _unmake(folder: Path) -> None:
-    """Remove a folder that holds nothing but our locks and a job that never began, after that was refused."""
+    """Remove a folder that holds only our locks, and a job that was refused before it began."""
     with suppress(OSError):  # others have removed it already
         files = list(folder.iterdir())
         if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in files):
@@ -79,7 +79,7 @@ def _unmake(folder: Path) -> None:
 
 
 def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
-    """Clear what killed workers left; not in an array, whose other parts may be writing, nor where no job is."""
+    """Clear what killed workers left; not in an array, whose other parts may be writing, nor without a job."""
     if part is None and jobs.exists(folder):
         with atomic.writing(folder, "a job folder of ours that can be written", "Make it writable"):
             for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
@@ -97,7 +97,7 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
 
 
 def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
-    """Run like `run`; raises OSError."""
+    """Do `run`; raises OSError."""
     work = _Work(folder, job, part)
     with place:  # which may be refused: the folders say that the job has begun
         for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
@@ -128,7 +128,7 @@ class _Work:
         return self.known - self.finished
 
     def first_tasks(self) -> list[Task]:
-        """The recordings to prepare. A part of an array begins with its own: they are then there for the others."""
+        """Return the recordings to prepare; a part of an array begins with its own, for the others to use."""
         count = len(self._job.inputs)
         own = [index for index in range(count) if index % self._parts == self._part]
         others = [index for index in range(count) if index % self._parts != self._part]
@@ -158,7 +158,7 @@ class _Work:
         return follow
 
     def _shards(self, recording: int, count: int) -> list[Task]:
-        """List this part's shards among the first `count` of a recording that were not requested yet."""
+        """Return this part's shards among the first `count` of a recording that were not requested yet."""
         if self._grows:
             count = max(count, self._parts)  # each part makes one, from which it learns how many there are
         numbers = range(self._asked[recording], count)
@@ -170,13 +170,13 @@ class _Work:
 
 
 def folder_of(out: Path) -> Path:
-    """Return the folder of the job whose shards are put together into the one result `out`: <out>.parts."""
+    """Return <out>.parts, the folder of the job whose shards are merged into the single result `out`."""
     return out.with_name(out.name + ".parts")
 
 
 @contextlib.contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Lock the folder of a new job, or of the same begun before. Raises TactileError for another's."""
+    """Lock the folder of a new job, or of the same one begun before. Raises TactileError for another job's."""
     folder = folder_of(out)
     with opened(folder, None):
         if not jobs.exists(folder):
@@ -189,7 +189,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
-    """Write the job alone, for runners of `tactile batch --array`; its folder. Raises what `begun` raises."""
+    """Write only the job, for `tactile batch --array`; returns its folder. Raises as `begun` does."""
     with begun(Path(out), job) as folder:
         return folder
 
@@ -198,9 +198,9 @@ def write(out: str | os.PathLike, job: Job) -> Path:
 def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
-    """Do a whole job, yield its folder to be put together into `out`, and remove it once that is done.
-    place : where the tasks are done, from the folder. Raises TactileError for the first task that could not be done,
-    and what `begun` and `run` raise."""
+    """Do a whole job, yield its folder to be merged into `out`, and remove it after that.
+    place : executor, by the job's folder. Raises TactileError for the first task that failed, and as `begun` and `run`
+        do."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)
         for name, why in sorted(done.aside.items()):
@@ -210,7 +210,7 @@ def completed(
 
 
 def _remove(folder: Path) -> None:
-    """Remove the job's own files, the job last, and the folder where it is empty then."""
+    """Remove the job's own files, the job file last, and the folder if it is then empty."""
     for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
         shutil.rmtree(folder / name, ignore_errors=True)
     for file in (jobs.MANIFEST, jobs.FILE, lock.FILE):

@@ -1,5 +1,5 @@
-"""A process that does tasks of one job: JSON lines in, JSON lines out, and an end of input ends it. Started by
-``local``. It ends by itself when its client is killed, and leaves no half file."""
+"""A process that does tasks of one job: JSON lines in, JSON lines out, until its input ends. ``local`` starts it; it
+ends by itself when its client is killed, and leaves no partial file."""
 
 from __future__ import annotations
 

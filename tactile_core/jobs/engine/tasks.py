@@ -1,4 +1,4 @@
-"""The two kinds of work in a job, as small values that any process can be handed."""
+"""The two kinds of work in a job, as small values for any process."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Why a task cannot be done: the fields of a TactileError; `where` is empty if its input is not to blame."""
+    """Reason why a task failed: the fields of a TactileError; `where` is empty if its input is not to blame."""
 
     found: str
     where: str = ""
@@ -31,11 +31,11 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @classmethod
     def from_error(cls, error: TactileError) -> Failure:
-        """Return what an error says."""
+        """Return an error's fields."""
         return cls(error.found, error.where, error.expected, error.advice)
 
     def error(self, task: str) -> TactileError:
-        """Return it as an error; task : its name, where nothing else is to blame."""
+        """Return the error; task : its name, for an empty `where`"""
         return TactileError(self.where or task, self.found, self.expected, self.advice)
 
     def __str__(self) -> str:
@@ -43,9 +43,8 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Outcome of a task.
-    made : False where it was there already; shards : that follow, of an input's first task
-    failure : why it cannot be done; stop : no other task can be done either"""
+    """Outcome of a task. made : False where the result existed; shards : number that follow an input's first task
+    failure : why it failed; stop : true if every other task would fail, too"""
 
     made: bool = False
     shards: int = 0
@@ -54,15 +53,16 @@ class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def name(job: jobs.Job, task: Task) -> str:
-    """Name of the task in files and messages."""
+    """Return the task's name for files and messages."""
     recording = job.inputs[task.recording].name
     return recording if task.shard is None else f"{recording}-{task.shard:06d}"
 
 
 def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
-    """Do a task of the job in `folder`; both sides plain data, so that JSON and Dask carry them alike. Never raises
-    what the task's input or the disk brings about: the reply says it. From here on this process, which may be
-    anybody's, keeps linear algebra in one thread, as the bytes would else depend on who does the task."""
+    """Do a task of the job in `folder`; task and reply are plain data, for JSON and Dask alike.
+
+    Errors by the task's input or the disk are in the reply and never raised. Linear algebra stays in one thread from
+    here on, as the bytes would otherwise depend on the process."""
     _one_thread_once()
     reply = _run(Path(folder), msgspec.convert(task, Task))
     return msgspec.to_builtins(reply)
@@ -94,7 +94,7 @@ def _run(folder: Path, task: Task) -> Reply:
 
 
 def _stamp(folder: Path) -> tuple[int, int]:
-    """Stamp that distinguishes job files in the same place, for a worker that serves several jobs."""
+    """Return a stamp of the job file, for a worker that serves several jobs in one place."""
     try:
         found = (folder / jobs.FILE).stat()
     except OSError as error:

@@ -39,11 +39,9 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """Recording of a finished job. name : its name in the job; frames : their number; shards : its files, in order
-
-    labels : name -> (T,) object array of str; split : part of the data set that it is in
-    every : frames of the recording of which one is among these; pair : the sensor and the gel, which name some arrays
-    """
+    """Recording of a finished job; name : in the job; frames : their number; shards : its files, in order
+    labels : name -> (T,) object array of str; split : its part of the data set
+    every : one of so many frames was translated; pair : sensor and gel, which some arrays are named after"""
 
     name: str
     frames: int
@@ -54,7 +52,8 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield all arrays, or all but some, in blocks of frames, under a BioTac's and a DIGIT's names in any case."""
+        """Yield all arrays but those in `without`, in blocks of frames, always under the names of a BioTac and a
+        DIGIT."""
         import h5py
 
         for path in self.shards:
@@ -91,7 +90,7 @@ class Recorded:
 
 @dataclasses.dataclass(frozen=True)
 class Finished:
-    """A finished job. aside : recording or shard -> why it is missing; warnings : recording -> sentences"""
+    """A finished job; aside : recording or shard -> why it is missing; warnings : recording -> sentences"""
 
     folder: Path
     id: str
@@ -105,14 +104,14 @@ class Finished:
         return sum(one.frames for one in self.recordings)
 
     def check_kept(self, array: str, word: str) -> None:
-        """Raise TactileError where the job did not keep an array, as ``--keep`` word does."""
+        """Raise TactileError where the job did not keep an array, which ``--keep`` `word` keeps."""
         if array not in self.recordings[0].arrays():
             advice = f"Make the job with --keep {word}"
             raise TactileError(self.folder, f"holds no {array}", f"a job that kept {word}", advice)
 
 
 def load(folder: Path) -> Finished:
-    """Load the job of a folder. Raises TactileError where a shard is missing or not as a job of ours has it."""
+    """Load the job of a folder. Raises TactileError where a shard is missing or differs from the job."""
     job = jobs.read(folder)
     if not isinstance(job.recipe, Translate):
         raise TactileError(folder, "a job of another verb", "one of `tactile batch`", "Give the verb's command again")
@@ -142,7 +141,8 @@ def load(folder: Path) -> Finished:
 
 
 def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int) -> None:
-    """Raise TactileError for a shard that is damaged, another's, or has other arrays or rows than its job says."""
+    """Raise TactileError for a shard that is damaged or another job's, or has other arrays or rows than its job
+    says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
     rows = min(job.recipe.shard_frames, translate_shards.translated(frames, job) - number * job.recipe.shard_frames)
@@ -162,7 +162,7 @@ def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int
 
 
 def _check_alike(paths: list[Path]) -> None:
-    """Raise TactileError where an array's frames are not of one shape and type in all shards."""
+    """Raise TactileError where an array's frames differ in shape or type between shards."""
     first: dict[str, str] = {}
     for path in paths:
         for name, found in _kinds(path).items():

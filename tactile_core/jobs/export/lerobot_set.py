@@ -1,10 +1,9 @@
-"""What LeRobot's layouts 2.1 and 3.0 share: features, rows, statistics, and the pass over a job's recordings.
+"""Common part of LeRobot's layouts 2.1 and 3.0: features, rows, statistics, and the pass over a job's recordings.
 
 One recording is one episode. LeRobot trains on what a robot sees, its state, and the action asked of it. A touch has no
-command, so the state is the contact on the DIGIT, and the action the state of the next frame: what is learnt is the
-touch to come. Steps of time are even, as LeRobot demands; ``time`` is the recording's own clock. A number that is not
-known is 0, as training on NaN ends in NaN; ``contact`` tells a place from none.
-"""
+command, so the state is the contact on the DIGIT, and the action the next frame's state: a policy learns the touch to
+come. Time steps are even, as LeRobot requires; ``time`` is the recording's own clock. An unknown number is 0, as
+training on NaN ends in NaN; ``contact`` says whether a place is one."""
 
 from __future__ import annotations
 
@@ -43,7 +42,7 @@ PLAIN = {
 
 
 class Layout(Protocol):
-    """Where the files of a version lie. version : as info.json names it; picture : the type of pictures in it."""
+    """File layout of a version; version : as info.json names it; picture : type of its pictures"""
 
     version: str
     picture: Literal["image", "video"]
@@ -52,10 +51,10 @@ class Layout(Protocol):
         """Add rows of an episode."""
 
     def end_episode(self) -> dict[str, Any]:
-        """Close what holds one episode; returns what the list of episodes says of its place."""
+        """Close an episode's files; returns its place for the list of episodes."""
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Close all files and write all lists; returns what info.json says of the layout."""
+        """Close all files and write all lists; returns the layout's entries of info.json."""
 
 
 def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:
@@ -92,7 +91,7 @@ def write_set(source: Finished, folder: Path, progress: Callable[[int, int], Non
 
 
 def _splits(source: Finished) -> dict[str, str]:
-    """Return the episodes of each part of the data set, whose recordings lie together, as info.json has them."""
+    """Return each part's episodes, which lie together, as info.json has them."""
     first = 0
     found: dict[str, str] = {}
     for name, same in groupby(source.recordings, lambda one: one.split):
@@ -103,7 +102,7 @@ def _splits(source: Finished) -> dict[str, str]:
 
 
 def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
-    """Describe what every frame has."""
+    """Describe the columns of a frame."""
     arrays = source.recordings[0].arrays()
     shapes = {name: list(shape) or [1] for name, (shape, _) in arrays.items()} | {"contact": [1]}
     found: Features = {}
@@ -129,7 +128,7 @@ def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
 
 
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
-    """Yield columns of some rows of an episode; `start` is its first row in the whole data set."""
+    """Yield columns of some rows of an episode. start : its first row in the whole data set"""
     for block, following in _followed(one):
         frame = block["frame"].astype(np.int64) // one.every
         own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {
@@ -150,7 +149,7 @@ def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int
 
 
 def _followed(one: Recorded) -> Iterator[tuple[Rows, np.ndarray]]:
-    """Yield blocks of frames with their states, and the state that follows each block; after the last its own last."""
+    """Yield blocks of frames with their states and the state after each block; the last state follows itself."""
     held: Rows = {}
     for block in one.blocks():
         block["contact"] = np.isfinite(block["contact_center"]).all(axis=1)
@@ -167,7 +166,8 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _one_rate(source: Finished) -> int:
-    """Return the recordings' rate, whole frames a second. Raises TactileError for different ones, or below 1."""
+    """Return the recordings' common rate, whole frames a second. Raises TactileError for different rates, or below
+    1."""
     first = _rate(source.recordings[0])
     for one in source.recordings:
         rate = _rate(one)
@@ -186,7 +186,7 @@ def _rate(one: Recorded) -> float:
 
 
 def table(rows: dict[str, Any], features: Features) -> pa.Table:
-    """Return rows in Arrow's types, with the features as Hugging Face's datasets library reads them; without videos."""
+    """Return rows, without videos, in Arrow's types, with features for Hugging Face's datasets library."""
     import pyarrow as pa
 
     fields: list[Any] = []

@@ -1,4 +1,5 @@
-"""Statistics of episodes as LeRobot normalises by: of each feature's numbers, and of a picture's channels in 0..1."""
+"""Statistics of episodes for LeRobot's normalisation: of each feature's numbers, and of a picture's channels in
+0..1."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ LEVELS = 256  # of a picture's channel
 
 
 class EpisodeStats:
-    """Gathers an episode's rows: all numbers, and of its pictures how often each level occurs in each channel."""
+    """Collects an episode's rows: all numbers, and a histogram of the levels in each channel of its pictures."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, list[np.ndarray]] = defaultdict(list)
@@ -49,7 +50,7 @@ def _of_numbers(values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
-    """Statistics of channels of which `counts` (3, LEVELS) pixels have each level."""
+    """Statistics of channels given as histograms `counts` (3, LEVELS) of pixels."""
     levels, shares = np.linspace(0, 1, LEVELS), counts / counts.sum(axis=1, keepdims=True)
     mean = shares @ levels
     below = np.cumsum(counts, axis=1) / counts.sum(axis=1, keepdims=True)
@@ -61,7 +62,7 @@ def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
 
 
 def aggregate(episodes: list[Stats]) -> Stats:
-    """Return the statistics of all episodes together; quantiles are the episodes' means, as LeRobot's own are."""
+    """Return the statistics of all episodes together; quantiles are the episodes' means, as in LeRobot."""
     return {name: _together([episode[name] for episode in episodes]) for name in episodes[0]}
 
 
@@ -76,5 +77,5 @@ def _together(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def listed(stats: Stats) -> dict[str, dict[str, Any]]:
-    """Return the statistics as JSON holds them."""
+    """Return the statistics for JSON."""
     return {name: {key: value.tolist() for key, value in one.items()} for name, one in stats.items()}

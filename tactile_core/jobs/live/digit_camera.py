@@ -1,4 +1,4 @@
-"""The camera of a real DIGIT, or a video of it: its newest picture, upright as simulated ones are."""
+"""The camera of a real DIGIT, or a video: its newest picture, upright as simulated ones are."""
 
 from __future__ import annotations
 
@@ -15,12 +15,10 @@ _LONGEST_READ = 2.0  # s, waited at the end for a camera that hangs
 
 
 class DigitCamera:
-    """A DIGIT's camera, read in a thread of its own, so that one that is slow or vanishes holds nothing up.
-
+    """A DIGIT's camera, read in a thread of its own, so that a slow or vanished one blocks nothing.
     source : number of a camera (0 is /dev/video0), or a video file, which is played at its own rate
-    lost : whether no more pictures come
-    Raises TactileError for what cannot be opened, ModuleNotFoundError without the extra [camera].
-    """
+    lost : true once no more pictures come
+    Raises TactileError for a source that cannot be opened, ModuleNotFoundError without the extra [camera]."""
 
     def __init__(self, source: str) -> None:
         is_device = source.isdigit()

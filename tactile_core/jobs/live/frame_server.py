@@ -1,9 +1,8 @@
 """Frames for other programs on this machine: a ZeroMQ message each, to whoever listens.
 
-A message is one line of JSON and then the bytes of the arrays that it names, one after the other;
-docs/read_frames.py reads it. The publisher's half of ZeroMQ's protocol (ZMTP 3.0, rfc.zeromq.org/spec/23) is spoken
-here: the library's own publisher keeps whatever strangers subscribe to, without a bound, in the thread that sends.
-"""
+A message is one line of JSON and then the bytes of the arrays that it names, one after the other; docs/read_frames.py
+reads it. The publisher's half of ZeroMQ's protocol (ZMTP 3.0, rfc.zeromq.org/spec/23) is written here: the library's
+own publisher stores subscriptions of strangers without limit, in the thread that sends."""
 
 from __future__ import annotations
 
@@ -30,12 +29,12 @@ READY = b"\x04\x19\x05READY\x0bSocket-Type" + (3).to_bytes(4, "big") + b"PUB"
 
 
 class FrameServer:
-    """Publishes frames at a port of this machine: whether anybody reads them, and how fast, changes nothing here.
+    """Publisher of frames at a port of this machine, open to all its users; readers, fast or slow, do not affect the
+    view.
 
-    port : 0 for any free one. Every user of this machine can read them. Nothing that readers send is read: their
-    own libraries drop what they did not subscribe to. A slow reader misses frames.
-    Raises TactileError for a port that cannot be had.
-    """
+    port : 0 for any free one. Raises TactileError for a port that is not available.
+    Whatever readers send is ignored: their own libraries drop what they did not subscribe to. A slow reader misses
+    frames."""
 
     def __init__(self, port: int) -> None:
         try:
@@ -75,7 +74,7 @@ class FrameServer:
                     reader.close()
 
     def _feed(self, reader: socket.socket) -> None:
-        """Send a reader the newest message as often as there is a new one, until it goes or takes nothing."""
+        """Send a reader the newest message whenever there is a new one, until it leaves or blocks."""
         sent = self._sent
         with reader, suppress(OSError):
             reader.settimeout(PATIENCE)
@@ -92,9 +91,11 @@ class FrameServer:
 
 
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
-    """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row. Of the header: frame, its index;
-    force_n and confidence 0..1, null where they are not known; flags, bits of ``recordings.flags``; trust, what they
-    say in words; latency_s, from the newest row to the picture; arrays, a name, a type of numpy's and a shape each."""
+    """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
+
+    The header has frame, its index; force_n and confidence 0..1, null where unknown; flags, bits of
+    ``recordings.flags``; trust, the same in words; latency_s, from the newest row to the picture; arrays, each with a
+    name, a type of numpy's and a shape."""
     known = math.isfinite(shown.newtons + shown.confidence)  # JSON has no NaN
     header = {
         "format": FORMAT,

@@ -31,18 +31,17 @@ AGAIN = 25  # new frames after which they are looked at again
 
 
 class LiveSignals:
-    """The change against rest, frame by frame, of frames that are like the first ones, which are prepared together.
+    """Changes against rest, frame by frame, with rest and film from the first frames, which are prepared together.
 
-    Rest and film are those of the first quiet part; drift is not removed, nor glitches. The polarity is decided by the
-    first contacts, and as given, or "falls", until then.
+    Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
+    polarity; until then it is the given one, or "falls".
     rate : Hz; options : polarity, and tare, of the first LONGEST s
-    unit : gains and offsets to take off, and its rest, which is taken where the first window is not calm near it
+    unit : gains, offsets and rest; its rest counts where the first window is not calm near it
     sensor : whose counts they are
-    found : where the rest is from, in words, once it is known
-    polarity, evidence : "falls" or "rises", and what says so; sure : whether it stays
-    silent : whether the finger does not answer: its electrodes all read the same
-    Raises TactileError for a tare of other frames.
-    """
+    found : source of the rest, in words, once it is known
+    polarity, evidence : "falls" or "rises", and its evidence; sure : true once it is final
+    silent : true if the finger does not respond: its electrodes all read the same
+    Raises TactileError for a tare of other frames."""
 
     def __init__(
         self,
@@ -72,7 +71,7 @@ class LiveSignals:
         self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
 
     def learn(self, rows: Recording) -> bool:
-        """Look at new frames for rest, and for their polarity; returns true once rest is known."""
+        """Search new frames for rest and polarity; returns true once rest is known."""
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
         self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
@@ -82,7 +81,7 @@ class LiveSignals:
         return self._known is not None
 
     def _joined(self, rows: Recording) -> Recording:
-        """Join the frames so far, as many as are looked through, by what signals are prepared from."""
+        """Join the frames so far, up to a number, with the channels that preparation needs."""
         electrodes, pdc = rows.electrodes, rows.pdc
         if self._seen is not None:
             electrodes = np.concatenate([self._seen.electrodes, electrodes])[: self._most]
@@ -95,7 +94,7 @@ class LiveSignals:
         )  # fmt: skip
 
     def _look(self, seen: Recording) -> None:
-        """Prepare the frames so far: their rest is taken when it is first found, their polarity until it is sure."""
+        """Prepare the frames so far, and keep their first rest, and their polarity once it is sure."""
         self._next_look = len(seen) + AGAIN
         if self._known is None:
             unit = full_scale(seen.electrodes)
@@ -113,12 +112,12 @@ class LiveSignals:
 
     @property
     def held(self) -> bool:
-        """Return true if the last `STALE` rows are equal though noise should keep them apart: a driver stands still."""
+        """Return true if the last `STALE` rows are equal though noise should differ: the driver stands still."""
         return self._noisy and self.known.kind == "raw" and repeats(self._last)[0].sum() == STALE - 1
 
     @property
     def known(self) -> Signals:
-        """Return the first frames' signals, whose rest all have; raises ValueError before it is known."""
+        """Return the first frames' signals, whose rest counts for all; raises ValueError before it is known."""
         if self._known is None:
             raise ValueError("no rest is known yet")
         return self._known
@@ -152,7 +151,7 @@ class LiveSignals:
 
 
 def _source(signals: Signals) -> str:
-    """Say where the rest of signals is from."""
+    """Describe the source of the signals' rest."""
     doubts = [text for text in signals.warnings if reason_of(text) in REST]
     parts = ", ".join(f"{first}:{last}" for first, last in signals.report["quiet_parts"])
     if doubts or not parts:

@@ -28,11 +28,9 @@ REMEMBERED = 1000  # latencies whose quantiles are reported
 @dataclass(frozen=True, eq=False)
 class Shown:
     """Picture on display.
-
-    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : what both say of it
+    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : both in words
     picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
-    latency : s from rows to picture; work : s of them
-    """
+    latency : s from rows to picture; work : s of computation in it"""
 
     frame: int
     picture: np.ndarray
@@ -50,13 +48,13 @@ class Shown:
 
 
 class View:
-    """Translation of arriving rows to pictures: always of the newest; older ones that came meanwhile are skipped.
-    signals : what is known of rest and polarity; frames, passed : that came, and of them passed over"""
+    """Translates arriving rows to pictures: always the newest row; older ones that arrived meanwhile are skipped.
+    signals : rest and polarity so far; frames, passed : numbers of rows that arrived and that were skipped"""
 
     def __init__(
         self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None
     ) -> None:
-        """Take the recording's rate, Hz, and what `LiveSignals` takes."""
+        """Make a view of a recording of a rate, Hz; the other arguments are those of `LiveSignals`."""
         self.signals = LiveSignals(rate, options, unit, tools.translator.source)
         self._tools, self._rate = tools, rate
         self._track = ForwardTracker()
@@ -65,7 +63,7 @@ class View:
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
     def show(self, rows: Recording, came: float) -> Shown | None:
-        """Translate and draw the last row that came at `came` (time.perf_counter); None before rest is known."""
+        """Translate and draw the last of rows that arrived at `came` (time.perf_counter); None before rest is known."""
         began = time.thread_time()
         self.frames += len(rows)
         if not self.signals.learn(rows):
@@ -88,7 +86,7 @@ class View:
         return shown
 
     def _translation(self, signals: Signals) -> Translation:
-        """Translate the newest frame, with the help of those before it, without delay."""
+        """Translate the newest frame, tracked from those before it, without delay."""
         translator = self._tools.translator
         evidence, state = translator.encode(signals), None
         if translator.answer.follows:
@@ -107,7 +105,7 @@ class View:
 
 
 def _newest(recording: Recording) -> np.ndarray:
-    """Return the counts (19,) of the last whole row; NaN cells are filled from rows before, with 0 where none are."""
+    """Return the counts (19,) of the last whole row; NaN cells take earlier rows' values, or 0."""
     found = np.full(recording.electrodes.shape[1], np.nan)
     for row in recording.electrodes[::-1]:
         found = np.where(np.isfinite(found), found, row)

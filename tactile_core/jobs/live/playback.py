@@ -1,4 +1,4 @@
-"""Feed a view the rows of a recording that grows, or of a finished one at its own pace, and show what it draws."""
+"""Feed a view the rows of a growing recording, or of a finished one at its own pace, and show what it draws."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
-        """Follow a file, or ``path#1``, its finger 1; columns, sensor : as of `read`. Raises TactileError for none."""
+        """Follow a file, or ``path#1``, its finger 1. columns, sensor : as of `read`. Raises TactileError for a missing
+        file."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
@@ -43,8 +44,9 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """Return the rows that came since the last call; None where none did, or where too many are bad. Raises
-        TactileError for a file that became shorter or another one, for one that is no recording, for a row that names
+        """Return the rows since the last call; None where there are none, or where too many are bad.
+
+        Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row of
         another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN."""
         data = self._new_bytes()
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
@@ -90,7 +92,7 @@ class Growing:
 
 
 def _identity(found: os.stat_result) -> tuple[int, int]:
-    """Identity of a file that does not change while it grows."""
+    """Return what identifies a file while it grows."""
     return found.st_dev, found.st_ino
 
 
@@ -104,7 +106,8 @@ Say = Callable[[str], None]
 
 
 def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequence[Output], say: Say, tell: Say) -> None:
-    """Show until the rows end or an output does; say : takes a line of progress; tell : the summary at the end."""
+    """Show frames until the rows or an output end. say : called with lines of progress; tell : with the summary at the
+    end"""
     reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
         for rows, came in source:
@@ -136,7 +139,7 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
 
 def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield new rows of a growing file and their arrival time, s; None now and then while no row comes.
-    idle : s without a row after which it ends; None: never. Raises what `Growing.poll` raises."""
+    idle : s without a row after which it ends; None: never. Raises as `Growing.poll` does."""
     growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()
@@ -152,7 +155,7 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
 
 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
-    """Yield the rows of a finished recording at their times, one part in memory at a time; speed 0: without waiting."""
+    """Yield the rows of a finished recording at their times, one part in memory at a time; speed 0 does not wait."""
     began = time.perf_counter()
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated

@@ -1,4 +1,4 @@
-"""A unit under test: pictures of balls pressed into it, and their change with single numbers."""
+"""Pictures of balls pressed into a unit, and their derivatives by single numbers."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors d
 
 
 class BallPictures(abc.ABC):
-    """Gel and camera of one calibration under a ball; what makes the light is the subclass's. Raises TactileError for a
-    camera that sees past the gel's window."""
+    """Gel and camera of one calibration under a ball; subclasses compute the light. Raises TactileError for a camera
+    that sees past the gel."""
 
     def __init__(self, calibration: Calibration) -> None:
         check_covered(calibration.camera.surface, calibration.camera)
@@ -56,14 +56,15 @@ class BallPictures(abc.ABC):
 
     @abc.abstractmethod
     def _changed(self, heights: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """The change (3, H, W) of each LED's light on gel of heights (H, W) m, seen at other ones, not spread."""
+        """Return the change (3, H, W) of each LED's light on heights (H, W) m; seen : (H, W) m, heights that the pixels
+        see. Light is not yet spread by the coating."""
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
         return print_on(self.rest, self.right, self.down, ball, self.thickness)
 
     def deepest(self, radius: float) -> float:
-        """Return the depth, m, to which prints of a ball of a radius, m, are known on this gel."""
+        """Return the depth, m, up to which prints of a ball of a radius, m, are tabulated for this gel."""
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
@@ -71,11 +72,11 @@ class BallPictures(abc.ABC):
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (H, W, 3) of the picture by a press, grey levels."""
+        """Return the change (H, W, 3) of the picture by a press, grey levels. ball : as ``lights`` has it"""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the light (H, W, 3), grey levels, of a ball that shows as much of it as a coating that faces LEDs."""
+        """Return the light (H, W, 3), grey levels, of a ball that is as bright as a coating that faces the LEDs."""
         share = contact_share(self._view(self.heights(ball)) - self._view.start)
         return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
 
@@ -96,12 +97,12 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """Return the whole factor by which pictures are made smaller for a fit."""
+    """Return the whole factor by which a fit reduces pictures."""
     return whole_factor(width, height, WORKING_WIDTH)
 
 
 def whole_factor(width: int, height: int, side: int) -> int:
-    """Return the largest whole factor by which pictures can be made smaller and keep a short side of ``side`` px."""
+    """Return the largest whole factor by which pictures can be reduced to a short side of at least ``side`` px."""
     wanted = max(min(width, height) // side, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 
@@ -114,7 +115,7 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return what draws units' balls by a preset; raises TactileError for one of Mitsuba's where LLVM is missing."""
+    """Return the class that draws balls by a preset; raises TactileError for one of Mitsuba's where LLVM is missing."""
     if preset == FAST:
         return FastPictures
     if trouble := missing_mitsuba():
@@ -123,7 +124,7 @@ def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
 
 
 def missing_mitsuba() -> str:
-    """Describe why pictures cannot be Mitsuba's own; "" where they can."""
+    """Describe why Mitsuba cannot draw pictures; "" where it can."""
     try:
         import mitsuba  # noqa: F401
     except ModuleNotFoundError:
@@ -132,18 +133,18 @@ def missing_mitsuba() -> str:
 
 
 class MitsubaPictures:
-    """Render units one after the other by one scene, which LLVM compiles once."""
+    """Render units one after the other in one scene, which LLVM compiles once."""
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset
         self._light: GelLight | None = None
 
     def __call__(self, calibration: Calibration) -> BallPictures:
-        """The pictures of a unit; LEDs must shine and the coating scatter."""
+        """Return the pictures of a unit; LEDs must shine and the coating scatter."""
         return _OfUnit(calibration, self)
 
     def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3), levels, of heights (H, W) m of a unit's gel."""
+        """Return the radiance (H, W, 3), levels, of a unit's gel at heights (H, W) m."""
         if self._light is None:
             self._light = GelLight(unit, self.preset, heights, 0)
         elif self._light.unit is not unit:
@@ -166,5 +167,5 @@ class _OfUnit(BallPictures):
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:
-    """Return a preset for pictures smaller by a factor: the bounce on as many places of the gel, or half as many."""
+    """Return a preset for pictures reduced by a factor: one bounce at as many places of the gel, or half as many."""
     return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

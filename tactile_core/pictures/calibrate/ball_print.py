@@ -1,10 +1,9 @@
 """The gel under a pressed ball: not a sphere cut out, but a print with the shoulder of a bonded layer around it.
 
-The rise of the gel comes from the project's own mechanics: the axisymmetric finite-strain solver, balls of a few sizes
-on a disc of the DIGIT's thickness and half-width, frictionless, tabulated over depth (``make_ball_print.py``). On
-another layer all lengths scale with its thickness; a ball between two of the table has a print between theirs. One that
-is larger than all scales the largest's lengths, which leaves out that the layer is then relatively thinner.
-"""
+The rise of the gel comes from the project's axisymmetric finite-strain solver: balls of a few sizes on a disc of the
+DIGIT's thickness and half-width, frictionless, tabulated over depth (``make_ball_print.py``). On another layer all
+lengths scale with its thickness; a ball between two of the table has a print between theirs. A ball larger than all
+scales the largest one's lengths, which neglects that the layer is then relatively thinner."""
 
 from __future__ import annotations
 
@@ -52,12 +51,12 @@ def print_on(
     ball: tuple[float, float, float, float],
     thickness: float = LAYER,
 ) -> np.ndarray:
-    """Return the heights (H, W) float32, m, of gel at rest (H, W) m under a ball; right, down : (H, W) m, image frame.
+    """Return the heights (H, W) float32, m, of a gel under a ball.
 
-    ball : right, down of its centre, depth from first touch, radius, m; thickness : m, of the gel
+    rest : (H, W) m, heights before; right, down : (H, W) m, image frame; thickness : m, of the gel
+    ball : right, down of its centre, depth from first touch, radius, m
     The dome changes the gap g between ball and gel. The print is that of the flat layer at the radius where the flat
-    gap is g: inside the contact the gel then lies on the sphere exactly.
-    """
+    gap is g: inside the contact the gel then lies on the sphere exactly."""
     at_right, at_down, depth, radius = ball
     gap = _profile(np.hypot(right - at_right, down - at_down), radius) + rest
     gap -= gap.min()
@@ -67,14 +66,14 @@ def print_on(
 
 
 def deepest(radius: float, thickness: float = LAYER) -> float:
-    """Return the depth, m, to which the print of a ball of a radius, m, is known on a gel of a thickness, m."""
+    """Return the depth, m, up to which the print of a ball of a radius, m, is tabulated for a gel of a thickness, m."""
     return sum(
         share * radius / table.radius * float(table.depths[-1]) for table, share in _tables_near(radius, thickness)
     )
 
 
 def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
-    """Tables of the balls next in size to one on a layer, and how much each counts: linear in the logarithm of size."""
+    """Return the tables of the balls next in size to one on a layer, with weights: linear in the logarithm of size."""
     tables = _tables()
     sizes = np.log([table.radius for table in tables])
     place = np.interp(np.log(radius * (LAYER / thickness)), sizes, np.arange(len(tables)))
@@ -84,7 +83,7 @@ def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
 
 
 def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
-    """Height of the ball's lower side over its lowest point."""
+    """Height, m, of the ball's underside over its lowest point, at distances, m, from the axis."""
     edge = SPHERE_TO * radius
     inner = np.minimum(distance, edge)
     fall = np.sqrt(radius**2 - inner**2)
@@ -92,7 +91,7 @@ def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
-    """Invert ``_profile``: the distance, m, from the axis where the ball is ``gap`` m above its lowest point."""
+    """Invert ``_profile``: the distance, m, from the axis at which the ball is ``gap`` m above its lowest point."""
     edge = SPHERE_TO * radius
     fall = np.sqrt(radius**2 - edge**2)
     inner = np.minimum(gap, radius - fall)
@@ -101,7 +100,7 @@ def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
 
 @functools.cache
 def _tables() -> tuple[_Table, ...]:
-    """Prints of all balls that were tabulated, the smallest first."""
+    """Return the prints of all tabulated balls, the smallest first."""
     with np.load(TABLE, allow_pickle=False) as table:
         step = float(table["step"])
         found = [(float(radius), table[f"depth_{k}"], table[f"rise_{k}"]) for k, radius in enumerate(table["radius"])]

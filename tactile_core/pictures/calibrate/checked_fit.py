@@ -1,4 +1,4 @@
-"""Fit a unit as ``tactile calibrate`` does: photographs that lie right, a trial on held-out presses, the fit on all."""
+"""Fit a unit as ``tactile calibrate`` does: check orientation, evaluate on held-out presses, fit on all."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CLEARLY = 0.8  # of what one way leaves, that another may leave and be no better
 
 
 class Way(NamedTuple):
-    """Change of a picture: transposed, then rows and columns reversed, and red exchanged with blue."""
+    """Transformation of a picture: transposed, then rows and columns reversed, and red exchanged with blue."""
 
     transposed: bool
     rows: bool
@@ -46,7 +46,7 @@ class Way(NamedTuple):
     colours: bool
 
     def applied_to(self, picture: np.ndarray) -> np.ndarray:
-        """Return a picture (h, w, 3) or mask (h, w) that is changed so."""
+        """Return a picture (h, w, 3) or mask (h, w) after this transformation."""
         changed = picture.swapaxes(0, 1) if self.transposed else picture
         changed = changed[:: -1 if self.rows else 1, :: -1 if self.columns else 1]
         return changed[..., ::-1] if self.colours and changed.ndim == 3 else changed
@@ -65,13 +65,13 @@ def check_orientation(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Raise TactileError, with each way's share, for photographs that another way explains clearly better.
+    """Raise TactileError, with each way's share, for photographs that another orientation or order of colours explains
+    clearly better.
 
     ball_diameter : m; progress : called with (ways tried, in all)
-    Of 8 orientations and 2 orders of colours those are tried that give pictures of the camera's shape. Ways that
-    explain the presses about as well, as where lights stand opposite, are told apart by the untouched gel, which is
-    compared with the start's and with that of the unit that ships, since a start of round numbers hardly knows it.
-    """
+    Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Ways that
+    explain the presses about as well (as where lights stand opposite) are decided by the untouched gel, compared with
+    that of the start and of the unit that ships, since a start of round numbers hardly knows it."""
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
     height, width = photographs.shape
     factor = whole_factor(width, height, COARSE_SIDE)
@@ -98,14 +98,14 @@ def check_orientation(
 
 
 def _changed(press: Press, way: Way) -> Press:
-    """Return the press that a changed photograph shows."""
+    """Return the press as the transformed photograph shows it."""
     picture, drift, change = way.applied_to(press.picture), way.applied_to(press.drift), way.applied_to(press.change)
     touched, region = way.applied_to(press.touched), way.applied_to(press.region)
     return dataclasses.replace(press, picture=picture, drift=drift, change=change, touched=touched, region=region)
 
 
 def _best(left: dict[Way, float], apart: dict[Way, float]) -> Way:
-    """Way that leaves least; of those that leave hardly more, one whose untouched gel is clearly nearer."""
+    """Return the way with the least residual; of those within CLEARLY, one whose untouched gel is clearly nearer."""
     best = min(left, key=left.__getitem__)
     near = [way for way in left if CLEARLY * left[way] <= left[best]]
     nearest = min(near, key=apart.__getitem__)
@@ -114,7 +114,7 @@ def _best(left: dict[Way, float], apart: dict[Way, float]) -> Way:
 
 
 def _resting(unit: Calibration) -> list[np.ndarray]:
-    """Pictures (h, w, 3) of the untouched gel in a unit's pixels: its own, and the one of the unit that ships."""
+    """Return pictures (h, w, 3) of the untouched gel in a unit's pixels: the unit's own and the shipped unit's."""
     known = [unit]
     with contextlib.suppress(TactileError):  # a sensor without a calibration, or of another aspect ratio
         known.append(load_calibration(None, unit.camera.sensor).at_size(unit.camera.width, unit.camera.height))
@@ -122,7 +122,7 @@ def _resting(unit: Calibration) -> list[np.ndarray]:
 
 
 def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int]) -> dict[bool, Calibration]:
-    """Calibrations in the pixels of pictures (h, w) as they are, and transposed, where the camera has that shape."""
+    """Return calibrations in the pixels of pictures (h, w), as they are and transposed, if of the camera's shape."""
     units = {}
     for transposed, (height, width) in ((False, shape), (True, shape[::-1])):
         try:
@@ -151,9 +151,9 @@ def fit_unit(
     reflectance: float | None = None,
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
-    """Fit a unit, as ``fit.calibrate``, and evaluate what fits of the other thirds make of each press.
+    """Fit a unit, as ``fit.calibrate``, and evaluate each press by a fit to the other thirds of the presses.
     reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
-    Raises TactileError for photographs that lie another way, and what ``fit.calibrate`` raises."""
+    Raises TactileError for photographs in another orientation, and as ``fit.calibrate`` does."""
 
     def part(first: int, last: int) -> Progress:
         return lambda done, total: progress(first + (last - first) * done // total, 100)
@@ -174,7 +174,7 @@ def cross_validated(
     quick: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate each press with a calibration of the others, by thirds; none for a single press. ball_diameter : m."""
+    """Evaluate each press by a calibration on the others, in thirds; none for a single press. ball_diameter : m"""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []
@@ -183,7 +183,7 @@ def cross_validated(
         others = chosen(photographs, [name for name in names if name not in apart])
 
         def step(done: int, total: int, before: int = fold) -> None:
-            """Report the progress of one fold as that of all."""
+            """Convert the progress of one fold to that of all."""
             progress(before * total + done, folds * total)
 
         done = calibrate(others, ball_diameter, start, unit="others", quick=quick, progress=step).calibration
@@ -192,7 +192,7 @@ def cross_validated(
 
 
 def check_worth(tried: list[Evaluation]) -> None:
-    """Raise TactileError for a calibration that explains its presses no better than the background."""
+    """Raise TactileError for a calibration that explains its presses no better than the background does."""
     ours, baseline = mean_metrics(tried)
     if not ours["roi_l1"] <= WORTH * baseline["roi_l1"]:
         found = (

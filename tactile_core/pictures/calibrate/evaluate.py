@@ -1,5 +1,5 @@
 """Evaluate a calibration on photographs: fit place and depth of each press, compare the picture with the photograph.
-The baseline stands beside each metric: the background alone, as if nothing had touched the gel."""
+The baseline beside each metric is the background alone, as if nothing had touched the gel."""
 
 from __future__ import annotations
 
@@ -35,9 +35,8 @@ class Evaluation:
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
-    through : light of this photograph's ball through the coating, a share of the coating's own. Metrics of that name
-        are of a picture with the light that the set's other photographs show; all others have the calibration's.
-    """
+    through : light of this photograph's ball through the coating, as a share of the coating's own. Metrics named after
+        it use the light that the set's other photographs show; all others use the calibration's"""
 
     press: Press
     ball: Ball
@@ -58,8 +57,8 @@ def evaluate_unit(
     pictures: Callable[[Calibration], BallPictures] = FastPictures,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate a calibration on each press of the photographs; radius : m, of the balls that name none.
-    pictures : what makes a unit's; places and depths are found by the fast ones
+    """Evaluate a calibration on each press of the photographs. radius : m, of balls for which none is given
+    pictures : class that draws the compared pictures; places and depths are found with the fast ones
     Raises TactileError for photographs of another shape than the calibration's pictures."""
     unit = fitted_size(calibration, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
@@ -116,14 +115,15 @@ def _try_press(
 
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; the baseline knows how light drifted as well."""
+    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; drift of light is added to it and the
+    baseline."""
     untouched = background + press.drift
     picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
-    """Describe what is wrong with a photograph; as the ball's place is known by now, also whether the edge cuts it."""
+    """Return flags of a photograph in words, with whether the picture's edge cuts the fitted ball."""
     camera = bench.camera
     contact = contact_radius(ball.depth, ball.radius)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]
@@ -132,7 +132,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the means over presses of the metrics and of the baseline's; NaN ones left out, NaN where all are."""
+    """Return the means over presses of the metrics and of the baseline's, without NaN; NaN where all are."""
     means = []
     for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]
@@ -151,7 +151,7 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 
 def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
-    """Make a row a metric, means over presses, and a row a metric and press, with where each ball was found.
+    """Return rows of all metrics as means over presses, and rows of each press, with where its ball was found.
     name : of the set of photographs"""
     ours, baseline = mean_metrics(tried)
     means, by_press = [], []
@@ -171,7 +171,7 @@ def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
 
 
 def sheet(tried: list[Evaluation]) -> bytes:
-    """Draw each press's photograph, render and difference (twice, on grey) as a PNG; equal input, equal bytes."""
+    """Draw each press's photograph, render and difference (doubled, on grey) as a PNG; equal input, equal bytes."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

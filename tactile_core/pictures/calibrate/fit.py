@@ -1,5 +1,5 @@
-"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton's method. On the fast picture first,
-then on Mitsuba's own, which has the light of one bounce too."""
+"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton: on the fast picture first, then on
+Mitsuba's, which adds the light of one bounce."""
 
 from __future__ import annotations
 
@@ -59,13 +59,12 @@ def calibrate(
     reflectance: float | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Calibrated:
-    """Fit camera, dome, coating, lights and gain of a unit from a start's; ball_diameter : m; unit : its name.
+    """Fit camera, dome, coating, lights and gain of a unit, from a start. ball_diameter : m; unit : its name
 
-    reflectance : of the ball, above 0 to 1; the coating's transmission then is fitted. None: it is the start's, and the
-        ball's reflectance is fitted: photographs of one object tell their product alone
+    reflectance : of the ball, above 0 to 1; the coating's transmission is then fitted. None keeps the start's
+        transmission and fits the reflectance: photographs of one object determine only the product
     quick : stop after the fast picture, as where Mitsuba by LLVM does not work
-    Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball.
-    """
+    Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball."""
     check_diameter(ball_diameter)
     coating = dataclasses.replace(start.coating, spread=max(start.coating.spread, 1e-3 * LEAST_SPREAD))
     whole = fitted_size(dataclasses.replace(start, coating=coating), photographs)
@@ -114,13 +113,13 @@ def calibrate(
 
 
 def _transmitting(unit: Calibration, reflectance: float) -> Calibration:
-    """Take the light of the object for that of one of this reflectance: the coating's transmission follows."""
+    """Return the unit with the transmission that explains the object's light by an object of this reflectance."""
     coating = dataclasses.replace(unit.coating, transmission=min(unit.through / reflectance, 1.0))
     return dataclasses.replace(unit, coating=coating, object_reflectance=reflectance)
 
 
 def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
-    """Say by what a calibration was fitted: which pictures, presses, balls and background."""
+    """Describe by what a calibration was fitted: pictures, presses, balls and background."""
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if estimated else "photographed"
     balls = {f"{2e3 * press.radius:g}" for press in presses if press.radius is not None}
     of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
@@ -128,7 +127,7 @@ def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
 
 
 class _Search:
-    """The presses that are fitted and where the search stands."""
+    """State of the search: the presses that are fitted, the unit's numbers and the balls."""
 
     def __init__(
         self, start: Calibration, photographs: Photographs, radius: float, progress: Callable[[int], None]
@@ -141,7 +140,7 @@ class _Search:
         self._object = np.array(NAMES) == "object_light"
 
     def place(self) -> None:
-        """Fit presses, gain and the object's light alone, with the unit's other numbers as in the start."""
+        """Fit presses, gain and the object's light alone; the unit's other numbers stay those of the start."""
         bench = FastPictures(self.start)
         balls = [fit_ball(bench, sight, sight.radius(self.radius), lit=True)[0] for sight in self._sights]
         self._problem = UnitResiduals(self.start, self._sights, self.radius, self._object)
@@ -164,7 +163,7 @@ class _Search:
             self._minimise(self._x, PLACING_STEPS)
 
     def readmit(self) -> bool:
-        """Take photographs back that show the ball under this unit's lights; returns true if there are any."""
+        """Take back photographs that show the ball under this unit's lights; returns true if there are any."""
         if not self.aside:
             return False
         bench, balls, taken = FastPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
@@ -184,7 +183,7 @@ class _Search:
         return bool(taken)
 
     def _take(self, presses: list[Press], unit: Calibration, balls: np.ndarray) -> None:
-        """Go on with these presses; balls : (n, 3) mm, where they stand; unit : with whose numbers."""
+        """Continue with these presses. balls : (n, 3) mm, their positions; unit : whose numbers to start from"""
         self.presses, self._sights = presses, [Sight(press) for press in presses]
         self._problem = UnitResiduals(unit, self._sights, self.radius, self._object)
         self._x = np.array([unit.through, *balls.ravel()])
@@ -193,7 +192,8 @@ class _Search:
     def fit(
         self, free: np.ndarray, pictures: Callable[[Calibration], BallPictures] = FastPictures, steps: int = STEPS
     ) -> None:
-        """Continue the search with some of the unit's numbers free."""
+        """Continue the search; free : (22,) bool, numbers of the unit that may change; pictures : class that draws
+        them"""
         numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
         self._problem, self._free = UnitResiduals(self.start, self._sights, self.radius, free, pictures), free
         self._minimise(np.concatenate([numbers[free], balls.ravel()]), steps)
@@ -211,8 +211,8 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Standard errors by name, and the names of parameters that the photographs do not determine. The errors count
-        what is assumed of units as one more measurement; misfits of the model as MODEL_ERROR."""
+        """Return standard errors by name, and the names of parameters that the photographs do not determine. Prior
+        knowledge of units counts as one more measurement, misfits of the model as MODEL_ERROR."""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]
@@ -232,7 +232,7 @@ class _Search:
 
 
 def unexplained_share(sight: Sight, left: float) -> float:
-    """Return the share of a photograph's squares that a fit leaves; left : mean square, grey levels squared."""
+    """Return the share of a photograph's squares that a fit leaves; left : mean square, grey levels squared"""
     return left / max(float(np.square(sight.change[sight.counts]).mean()), 1e-9)
 
 

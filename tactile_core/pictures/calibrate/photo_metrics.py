@@ -32,7 +32,8 @@ def psnr(error: np.ndarray) -> float:
 
 
 def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray) -> float:
-    """Return the mean over colours of the lobes' intersection over union; colours without any lobe are left out."""
+    """Return the intersection over union of shadow lobes (changes below LOBE), mean over colours that have any.
+    change, true_change : (H, W, 3) grey levels against the background; region : (H, W) bool"""
     overlaps = []
     for channel in range(len(COLOURS)):
         ours, true = ((each[..., channel] < LOBE) & region for each in (change, true_change))

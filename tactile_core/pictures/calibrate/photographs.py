@@ -1,4 +1,4 @@
-"""Photographs of balls pressed into a gel: pictures, background, and where each press shows."""
+"""Photographs of balls pressed into a gel: pictures, background, and where each press is visible."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ class Press:
     """Photograph of a press.
 
     picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
-    change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large ones
-    region : (H, W) bool, the region of interest, which knows nothing of drift
+    change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large
+        changes
+    region : (H, W) bool, the region of interest, found without the drift
     flags : what is wrong with it, in words; empty for nothing
-    radius : m, of its ball; None for that of the whole set
-    """
+    radius : m, of its ball; None for that of the whole set"""
 
     name: str
     picture: np.ndarray
@@ -57,7 +57,7 @@ class Press:
 @dataclasses.dataclass(frozen=True)
 class Photographs:
     """Photographs of one unit, prepared.
-    background : (H, W, 3) float32, grey levels; estimated : whether it was made from the set
+    background : (H, W, 3) float32, grey levels; estimated : true if it was estimated from the set
     untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel"""
 
     folder: Path
@@ -81,11 +81,10 @@ def read_photographs(
 ) -> Photographs:
     """Read all pictures of folders or videos, by name; without a background photograph it is estimated.
 
-    radii : m, of each folder's ball; None where one ball, named to what uses the photographs, pressed all
+    radii : m, of each folder's ball; None where one ball, given elsewhere, made all presses
     only : names of the presses to keep, see ``chosen``; None for all
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
-    pictures to tell the background; ModuleNotFoundError for a video without OpenCV.
-    """
+    pictures to estimate the background; ModuleNotFoundError for a video without OpenCV."""
     paths = [Path(each) for each in ([folders] if isinstance(folders, str | os.PathLike) else folders)]
     folder = paths[0] if len(paths) == 1 else Path(os.path.commonpath([path.absolute() for path in paths]))
     pictures, ball = {}, {}
@@ -134,9 +133,9 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half. The
-    median at each pixel of those that differ from the median of all by CHANGE at most: presses that cover a third of
-    the pictures pull the plain median by up to that much."""
+    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half. At
+    each pixel it is the median of values within CHANGE of the plain median, which presses on a third of the pictures
+    pull by up to that much."""
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
     rest = np.where(touched, np.nan, pictures.astype(np.float32))
@@ -146,8 +145,9 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses and less its means.
-    Means over NOISE_WINDOW hold drift of the light. A photographed background adds noise of its own."""
+    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses. Means over
+    NOISE_WINDOW, which hold the drift of light, are subtracted first. A photographed background adds noise of its
+    own."""
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:
@@ -161,7 +161,7 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool of changes over 18 levels in a channel within 9 px; from the photograph alone."""
+    """Return the mask (H, W) bool of pixels within 9 px of a change over 18 levels in any channel, drift included."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
@@ -183,7 +183,7 @@ def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
 
 
 def _pictures(path: Path) -> dict[str, np.ndarray]:
-    """Pictures (H, W, 3) uint8 by name: a folder's photographs and videos, or a video's frames."""
+    """Return pictures (H, W, 3) uint8 by name: a folder's photographs and videos, or a video's frames."""
     if not path.is_dir() and path.suffix.lower() in video_frames.SUFFIXES:
         return video_frames.frames_of(path)
     if not path.is_dir():
@@ -200,7 +200,7 @@ def _pictures(path: Path) -> dict[str, np.ndarray]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
-    """Return the press that a photograph shows, of a ball of a radius, m; None where it shows none."""
+    """Return the press in a photograph, of a ball of a radius, m; None where there is none."""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift
@@ -228,9 +228,9 @@ SOFTNESS = 3.0  # grey levels: what lies farther from the drift than twice that 
 
 
 def lighting_drift(change: np.ndarray) -> np.ndarray:
-    """Return the drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3). By
-    iteratively reweighted least squares with Geman and McClure's weights, from the median; a press that covers less
-    than half of the picture counts for next to nothing."""
+    """Return the drift (H, W, 3) float32 grey levels: the quadratic nearest most of a photograph's change (H, W, 3).
+    Iteratively reweighted least squares with Geman and McClure's weights, from the median: a press that covers less
+    than half of the picture has almost no weight."""
     height, width = change.shape[:2]
     step = max(COARSE * width // 240, 1)
     rows, columns = height // step, width // step

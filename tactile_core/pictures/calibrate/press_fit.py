@@ -19,12 +19,12 @@ EASIER, HARDER = 0.2, 8.0  # factors of the damping after a step that helped, an
 def minimise(
     problem: Any, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, float]:
-    """Find a minimum near x and its cost, after ``most`` steps or once a step gains less than a share ``tolerance``.
+    """Minimise a sum of squares from x; returns x and its cost, after ``most`` steps or when a step gains less than a
+    share ``tolerance``.
 
-    problem : a sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless; ``inside(x)``
-        the nearest x that can be; ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at
-        the last accepted x
-    """
+    problem : sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless; ``inside(x)`` the
+        nearest valid x; ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last
+        accepted x"""
     cost, damping = problem.cost(x), START_DAMPING
     for step in range(most):
         matrix, gradient = problem.normal_equations(x)
@@ -67,9 +67,9 @@ class Ball(NamedTuple):
 
 
 class Sight:
-    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and which of them count (h, w).
-    shown : (n, 3) levels of change of those that count; untouched : (n, 3) of the gel at rest, in that day's light
-    factor : by which the photograph is made smaller; None for that of fits"""
+    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and the pixels that count (h, w).
+    shown : (n, 3) levels of change in pixels that count; untouched : (n, 3) of the gel at rest, in that day's light
+    factor : by which the photograph is reduced; None for the usual one of fits"""
 
     def __init__(self, press: Press, factor: int | None = None) -> None:
         factor = factor or working_factor(press.picture.shape[1], press.picture.shape[0])
@@ -82,16 +82,16 @@ class Sight:
         self.untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown
 
     def missed(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a change (n, 3) of linear light misses of the photograph, levels, and the camera's slope."""
+        """Return the residual, levels, of a change (n, 3) of linear light, and the slope of the camera's curve."""
         seen, slope = bent(change, self.untouched)
         return seen - self.shown, slope
 
     def radius(self, common: float) -> float:
-        """Return the radius, m, of the photograph's own ball; without one that of the whole set's."""
+        """Return the radius, m, of the photograph's own ball, else that of the whole set."""
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
-        """Return right and down, m, of the change's middle, and of where it is largest over about a ball's print."""
+        """Return starts (right, down) m: the change's centre, and where it is largest over about a ball's print."""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
@@ -103,9 +103,9 @@ class Sight:
 def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
-    """Fit the ball whose picture is nearest the photograph's; returns it and the mean squared residual, levels squared.
-    bench : in working pixels; radius : m, the ball's, or where its search starts
-    lit : whether light of the object through the coating is fitted as well (``missing_light``); else the unit's"""
+    """Fit the ball whose picture is nearest the photograph; returns it and the mean squared residual, levels squared.
+    bench : in working pixels; radius : m, the ball's, or the search's start
+    lit : true fits the object's light through the coating as well (``missing_light``), false takes the unit's"""
     problem = _PressProblem(bench, sight, radius, lit)
     starts = [
         np.array([*place, share * bench.deepest(radius), radius][: 4 if free_radius else 3])
@@ -119,7 +119,7 @@ def fit_ball(
 
 
 class _PressProblem:
-    """Squares of what a ball's picture misses; x = right, down, depth and, where it is free, radius."""
+    """Squares of a ball's residual; x = right, down, depth and, if free, radius."""
 
     def __init__(self, bench: BallPictures, sight: Sight, radius: float, lit: bool) -> None:
         self._bench, self._sight, self._radius, self._lit = bench, sight, radius, lit
@@ -131,7 +131,7 @@ class _PressProblem:
         return self._sight.missed(self._bench.change(ball)[self._sight.counts])[0].ravel()
 
     def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture and table."""
+        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture or table."""
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
         if not (inside and x[2] >= SHALLOWEST and SMALLEST_BALL <= radius <= LARGEST_BALL):
@@ -142,11 +142,11 @@ class _PressProblem:
         return float(np.square(self._last).sum() / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return x: ``cost`` tells what is off the picture and the table."""
+        """Return x: ``cost`` rejects what lies outside picture and table."""
         return x
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, of n numbers, at the last cost's x."""
+        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, at the last cost's x."""
         last = self._last
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last
@@ -157,16 +157,16 @@ LIKELY = 0.1  # share of a coating's own light, how much comes through (assumed)
 
 
 def contact_radius(depth: float, radius: float) -> float:
-    """Return the radius, m, of the contact of a ball of a radius pressed so deep, m."""
+    """Return the contact radius, m, of a ball of a radius, m, pressed to a depth, m."""
     return float(min(CONTACT_SHARE * np.sqrt(2 * radius * depth), radius))
 
 
 def missing_light(
     bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
 ) -> tuple[np.ndarray, float]:
-    """Fit how much more light comes through the coating of a photograph than of a ball's picture. Returns what the
-    picture with it misses (n, 3), grey levels, of the pixels that count; and that light, by least squares, as a share
-    of a coating's own that faces the LEDs"""
+    """Fit how much more light comes through the coating of a photograph than of a ball's picture.
+    Returns the residual (n, 3), grey levels, of the picture with that light, and the light, by least squares, as a
+    share of that of a coating that faces the LEDs."""
     missed, slope = sight.missed(bench.change(ball)[sight.counts])
     white = slope * bench.white(ball)[sight.counts]
     more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)

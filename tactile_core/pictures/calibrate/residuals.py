@@ -1,10 +1,9 @@
-"""The sum of squares that a unit's calibration makes small: photographs of presses against their pictures.
+"""The sum of squares that a unit's calibration minimises: photographs of presses against their pictures.
 
-The unknowns are the unit's numbers and three numbers a press. The gain C is linear in light, so that it is solved
-for at each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by steps of
-Gauss and Newton's, as the camera's toe and shoulder bend the picture. What is assumed of units holds the numbers that
-few photographs do not tell: one more square each.
-"""
+The unknowns are the unit's numbers and three numbers a press. The gain C is linear in light, so it is solved for at
+each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by Gauss-Newton steps
+as the camera's toe and shoulder are not linear. Priors of units, one square each, determine numbers that few
+photographs do not."""
 
 from __future__ import annotations
 
@@ -55,7 +54,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return a calibration with other numbers and the same gain; raises TactileError for some that mean nothing."""
+    """Return a calibration with other numbers and the same gain; raises TactileError for meaningless ones."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
@@ -83,7 +82,7 @@ PRESS_STEP = 10e-3  # mm
 
 @dataclasses.dataclass(frozen=True)
 class _Lights:
-    """Radiance of a press: by LED and counted pixel (3, p), times 1, right, down in mm (9, p)."""
+    """Radiance of a press: by LED and counted pixel (3, p); terms : the same times 1, right, down in mm (9, p)"""
 
     changes: np.ndarray
     terms: np.ndarray
@@ -91,11 +90,9 @@ class _Lights:
 
 class UnitResiduals:
     """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
-
-    start : the calibration that the spread of units is centred on, in working pixels
-    radius : m, of the balls that name none
-    free : (22,) bool, which of the unit's numbers may change; pictures : what makes a unit's
-    """
+    start : the calibration that the priors are centred on, in working pixels
+    radius : m, of balls for which none is given
+    free : (22,) bool, which of the unit's numbers may change; pictures : class that draws them"""
 
     def __init__(
         self,
@@ -118,7 +115,7 @@ class UnitResiduals:
         self.gain = self._start_gain
 
     def unit(self, x: np.ndarray) -> Calibration:
-        """Return the calibration of x, with the gain of the last cost that was taken."""
+        """Return the calibration of x, with the gain of the last accepted cost."""
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
@@ -151,13 +148,13 @@ class UnitResiduals:
         return float(cost / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return x with no less than no light through the coating."""
+        """Return x with the light through the coating at least 0."""
         least = np.full(len(x), -np.inf)
         least[: self._free.sum()][np.flatnonzero(self._free) == OBJECT_LIGHT] = 0
         return np.maximum(x, least)
 
     def unexplained(self) -> np.ndarray:
-        """Return the share (n,) of each photograph's squares that the pictures of the last cost leave."""
+        """Return the share (n,) of each photograph's squares that the last cost leaves."""
         pairs = zip(self._missed(), self._sights, strict=True)
         return np.array([np.square(missed).sum() / np.square(sight.shown).sum() for (missed, _), sight in pairs])
 
@@ -183,13 +180,13 @@ class UnitResiduals:
         return np.concatenate([changes, right * changes, down * changes])
 
     def _missed(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Residuals (3, p) of the pictures of each press, and the slopes (3, p) of the camera's curve there."""
+        """Return residuals (3, p) of each press's picture, and slopes (3, p) of the camera's curve there."""
         pairs = zip(self._last, self._sights, strict=True)
         found = (sight.missed((self.gain @ lights.terms).T) for lights, sight in pairs)
         return [(missed.T, slope.T) for missed, slope in found]
 
     def _gain_equations(self) -> tuple[np.ndarray, np.ndarray]:
-        """Gauss-Newton's matrix (3, 9, 9) and gradient (3, 9) of each channel's gain."""
+        """Return Gauss-Newton's matrix (3, 9, 9) and gradient (3, 9) of each channel's gain."""
         matrix, gradient = np.diag(self._gain_weight), self._gain_weight * (self.gain - self._start_gain)
         for lights, (missed, slope) in zip(self._last, self._missed(), strict=True):
             bright = slope[:, None] * lights.terms
@@ -203,7 +200,7 @@ class UnitResiduals:
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the matrix and gradient over x, the gain eliminated."""
+        """Return the matrix and gradient over x with the gain eliminated."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
@@ -225,7 +222,7 @@ class UnitResiduals:
         return matrix, gradient
 
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Slopes (3, free, p) of each press's picture by the unit's numbers, forward differences."""
+        """Derivatives (3, free, p) of each press's picture by the unit's numbers, forward differences."""
         slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
         column = {number: k for k, number in enumerate(np.flatnonzero(self._free).tolist())}
         for group in TOGETHER:
@@ -243,7 +240,7 @@ class UnitResiduals:
         return slopes
 
     def _moved(self, numbers: np.ndarray, group: tuple[int, ...]) -> tuple[BallPictures, int]:
-        """Pictures with some numbers a step larger, or, where a unit cannot have that, smaller; and which way."""
+        """Return pictures with some numbers one step larger and 1, or smaller and -1 where a unit cannot have more."""
         moved = np.zeros_like(numbers)
         moved[list(group)] = STEP[list(group)]
         try:
@@ -252,7 +249,7 @@ class UnitResiduals:
             return self._pictures(with_parameters(self._bench.calibration, numbers - moved)), -1
 
     def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
-        """Slopes (3, 3, p) of a press's picture by its right, down and depth."""
+        """Derivatives (3, 3, p) of a press's picture by its right, down and depth."""
         ball, lights, sight = self.balls(x)[k], self._last[k], self._sights[k]
         after = [self._lights(self._bench, ball + step, sight).terms for step in PRESS_STEP * np.eye(3)]
         return np.stack([self.gain @ (terms - lights.terms) / PRESS_STEP for terms in after], axis=1)

@@ -21,8 +21,9 @@ SHALLOW = 0.3  # of the deepest press's change: a weaker one is the edge of anot
 
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:
-    """Return frames of a video, (H, W, 3) uint8 by name: of each press the deepest, and the untouched gel. Raises
-    TactileError for what OpenCV cannot read as a video, is too long or large, ModuleNotFoundError without it."""
+    """Return frames (H, W, 3) uint8 of a video by name: the deepest of each press, and some of the untouched gel.
+    Raises TactileError for a file that OpenCV cannot read as a video, or that is too long or large; ModuleNotFoundError
+    without it."""
     installed.require("camera", "cv2")
     small = np.stack([_small(frame) for frame in _read(path)])
     change = np.abs(small - np.median(small, axis=0).astype(np.float32)).max(-1) > CHANGE
@@ -35,7 +36,7 @@ def frames_of(path: Path) -> dict[str, np.ndarray]:
 
 
 def _wanted(changed: np.ndarray) -> set[int]:
-    """Numbers of the frames to take, by how many small pixels (n,) of each have changed."""
+    """Return the numbers of the frames to take, from the number of small pixels (n,) that changed in each."""
     touched = np.r_[False, changed >= LEAST, False]
     edges = np.flatnonzero(touched[1:] != touched[:-1]).reshape(-1, 2)
     deepest = np.array([first + changed[first:end].argmax() for first, end in edges], int)
@@ -44,7 +45,7 @@ def _wanted(changed: np.ndarray) -> set[int]:
 
 
 def _spread(numbers: np.ndarray, most: int) -> list[int]:
-    """Numbers spread over all of them, ``most`` at most."""
+    """Return at most ``most`` of the numbers, evenly spread."""
     places = np.linspace(0, len(numbers) - 1, min(most, len(numbers))).round().astype(int)
     return numbers[places].tolist()
 

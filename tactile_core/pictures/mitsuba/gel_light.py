@@ -1,4 +1,4 @@
-"""Radiance of the gel by a scene of Mitsuba's, compiled by LLVM: by our integrator, or by Mitsuba's paths."""
+"""Radiance of the gel in a scene of Mitsuba's, compiled by LLVM: by our integrator, or by Mitsuba's paths."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
 
 
 class GelLight:
-    """Radiance by one preset; scenes are made once, only the gel's vertices change. Without the light that the coating
-    spreads, which ``Renderer`` lays over (``coating_spread``).
+    """Radiance by one preset; scenes are made once, only the gel's vertices change. The coating's spread is not
+    included: ``Renderer`` adds it (``coating_spread``).
     surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers"""
 
     def __init__(
@@ -56,9 +56,10 @@ class GelLight:
         self._look(mi)
 
     def change_unit(self, unit: Calibration) -> None:
-        """Change to another unit with as many pixels: takes 10 ms, as the scene is not compiled again. Its LEDs,
-        camera, coating and index may differ in numbers, not in kind (a material's name; a sphere so small that it is a
-        point). Not for a preset of paths, nor with more lamps. Raises TactileError where it must not."""
+        """Change to another unit with as many pixels in 10 ms, without compiling the scene again.
+
+        Its LEDs, camera, coating and index may differ in numbers, not in kind (the material's name; a sphere so small
+        that it is a point). Raises TactileError for a preset of paths, with further lamps, and for another kind."""
         mi = activate(LLVM)
         mesh = GelMesh(unit.camera, self.preset.spacing)
         same = plugin_names(unit) == plugin_names(self.unit) and unit.camera.shape == self.unit.camera.shape
@@ -69,7 +70,7 @@ class GelLight:
         self._look_from(mi)
 
     def _look(self, mi: Any) -> None:
-        """Rays of the unit's camera."""
+        """Set up the integrator and the camera's rays."""
         camera, step = self.unit.camera, self.preset.bounce_step
         if self.preset.paths:
             self._paths = mi.load_dict({"type": "path", "max_depth": DEPTH, "hide_emitters": True})
@@ -87,7 +88,7 @@ class GelLight:
             self._turned = mi.Float(np.repeat(turned.ravel(), DIRECTIONS).astype(np.float32))
 
     def _look_from(self, mi: Any) -> None:
-        """Cast rays from where the camera stands."""
+        """Make the rays of the camera's position."""
         import drjit
 
         camera, step = self.unit.camera, self.preset.bounce_step
@@ -101,7 +102,7 @@ class GelLight:
         self._height = drjit.opaque(mi.Float, MM * camera.apparent_height)
 
     def _towards(self, mi: Any, step: int, times: int = 1) -> Any:
-        """Rays at every step-th pixel, each so many times."""
+        """Return rays at every step-th pixel, `times` of each."""
         camera = self.unit.camera
         first = (step - 1) / 2
         right = camera.right[0] + (first + step * np.arange(camera.width // step) + ASIDE[0]) * camera.pixel_size[0]
@@ -111,12 +112,12 @@ class GelLight:
         return mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward))
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        """Return the radiance (H, W, 3) float32, levels, of heights (H, W) m."""
         *_, found = self.refined(height_map)
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the same as ``radiance``; where paths are traced, first the noisier mean after each pass."""
+        """Yield ``radiance`` at last; where paths are traced, after each pass the mean so far, which is noisier."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
@@ -134,7 +135,7 @@ class GelLight:
         yield found if self._coarse is None else found + self._bounced(mi)
 
     def _hit(self, ray: Any) -> Any:
-        """Intersect rays with the scene; the gel's shading normals are of the map's own slopes."""
+        """Intersect rays with the scene; the gel's shading normals are those of the map's slopes."""
         mi = activate(LLVM)
         import drjit as dr
 
@@ -192,7 +193,7 @@ class GelLight:
         return self._finer(evened((found * (step / cell) ** 2).astype(np.float32)), cell)
 
     def _finer(self, coarse: np.ndarray, step: int) -> np.ndarray:
-        """A coarse grid's (h, w, 3) light at every pixel."""
+        """Interpolate a coarse grid's (h, w, 3) light to every pixel."""
         row, column = (np.indices(self.unit.camera.shape) - (step - 1) / 2) / step
         at = lookup(row.astype(np.float32), column.astype(np.float32), coarse.shape[:2])
         return np.stack([at(np.ascontiguousarray(coarse[..., k])) for k in range(3)], -1)

@@ -1,4 +1,4 @@
-"""The gel as a triangle mesh for Mitsuba, made of a height map."""
+"""The gel as a triangle mesh for Mitsuba, made from a height map."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 
 
 class GelMesh:
-    """Vertices and faces of height maps under one camera. Mesh coordinates: right, up and toward the camera, mm. Where
-    pixels are made square, up is scaled: straight lines stay straight, so visibility is that of the real gel; lengths
-    and angles along the picture are not."""
+    """Vertices and faces of height maps under one camera. Mesh coordinates: right, up and toward the camera, mm.
+
+    With square pixels, up is scaled: straight lines stay straight, so visibility is right, but lengths and angles along
+    the picture are not."""
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
         """Take spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
@@ -47,7 +48,7 @@ class GelMesh:
         return self._plan.reshape(-1, 3).copy()
 
     def normals(self, height: np.ndarray) -> np.ndarray:
-        """Return the vertices' unit normals (n, 3) float32, of the map's own slopes; in real, unscaled space alone."""
+        """Return the vertices' unit normals (n, 3) float32 from the map's slopes; not for a mesh that is scaled."""
         right, down = (each[np.ix_(self._rows, self._columns)] for each in slopes(height, self.camera))
         found = np.stack([-right, down, np.ones_like(right)], -1)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
@@ -89,7 +90,7 @@ def triangle_mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, *
 
 
 def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
-    """Give pixels whose rays have missed (H, W) bool the gel what their neighbours have in maps (H, W, ...), in place.
+    """Fill pixels whose rays missed the gel from their neighbours, in place. missed : (H, W) bool; maps : (H, W, ...).
     A ray in a million slips between two triangles. Raises TactileError where more have missed."""
     if missed.mean() > MOST_MISSED:
         found = f"{missed.sum()} of {missed.size} rays miss it"
@@ -100,9 +101,9 @@ def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
-    """Refuse a mesh on which Mitsuba would crash or leave holes. vertices (n, 3), faces (m, 3) ; count : how many
-    vertices the scene was made with Raises TactileError for another number of vertices, values that are not finite, or
-    a face of a missing vertex."""
+    """Refuse a mesh on which Mitsuba would crash or leave holes.
+    vertices (n, 3), faces (m, 3); count : number of vertices that the scene was made with
+    Raises TactileError for another number of vertices, values that are not finite, or a face with a missing vertex."""
     if vertices.shape != (count, 3):
         raise TactileError("gel mesh, vertices", f"shape {vertices.shape}", f"({count}, 3)")
     if not np.isfinite(vertices).all():

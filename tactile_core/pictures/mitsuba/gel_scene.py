@@ -1,6 +1,7 @@
 """A unit as a scene of Mitsuba's: coated gel, LEDs that shine, housing walls; in mm, right, up and toward the camera.
-Each LED shines in a band of its own: R, G and B of Mitsuba's spectra are the light of the red, green and blue LED. What
-the camera makes of them is the calibration's response. LEDs and coating lie in one medium, gel and acrylic."""
+
+Each LED has a band of its own: R, G and B of Mitsuba's spectra are the light of the red, green and blue LED; the
+calibration's response converts them to the camera's colours. LEDs and coating lie in one medium, gel and acrylic."""
 
 from __future__ import annotations
 
@@ -46,12 +47,12 @@ def material(coating: Coating, gel_index: float) -> dict[str, Any]:
 
 
 def _outer_index(gel_index: float) -> float:
-    """Index round the clear coat; Mitsuba refuses equal ones, which would reflect nothing."""
+    """Return the index around the clear coat; Mitsuba refuses equal indices, which reflect nothing."""
     return gel_index if abs(gel_index - PIGMENT_INDEX) > LEAST_STEP else PIGMENT_INDEX - LEAST_STEP
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
-    """Return the LEDs by their colours: black spheres that shine, or points where they look as small."""
+    """Return the LEDs by colour: black spheres that shine, or points where they are that small."""
     return {led.colour: _lamp(led) for led in unit.leds}
 
 
@@ -80,8 +81,8 @@ def plugin_names(unit: Calibration) -> list[str]:
 
 
 def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
-    """Give loaded LEDs and gel another unit's numbers; lights, gel : what ``traverse`` finds in their scenes. Same
-    plugins as before: nothing is compiled again."""
+    """Give loaded LEDs and gel another unit's numbers. lights, gel : results of ``traverse`` on their scenes. The
+    plugins stay the same, so nothing is compiled again."""
     for name, lamp in lamps(unit).items():
         if lamp["type"] == "point":
             lights[f"{name}.position"] = lamp["position"]
@@ -106,9 +107,9 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
 
 
 def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
-    """Return four black walls round gel and LEDs, from the gel's height up, that keep light from outside away. Their
-    places are matrices (4, 4). What the housing throws back near an LED is in that LED's fitted radius, which is
-    several times a chip's."""
+    """Return four black walls around gel and LEDs, from the gel's height up, as matrices (4, 4); they keep outside
+    light away. What the housing reflects near an LED is part of that LED's fitted radius, which is several times a
+    chip's."""
     lowest, highest = mesh.bounds()
     for led in unit.leds:
         place, reach = np.array(to_scene(led.position)), led.radius * MM + WALL_GAP
@@ -133,7 +134,7 @@ def to_scene(place: Sequence[float]) -> list[float]:
 
 @dataclasses.dataclass(frozen=True)
 class Lamp:
-    """A sphere that shines evenly; 0 of radius is a point.
+    """A sphere that shines evenly, or a point with radius 0.
     position : (right, down, toward the camera), m, image frame; radius : m
     brightness : radiance times squared radius in the bands of the red, green and blue LED, levels m^2"""
 
@@ -144,7 +145,7 @@ class Lamp:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Occluder:
-    """A black body that stands in the light's way; vertices : (n, 3) m, image frame; faces : (m, 3)."""
+    """A black body in the light's way; vertices : (n, 3) m, image frame; faces : (m, 3)."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -152,7 +153,7 @@ class Occluder:
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """Hold all lamps and bodies beside a unit's own."""
+    """All lamps and bodies beside a unit's own."""
 
     lamps: tuple[Lamp, ...] = ()
     occluders: tuple[Occluder, ...] = ()

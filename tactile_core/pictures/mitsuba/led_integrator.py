@@ -1,14 +1,13 @@
-"""Our own light in Mitsuba's scenes: a few even points of each emitter, shadows evened out, one coarse bounce.
+"""Our own integrator for Mitsuba's scenes: a few even points of each emitter, smoothed shadows, one coarse bounce.
 
-It asks the scene's emitters and materials, so whatever shines or is painted takes part; Mitsuba's path integrator,
-given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and
-nothing in the way, their mean is exact. Nothing here is random.
+It asks the scene's emitters and materials, so all that shines or is painted takes part; Mitsuba's path integrator,
+given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and no
+occluder, their mean is exact. Nothing here is random.
 
-Light that a glossy coating mirrors onto other gel is followed forward from where it is mirrored. Beside a print's rim,
-gel is lit by the highlights of the flank above it. They are narrow, and directions that a place looks into miss them;
-from the flank they are easily followed. What an LED's light does near the mirror's direction is counted by ``mirrored``
-(half vectors within the lobe), all else by ``bounced``: each path once.
-"""
+Light that a glossy coating mirrors onto other gel is followed forward from the mirroring place: beside a print's rim,
+gel is lit by the highlights of the flank above it, which are so narrow that directions sampled from the lit place miss
+them. ``mirrored`` counts an LED's light near the mirror's direction (half vectors within the lobe), ``bounced`` all
+else: each path once."""
 
 from __future__ import annotations
 
@@ -25,7 +24,7 @@ DIRECTIONS = RINGS * SPOKES
 
 
 class EmitterLight(NamedTuple):
-    """Light of one emitter: its unoccluded radiance, and the share that arrives."""
+    """Light of one emitter: its radiance without occluders, and the share that arrives."""
 
     open: Any
     share: Any
@@ -34,9 +33,9 @@ class EmitterLight(NamedTuple):
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[EmitterLight]:
-    """Compute the light of each emitter at surface interactions, by a number of points on the emitter.
-    scene : what stands in the way; phase : 0..1, turns the points, in shares of their distance
-    lobe : cosine of the half vector from which on light is left out, near the mirror's direction; None for none"""
+    """Compute the light of each emitter at surface interactions, from a number of points on the emitter.
+    scene : the occluders; phase : 0..1, rotates the points, in shares of their distance
+    lobe : cosine of the half vector beyond which light near the mirror's direction is left out; None for none"""
     import drjit as dr
 
     material, found = hit.bsdf(), []
@@ -61,9 +60,9 @@ def direct(
 def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
-    """Radiance (n, 3) that n surface interactions show of light that came by one other place.
-    meet : what rays meet; hit : each of them DIRECTIONS times, one behind the other
-    phase : 0..1 of each, turns its directions; lobe : as ``direct`` has it, of the other place"""
+    """Radiance (n, 3) that n surface interactions show of light that was reflected once before.
+    meet : function that intersects rays; hit : the interactions, each DIRECTIONS times in a row
+    phase : 0..1 of each, rotates its directions; lobe : as in ``direct``, of the place of that reflection"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS
@@ -88,7 +87,7 @@ STEEPEST = 0.05  # least share of a pixel's surface that faces the camera
 
 
 def narrow_lobe(coating: Coating) -> tuple[float, float] | None:
-    """GGX's alpha of a coating's highlights and the cosine at their lobe's end; None where they are wide or absent."""
+    """GGX's alpha of a coating's highlights and the cosine at their lobe's end; None for wide or no highlights."""
     alpha = coating.roughness**2 if coating.bsdf == PRINCIPLED else coating.roughness
     if coating.bsdf == DIFFUSE or alpha > NARROW:
         return None
@@ -108,11 +107,9 @@ def mirrored(
     shape: tuple[int, int],
 ) -> np.ndarray:
     """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
-
-    hit : the places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
-    phase : 0..1 of each, turns its directions; lobe : alpha, and the cosine at its end
-    camera_height : mm; to_cell : where (column, row) the camera sees a point
-    """
+    hit : the mirroring places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
+    phase : 0..1 of each, rotates its directions; lobe : alpha, and the cosine at its end
+    camera_height : mm; to_cell : (column, row) at which the camera sees a point"""
     import drjit as dr
 
     number = mi.Float(dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS)
@@ -148,8 +145,8 @@ def mirrored(
 
 
 def _deposited(cell: np.ndarray, light: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Light (3, n) summed over (h, w, 3), each shared among the four cells round its (column, row) of cell (2, n). In
-    numpy, where sums have one order: Mitsuba's threads would add in another each time."""
+    """Sum light (3, n) into (h, w, 3), each shared among the four cells around its (column, row) of cell (2, n). In
+    numpy, whose sums have one order: Mitsuba's threads add in another each time."""
     some = light.any(0)
     light, (column, row) = light[:, some], cell[:, some]
     left, upper = np.floor(column).astype(int), np.floor(row).astype(int)

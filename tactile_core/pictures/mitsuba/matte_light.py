@@ -1,10 +1,9 @@
 """Radiance of the gel without LLVM: Mitsuba traces rays one by one, to points that stand for each light.
 
-The light that the white coating throws onto itself is gathered in numpy. The gel is a height field, so along each
-azimuth a place sees what rises above all that lies before it. Marching outward, every step that raises the horizon adds
-its radiance times the projected solid angle of the rise. Nothing of that is random, nor needs Mitsuba: the tests hold
-it against Mitsuba's path tracer.
-"""
+Light that the white coating throws onto itself is gathered in numpy. The gel is a height field, so along each azimuth a
+place sees what rises above all that lies before it. Marching outward, every step that raises the horizon adds its
+radiance times the projected solid angle of the rise. None of that is random or needs Mitsuba; the tests compare it with
+Mitsuba's path tracer."""
 
 from __future__ import annotations
 
@@ -31,7 +30,7 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
 
 class MatteLight:
-    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; arguments checked by the caller."""
+    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; the caller checks the arguments."""
 
     def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
         self.unit, self.preset = unit, preset
@@ -44,7 +43,8 @@ class MatteLight:
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
-        """Return the radiance (H, W, 3) float32 by the LEDs alone, of heights (H, W), and what the first pass saw."""
+        """Return the radiance (H, W, 3) float32 of heights (H, W) by the LEDs alone, and the surface that pixels
+        saw."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)
@@ -60,7 +60,7 @@ class MatteLight:
         return through_window(radiance, hits.height, self.unit) if preset.window else radiance
 
     def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Surface]:
-        """Direct light (H, W, 3) and what pixels saw."""
+        """Return direct light (H, W, 3) and the surface that pixels saw."""
         leds, count = self.unit.leds, self.preset.points
         if self.preset.passes == 1:
             shift, points = ASIDE, [light_points(led, count) for led in leds]
@@ -79,8 +79,9 @@ def direct_light(
     hits: Surface, seen: np.ndarray, points: Sequence[np.ndarray], unit: Calibration, *, soften: bool
 ) -> np.ndarray:
     """Return the radiance (H, W, L) float32, levels, of L LEDs on a matte coating.
-    seen : (H, W) uint32, a bit a point; points : (n, 3) m of each LED, n <= 8, in the order of the bits
-    soften : even out the steps that few points leave in a shadow's edge, over 3 x 3 pixels"""
+    seen : (H, W) uint32, one bit for each visible point; points : (n, 3) m of each LED, n <= 8, in the order of the
+        bits
+    soften : true smooths the steps of few points in a shadow's edge, over 3 x 3 pixels"""
     positions, bit = np.array([led.position for led in unit.leds]), 0
     lit, radiance = lambert(hits, positions), np.empty((*hits.height.shape, len(positions)), np.float32)
     for k, (facing, cloud) in enumerate(zip(lit.facing, points, strict=True)):
@@ -93,8 +94,8 @@ def direct_light(
 
 
 def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
-    """Cosine times distance of a light's middle becomes, in place, the mean over its points of those that are seen.
-    They are so close together that they differ in direction alone: n . (l + d), d from the middle to the point."""
+    """Replace `facing` (cosine times distance) of a light's middle, in place, by the mean over its visible points.
+    These are so close together that they differ in direction alone: n . (l + d), d from the middle to the point."""
     every = 2 ** len(cloud) - 1
     box = bounding_box(seen != every, margin=1)
     if box is None:
@@ -110,20 +111,20 @@ def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray,
 
 
 def light_points(led: Led, count: int) -> np.ndarray:
-    """Return points (count, 3) m, image frame, round the light's middle, in the plane that faces the picture's middle.
-    A ring with the second moments of an even disc, the best of a few points: radius sqrt(1/2)."""
+    """Return points (count, 3) m, image frame, around the light's middle, in the plane that faces the picture's middle:
+    a ring of radius sqrt(1/2), which has the second moments of an even disc."""
     angle = 2 * np.pi * np.arange(count) / count
     return led.position + led.radius * np.sqrt(0.5) * _across(led, np.cos(angle), np.sin(angle))
 
 
 def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray:
-    """Return the points (count, 3) m, image frame, of a cloud that shines as an evenly bright sphere does.
+    """Return points (count, 3) m, image frame, that together shine as an evenly bright sphere does.
 
     They fill the ball with density 1 / sqrt(1 - r^2), which shows an even disc to every side (Abel's transform).
-    Where nothing is in the way, such a cloud lights exactly as its middle would: the light of a point falls on a
-    surface as the gradient of 1 / distance, to which Newton's shell theorem applies. To the picture's middle they are
-    a sunflower. turn, depth : 0..1, where the pattern starts across and along that line
-    """
+    Without occluders such a cloud lights exactly as its middle would: the light of a point falls on a surface as the
+    gradient of 1 / distance, to which Newton's shell theorem applies. Seen from the picture's middle they are a
+    sunflower.
+    turn, depth : 0..1, where the pattern starts across and along that line"""
     number = np.arange(count)
     radius = np.sqrt((number + (turn * 7 % 1)) / count)  # the rings move as the pattern turns
     angle = number * _GOLDEN_ANGLE + 2 * np.pi * turn
@@ -134,7 +135,7 @@ def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray
 
 
 def _across(led: Led, aside: np.ndarray, upward: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) across the line to the picture's middle: aside is level, upward leans away from the gel."""
+    """Vectors (n, 3) across the line to the picture's middle: `aside` is level, `upward` leans away from the gel."""
     toward = np.asarray(led.position) / np.linalg.norm(led.position)
     side = np.cross(toward, [0.0, 0.0, 1.0])
     side /= np.linalg.norm(side)
@@ -147,8 +148,8 @@ REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole pic
 def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
-    """Return the radiance (H, W, 3) float32 that the gel's own light adds to what pixels see.
-    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : what they see"""
+    """Return the radiance (H, W, 3) float32 that the gel's own light adds to the pixels.
+    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : the surface that they see"""
     camera, step = unit.camera, gather.step
     spacing = camera.pixel_size[0] * step, camera.pixel_size[1] * step
     first = step // 2
@@ -177,7 +178,7 @@ def _axis(first: float, step: float, count: int, margin: int) -> np.ndarray:
 def _on_gel(
     height: np.ndarray, right: np.ndarray, down: np.ndarray, direct: np.ndarray, unit: Calibration, margin: int
 ) -> np.ndarray:
-    """Radiance (h, w, 3) of a coarse map of the gel: the picture's inside it, open light on the rim, 0 beyond."""
+    """Radiance (h, w, 3) of a coarse map of the gel: the picture's inside it, unshadowed light on the rim, 0 beyond."""
     camera = unit.camera
     right, down, flat = right[None, :], down[:, None], np.zeros_like(height)
     radiance = np.moveaxis(open_light(Surface(right, down, height, flat, flat), unit), 0, -1).copy()
@@ -194,8 +195,8 @@ def irradiance(
     height: np.ndarray, radiance: np.ndarray, margin: int, spacing: tuple[float, float], gather: Gather
 ) -> np.ndarray:
     """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
-    height : (h, w) m; radiance : (h, w, 3); margin : places on each side that only give light, as far as is looked
-    spacing : (right, down) m"""
+    height : (h, w) m; radiance : (h, w, 3); spacing : (right, down) m
+    margin : places on each side that give light and receive none, as far as the search reaches"""
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)
     inside = slice(margin, -margin), slice(margin, -margin)
     slopes = [slope[inside] for slope in np.gradient(height, spacing[1], spacing[0])]
@@ -236,7 +237,7 @@ def _distances(step: float, reach: float, growth: float) -> list[float]:
 
 
 def _shifted(field: np.ndarray, right: float, down: float, margin: int) -> np.ndarray:
-    """The field (h, w, k) seen from each place a fractional number of cells away, without its margin."""
+    """Return the field (h, w, k) shifted by a fractional number of cells, without its margin."""
     column, row = int(np.floor(right)), int(np.floor(down))
     s, t = np.float32(right - column), np.float32(down - row)
     height, width = field.shape[0] - 2 * margin, field.shape[1] - 2 * margin

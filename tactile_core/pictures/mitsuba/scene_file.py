@@ -2,13 +2,12 @@
 
 NAME.xml        LEDs, coating, housing, camera, Mitsuba's path integrator; `mitsuba NAME.xml` writes the radiance
 NAME.ply        the gel, mm
-NAME.camera.exr response and ambient light, by which radiance becomes 8-bit levels, as of ``jobs.render``
+NAME.camera.exr response and ambient light, which convert radiance to 8-bit levels, as in ``jobs.render``
 
-The light that the coating spreads is left out, as Mitsuba's materials spread none: the XML's first comment and the
-EXR's `coating_spread_px` say the Gaussian, standard deviation in pixels, to lay over the radiance.
-The file's camera has square pixels, as wide as the unit's, and is a pinhole where the unit's appears: Mitsuba's camera
-cannot look through the window and keep the unit's even grid. Gel 1 mm up lies up to a third of a pixel off by that.
-"""
+Mitsuba's materials do not spread light sideways: the XML's first comment and the EXR's `coating_spread_px` give the
+Gaussian, standard deviation in pixels, to apply to the radiance. The file's camera has square pixels, as wide as the
+unit's, and its pinhole is at the unit's apparent height, as Mitsuba's camera cannot look through the window and keep
+the unit's even grid: gel 1 mm up is off by up to a third of a pixel."""
 
 from __future__ import annotations
 
@@ -44,8 +43,7 @@ _TAGS = {
 
 
 def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
-    """Return the files of a scene: itself, the gel's shape and what the camera does beside it. Raises TactileError for
-    another ending than .xml."""
+    """Return the three files of a scene, see above. Raises TactileError for another ending than .xml."""
     path = Path(path)
     if path.suffix != ".xml":
         raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
@@ -84,13 +82,13 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
 
 
 def square_pixels(camera: Camera) -> Camera:
-    """Return the same view with square pixels: as many rows as that makes, to half a row."""
+    """Return the same view with square pixels; the number of rows follows, to half a row."""
     rows = round(camera.height * camera.px_per_mm_x / camera.px_per_mm_y)
     return dataclasses.replace(camera, height=rows, px_per_mm_y=camera.px_per_mm_x)
 
 
 def camera_planes(unit: Calibration, ambient: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ..., which is (H, W, 3) levels."""
+    """Return the planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ... ambient : (H, W, 3) levels"""
     response = unit.pixel_response.astype(np.float32)
     planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
     for k, name in enumerate("RGB"):
@@ -112,7 +110,7 @@ def _eye(camera: Camera) -> dict[str, Any]:
 
 
 def _add(parent: ElementTree.Element, name: str, value: Any) -> None:
-    """A plugin, colour, number, text or transform as XML."""
+    """Add a plugin, colour, number, text or transform as XML."""
     if isinstance(value, Mapping) and value["type"] == "rgb":
         _field(parent, "rgb", name, ", ".join(f"{each:.9g}" for each in value["value"]))
     elif isinstance(value, Mapping):
@@ -140,7 +138,7 @@ def _field(parent: ElementTree.Element, kind: str, name: str, value: str) -> Non
 
 
 def _ply(mesh: GelMesh, height: np.ndarray) -> bytes:
-    """Binary PLY of the gel with normals."""
+    """Return the gel with normals as binary PLY."""
     vertices = np.hstack([mesh.vertices(height), mesh.normals(height)]).astype("<f4")
     fields = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     header = (

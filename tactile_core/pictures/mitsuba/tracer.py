@@ -1,6 +1,7 @@
-"""Mitsuba's part: where pixels' rays meet the gel, and which light points are seen from there. One persistent scene a
-tracer; only the gel's vertices change. Both variants trace the same mesh with the same rays, so they agree but for
-rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
+"""Where pixels' rays meet the gel, and which light points are visible from there, by Mitsuba.
+
+One persistent scene a tracer; only the gel's vertices change. Both variants trace the same mesh with the same rays, so
+they agree but for rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ class Tracer(abc.ABC):
         self.values = self.mi.traverse(self.scene)
 
     def around(self) -> dict[str, Any]:
-        """Return the scene's objects other than the gel."""
+        """Return the objects of the scene besides the gel."""
         return {}
 
     def load(self, height: np.ndarray) -> None:
@@ -41,9 +42,10 @@ class Tracer(abc.ABC):
 
     @abc.abstractmethod
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places (H, W, 3) float32 m that pixels see, and what these see of points (n, 3) m, 1 <= n <= 32.
+        """Trace the pixels' rays to the gel, and from there to points (n, 3) m, 1 <= n <= 32.
         shift : pixels to the right and down from each pixel's middle
-        Returns the places and seen (H, W) uint32, bit k for point k: nothing in the way, and on the gel's front."""
+        Returns places (H, W, 3) float32 m, and seen (H, W) uint32, bit k for point k: not occluded, and on the gel's
+        front."""
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
@@ -83,7 +85,7 @@ class _LlvmTracer(Tracer):
 
 
 class _ScalarTracer(Tracer):
-    """Renderer with one render for the places and one for each point: loops over pixels stay inside Mitsuba."""
+    """Renderer with one render for the places and one for each point, so that loops over pixels stay inside Mitsuba."""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         super().__init__(mesh, height, variant)
@@ -124,7 +126,7 @@ class _ScalarTracer(Tracer):
 
 
 def _mended(place: np.ndarray, seen: np.ndarray, mesh: GelMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Places (H, W, 3) in the image frame, m, and what is seen from them, without holes. Where a ray misses the gel its
-    place is the origin, where no ray leads. Raises TactileError as ``mend`` does."""
+    """Return places (H, W, 3) m, image frame, and their bits, with holes filled: a ray that misses the gel has its
+    place at the origin, where no ray leads. Raises TactileError as ``mend`` does."""
     mend(np.logical_not(place.any(-1)), place, seen)
     return place * np.array([1 / MM, -1 / (MM * mesh.up_scale), 1 / MM], np.float32), seen

@@ -1,6 +1,4 @@
-"""Choose the variant of Mitsuba that this machine runs: compiled for vectors by LLVM, or one ray at a time
-without it.
-"""
+"""Choose the variant of Mitsuba for this machine: compiled by LLVM, or one ray at a time without it."""
 
 from __future__ import annotations
 
@@ -40,15 +38,15 @@ for file in sorted(files):
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The variant to use, and why in a sentence."""
+    """The variant to use, and a sentence why."""
 
     name: str
     why: str
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """Choose the variant that was given, or the faster one that works on this machine. Raises TactileError for an
-    unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
+    """Choose the given variant, or the faster one that works on this machine. Raises TactileError for an unknown one or
+    one that does not work; ModuleNotFoundError without mitsuba."""
     import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
     if wanted not in (None, LLVM, SCALAR):
@@ -75,7 +73,7 @@ def fitting(error: float, variant: str | None = None) -> str:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """Return the variant that all workers of a job use, so that pictures agree; "" for fast ones, which need none."""
+    """Return the variant for all workers of a job, so that pictures agree; "" for fast ones, which need none."""
     return "" if preset == "fast" else choose_variant(wanted).name
 
 

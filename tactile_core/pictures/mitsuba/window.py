@@ -1,10 +1,9 @@
 """The window that the camera looks through: gel and acrylic, which refract as one medium.
 
-A calibrated camera says where on the plane of height zero each pixel looks, and where its pinhole appears in the
-picture's middle. Rays from air into acrylic bend the more, the more they lean, so that pixels farther out see the
-pinhole at another height: gel above that plane shifts a little. What the window reflects, and its losses, are part of
-the calibrated lights and response.
-"""
+A calibrated camera says where on the plane of height zero each pixel looks, and the pinhole's apparent position for the
+picture's middle. Refraction from air into acrylic grows with the angle, so pixels farther out see the pinhole at
+another height: gel above that plane shifts a little. Reflections and losses of the window are part of the calibrated
+lights and response."""
 
 from __future__ import annotations
 
@@ -33,7 +32,7 @@ def air_over_window(camera: Camera, index: float) -> float:
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
     """Return the pinhole's apparent height, m above height zero, for pixels that look a distance, m, off its axis.
-    Snell's law through a flat window. A camera too near for its window to fit in keeps its height."""
+    Snell's law through a flat window. A camera nearer than its window is thick keeps its height."""
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
@@ -48,8 +47,7 @@ def tangent(sine: np.ndarray) -> np.ndarray:
 
 
 def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -> np.ndarray:
-    """Return the picture (H, W, k) of a pinhole as it looks through the window, float32.
-    height : (H, W) m of the gel that each pixel of the picture sees"""
+    """Return a pinhole's picture (H, W, k) as seen through the window, float32. height : (H, W) m, of the gel in it"""
     camera = unit.camera
     right, down = np.meshgrid(camera.right, camera.down)
     nearer = 1 - height / apparent_height(np.hypot(right, down), camera, unit.gel_index)
@@ -68,9 +66,9 @@ def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarra
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and directions (3, n) float32 of rays, right, up, toward the camera, mm, looking at places (n,) m.
-    right, down : on the plane of height zero. Rays start under the window. A camera too near for its window to fit in
-    has none."""
+    """Return starts and directions (3, n) float32 of rays: right, up, toward the camera, mm.
+    right, down : (n,) m, where they meet the plane of height zero. Rays start under the window, unless the camera is
+        nearer than the window is thick."""
     camera, index = unit.camera, unit.gel_index
     air, window = air_over_window(camera, index), window_height(camera)
     if air <= 0:

@@ -1,6 +1,5 @@
-"""``<recording>/%06d.exr``: float32, numbered by the frame's index in the recording; what the job kept of
-``height``, m, and ``R``, ``G``, ``B``, grey levels 0..255. Needs OpenEXR, of the extra [render].
-"""
+"""``<recording>/%06d.exr``: float32, numbered by the frame's index in the recording; of ``height``, m, and ``R``,
+``G``, ``B``, grey levels 0..255, what the job kept. Needs OpenEXR, of the extra [render]."""
 
 from __future__ import annotations
 

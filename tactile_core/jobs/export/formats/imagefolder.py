@@ -1,5 +1,5 @@
-"""``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``: pictures as Hugging Face's ``datasets`` loads them. A
-row of metadata.csv is a picture: its file, recording, frame and time, the labels, and the numbers of the contact."""
+"""``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``: pictures as Hugging Face's ``datasets`` loads them.
+Each row of metadata.csv is a picture: file, recording, frame, time, labels, and numbers of the contact."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[Any]]]:
-    """Write the pictures of a recording; yields the rows of some frames."""
+    """Write the pictures of a recording; yields the rows of some frames at a time."""
     for block in one.blocks():
         rows = []
         for row, frame in enumerate(map(int, block["frame"])):
@@ -61,6 +61,6 @@ def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[
 
 
 def _number(value: Any, part: int | None) -> str:
-    """Format a number with six digits; empty where it is not known."""
+    """Format a number with six digits; empty for an unknown one."""
     number = float(value if part is None else value[part])
     return f"{number:.6g}" if np.isfinite(number) else ""

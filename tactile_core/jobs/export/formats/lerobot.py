@@ -27,7 +27,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 class _Together:
-    """Data files of many episodes, one after another."""
+    """Data files of many episodes each."""
 
     version = "v3.0"
     picture: Literal["image", "video"] = "image"
@@ -51,7 +51,7 @@ class _Together:
         self._writer.write_table(added)
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the file where it has become large; returns its number."""
+        """Close the file if it has become large; returns its number."""
         place = {f"data/{name}": number for name, number in self._place().items()}
         if self._path.stat().st_size > FILE_MB * 1e6:
             self._close()
@@ -83,7 +83,7 @@ class _Together:
 
 
 def _write_tasks(path: Path) -> None:
-    """Write the one task; LeRobot looks it up by the index of this table, as pandas writes it."""
+    """Write the single task; LeRobot looks it up by the index of this table, as pandas writes it."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -1,5 +1,5 @@
-"""``<recording>.npz``: all arrays of a recording, as NumPy reads them, and labels as ``labels/<name>``. Frames are
-written as they come."""
+"""``<recording>.npz``: all arrays of a recording, as NumPy reads them, and labels as ``labels/<name>``; written frame
+by frame."""
 
 from __future__ import annotations
 
