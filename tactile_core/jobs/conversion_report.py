@@ -36,8 +36,7 @@ SHEET_ARRAYS = (
 
 
 class ConversionReport:
-    """Collects what is reported of all frames, and what the contact sheet shows; flagged : number of frames of each
-    flag"""
+    """Collects what is reported of all frames, and what the contact sheet shows; flagged : number of frames by flag"""
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
         """Start a report on rising frames (T,) of prepared rows, which `made` translates."""
@@ -91,8 +90,7 @@ class ConversionReport:
 
     @property
     def explained(self) -> float | None:
-        """Mean over frames in contact of the share of the electrodes' change that the translation explains; None
-        without any."""
+        """Share of the electrodes' change that the translation explains, mean in contact; None without any."""
         share = np.concatenate(self._explained)
         touching = np.isfinite(share)
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None

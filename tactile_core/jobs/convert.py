@@ -94,8 +94,7 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : the result; warnings : sentences; remark : how far kept traction is from the
-    force"""
+    """A finished conversion. folder : the result; warnings : sentences; remark : on kept traction against force"""
 
     folder: Path
     warnings: tuple[str, ...]

@@ -37,8 +37,7 @@ class Tools:
 
 
 class FramePass:
-    """All arrays of a recording's frames, part by part, and their file; folded : number of height maps of folded gels
-    so far"""
+    """All arrays of a recording's frames, part by part, and their file; folded : height maps of folded gels so far"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None

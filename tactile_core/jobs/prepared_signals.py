@@ -45,8 +45,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording; prepared : its parts' reports; frames, labels : of the whole recording, see
-    ``recordings.labels``"""
+    """Facts of a recording; prepared : its parts' reports; frames, labels : of all of it (``recordings.labels``)"""
 
     recording: str
     layout: str
@@ -64,8 +63,7 @@ class About(TypedDict):
 
 
 def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare recording `index` unless it is; returns its frames, and if it was made. Raises TactileError if it
-    changed."""
+    """Prepare recording `index` unless it is; returns its frames, and if made. Raises TactileError if it changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     frames = checksummed.stated_rows(file)

@@ -121,8 +121,7 @@ def claimed(out: Path, options: Options) -> str:
 
 
 def choose_preset(options: Options) -> str:
-    """Return the named preset, the cheapest one within the levels, or the default. Raises TactileError for both
-    options."""
+    """Return the named preset, the cheapest within the levels, or the default. Raises TactileError for both options."""
     if options.levels is None:
         return options.preset or DEFAULT
     if options.preset is not None:

@@ -282,8 +282,7 @@ def scale(*displacements: np.ndarray | None) -> float:
 
 
 def _shown(place: np.ndarray, beside: float) -> tuple[float, float]:
-    """Return the range, m, that a row shows along one axis: all nodes' places (n,) m and a margin, in tenths of a
-    mm."""
+    """Return the range, m, that a row shows along one axis: all nodes' places (n,) m and a margin, to 0.1 mm."""
     low, high = np.round(1e4 * np.array([place.min() - beside, place.max() + beside])) / 1e4
     return float(low), float(high)
 

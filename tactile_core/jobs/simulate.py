@@ -43,8 +43,7 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """List all combinations, the last name's values changing fastest. Raises TactileError for a bad or repeated
-    word."""
+    """List all combinations, the last name's values changing fastest. Raises TactileError for bad or repeated words."""
     axes: dict[str, list[Value]] = {}
     for word in words:
         name, mark, text = word.partition("=")

@@ -60,8 +60,7 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Ambient light (3, H, W) float32, levels of each LED's band, of gel seen at heights (H, W) m less that at height
-    zero."""
+    """Ambient light (3, H, W) float32, levels of each LED's band, of gel seen at heights (H, W) m less that at zero."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 

@@ -100,8 +100,7 @@ class HeightMapper:
     def follow(
         self, displacement: np.ndarray, x: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the displaced places x, z and heights (n,) m of gel points that rest at places x, z (n,) m.
-        displacement : (n_nodes, 3) m"""
+        """Return places x, z and heights (n,) m, by displacement (n_nodes, 3) m, of points at rest at x, z (n,) m."""
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
         tables = np.stack([move[..., 0], move[..., 2], self.rest_y + move[..., 1]])
         coefficients = self.along.to_coefficients @ tables @ self.across.to_coefficients.T
@@ -171,8 +170,7 @@ class HeightMapper:
         return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate splines with coefficients (k, rows, columns) at places (n,) m; (n, k) float32, within 0.1 nm a
-        mm."""
+        """Evaluate splines with coefficients (k, rows, columns) at places (n,) m; (n, k) float32, to 0.1 nm a mm."""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)

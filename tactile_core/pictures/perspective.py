@@ -68,8 +68,7 @@ class Perspective:
         return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return (slope along p) |p| / apparent height (H, W), p the place from the picture's middle; and its
-        minimum."""
+        """Return (slope along p) |p| / apparent height (H, W), p the place from the picture's middle; and its least."""
         slope_right, slope_down = slopes(height, self.camera)
         slope_right *= self.right * self.inverse
         slope_down *= self.down * self.inverse

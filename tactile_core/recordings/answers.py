@@ -31,8 +31,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
 
 
 def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> Signals:
-    """Prepare frames with a response; silent ones get no change and a flag. Raises TactileError for a tare among
-    those."""
+    """Prepare frames with a response; silent ones get no change and a flag. Raises TactileError for a tare in those."""
     heard = np.flatnonzero(~silent)
     first = np.flatnonzero(silent)[0]
     where = f"{recording.row_word} {recording.rows[first]}"

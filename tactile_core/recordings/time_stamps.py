@@ -70,8 +70,7 @@ def is_likely(values: np.ndarray) -> bool:
 
 
 def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Spread frames (T,) that share a stamp evenly up to the next, at the ends by the usual step; also return
-    sentences."""
+    """Spread frames (T,) that share a stamp evenly up to the next, the last by the usual step; and say so."""
     steps = np.diff(seconds)
     if len(steps) < FEWEST or not (steps >= 0).all() or (steps == 0).mean() < SHARED:
         return seconds, []

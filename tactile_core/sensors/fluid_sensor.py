@@ -84,8 +84,7 @@ class SkinLattice:
 
 @dataclasses.dataclass(frozen=True)
 class FluidFilm:
-    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, smallest valid
-    film"""
+    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, still valid"""
 
     conductivity: float = number("s_per_m", above=0)
     interface: float = number("ohm", above=-1)
@@ -120,8 +119,7 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where both have the
-    same x"""
+    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where x is shared"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")

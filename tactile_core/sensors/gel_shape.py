@@ -103,8 +103,7 @@ class GelShape:
         return np.full(np.shape(z), self.tip_x)
 
     def _corner_block(self, steps_x: np.ndarray, steps_z: np.ndarray) -> np.ndarray:
-        """Points (rows, columns, 2) from the window's tip corner (z > 0) to the arc, at fractions 0..1 in each
-        direction."""
+        """Points (rows, columns, 2) from the window's tip corner (z > 0) to the arc, at fractions 0..1 each way."""
         corner = np.array([self._lattice.window_x[0], self._lattice.window_z[1]])
         # where the row of the corner meets the arc, and where its column does
         angle_a = np.arctan2(self._half_width_at(corner[:1])[0], corner[0] - self.arc_x)

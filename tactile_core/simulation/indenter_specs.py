@@ -103,8 +103,7 @@ IndenterSpec = Single | SeveralSpec
 
 
 def with_files_of(folder: pathlib.Path, spec: IndenterSpec) -> IndenterSpec:
-    """Return the spec with mesh files of the scene's folder. Raises TactileError for a file missing or outside of
-    it."""
+    """Return the spec with mesh files of the scene's folder. Raises TactileError for one missing or outside of it."""
     if isinstance(spec, SeveralSpec):
         parts = [msgspec.structs.replace(part, body=with_files_of(folder, part.body)) for part in spec.parts]
         return msgspec.structs.replace(spec, parts=parts)

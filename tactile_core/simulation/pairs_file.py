@@ -158,8 +158,7 @@ def _named(pair: tuple[str, str]) -> dict[str, str]:
 def _dataset(
     file: h5py.File, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
 ) -> np.ndarray:
-    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all datasets in the
-    file"""
+    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
         raise TactileError(place, "no such dataset", f"the datasets {', '.join(names.values())}", ADVICE)
@@ -222,8 +221,7 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts 80/10/10 by press, which keeps similar ones together. Raises TactileError for under five
-    presses."""
+    """Split contacts 80/10/10 by press, which keeps similar ones together. Raises TactileError below five presses."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"

@@ -21,8 +21,7 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier for a bound; error : um rms that 95 of 100 contacts stay below; ms : a contact; share : of the reached
-    depth"""
+    """Tier for a bound; error : um rms that 95 of 100 contacts stay below; ms : a contact; share : reached depth"""
 
     tier: Tier
     error: float

@@ -98,8 +98,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (F, 2) on the gel's lattice, in its units, of contacts (F, 3) m; and a mask (F,) of those off the
-    pad."""
+    """Return places (F, 2) on the gel's lattice, in its units, of contacts (F, 3) m; and which (F,) are off the pad."""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
@@ -224,8 +223,7 @@ def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
-    """Return rows of the median error of place and force on held-out presses; baseline: always the training's
-    median."""
+    """Rows of the median error of place and force on held-out presses; baseline: always the training's median."""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
     latent = nets.encode_signal(data.change[test], data.rectified)

@@ -175,8 +175,7 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """Return a row for each metric over the contacts in these rows that press without sliding, averaged as
-    `in_bins`."""
+    """Rows of each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []

@@ -114,8 +114,7 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """Return the near basis's input, faded toward the window's edge, where decoded gel would otherwise have a
-        step."""
+        """Return the near basis's input, faded toward the window's edge, where decoded gel would have a step."""
         fade = torch.from_numpy(self.frame.fade())
         return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
 
@@ -164,8 +163,7 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, on the
-        host."""
+        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, on host."""
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()

@@ -229,8 +229,7 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for one pass over the data; returns the mean loss. The rate rises over the first steps, then falls as a
-    cosine."""
+    """Train for one pass over the data; returns the mean loss. The rate rises at first, then falls as a cosine."""
     total = 0.0
     for step, loss in enumerate(losses):
         share = (epoch * len(losses) + step + 1) / (epochs * len(losses))

@@ -70,8 +70,7 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the network's sizes: changes on two scales -> half the parts' difference, and the logit of two
-    contacts."""
+    """Return the network's sizes: changes on two scales -> half the parts' difference, and the logit of two."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 

@@ -243,8 +243,7 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains that the frames do not determine by 1; return the gains, a mask of the fitted ones, and
-    warnings."""
+    """Replace gains that the frames do not determine by 1; return gains, a mask of the fitted ones, and warnings."""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():

@@ -183,8 +183,7 @@ def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np
 
 
 def check_tables(card: dict[str, Any], where: str) -> None:
-    """Raise TactileError unless a card has bounds, and rising finite quantiles, one a level, for confidence and
-    silence."""
+    """Raise TactileError unless a card has bounds, and rising quantiles, one a level, for confidence and silence."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
     distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:

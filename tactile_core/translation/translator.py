@@ -137,8 +137,7 @@ class Translator:
         return recovered(self._typical(signals), _rectified(signals), self._patterns)
 
     def _typical(self, signals: Signals) -> np.ndarray:
-        """Convert changes to (T, e) counts of the unit that the networks know. Raises TactileError for another
-        sensor."""
+        """Convert changes to (T, e) counts of the unit that the networks know; TactileError for another sensor."""
         if signals.sensor != self.source:
             found = f"signals of a {sensors.title(signals.sensor)}"
             raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")

@@ -181,8 +181,7 @@ def _labels(path: str, file: File) -> dict[str, str]:
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
-    """Return numbers measured beside a recording, as one text a frame: force in N from its file, columns of its own
-    file."""
+    """Return numbers beside a recording, one text a frame: force in N from its file, columns of its own file."""
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():

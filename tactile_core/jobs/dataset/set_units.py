@@ -31,8 +31,7 @@ def file_name(unit: str) -> str:
 
 
 def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, str]]:
-    """Return the readable files of the set's sensor, and path -> why others are left out; each file is read whole if
-    the unit is adapted."""
+    """Return readable files of the set's sensor, and path -> why others are not; read whole if the unit is adapted."""
     good, aside = [], {}
     for file in files:
         path = str(file.path)

@@ -19,8 +19,7 @@ MOST, FEWEST = 1000, 12  # examples of a task; with fewer nothing is shown (assu
 
 @dataclass(frozen=True)
 class Row:
-    """Accuracy of a classifier; task : label; by : kind of features; error : standard error; examples, classes :
-    numbers"""
+    """Accuracy of a classifier; task : label; by : kind of features; error : standard; examples, classes : numbers"""
 
     task: str
     by: str

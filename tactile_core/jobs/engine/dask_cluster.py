@@ -167,8 +167,7 @@ def _read(address: str) -> QueueFile:
 
 @contextmanager
 def _closing(cluster: Any) -> Iterator[Any]:
-    """Close the cluster at the end. The library asserts that each job has been closed, which may be late on a busy
-    machine."""
+    """Close the cluster at the end. Its library asserts that all jobs are closed, which a busy machine may delay."""
     try:
         yield cluster
     finally:

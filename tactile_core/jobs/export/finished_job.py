@@ -52,8 +52,7 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield all arrays but those in `without`, in blocks of frames, always under the names of a BioTac and a
-        DIGIT."""
+        """Yield all arrays, or all but some, in blocks of frames, always under the names of a BioTac and a DIGIT."""
         import h5py
 
         for path in self.shards:
@@ -141,8 +140,7 @@ def load(folder: Path) -> Finished:
 
 
 def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int) -> None:
-    """Raise TactileError for a shard that is damaged or another job's, or has other arrays or rows than its job
-    says."""
+    """Raise TactileError for a shard that is damaged or another job's, or has other arrays or rows than it says."""
     if checksummed.verified_checksum(path) is None:
         raise TactileError(path, "damaged", "a whole shard", ADVICE)
     rows = min(job.recipe.shard_frames, translate_shards.translated(frames, job) - number * job.recipe.shard_frames)

@@ -166,8 +166,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _one_rate(source: Finished) -> int:
-    """Return the recordings' common rate, whole frames a second. Raises TactileError for different rates, or below
-    1."""
+    """Return the recordings' common rate, whole frames a second. Raises TactileError for different ones, or below 1."""
     first = _rate(source.recordings[0])
     for one in source.recordings:
         rate = _rate(one)

@@ -1,5 +1,4 @@
-"""Statistics of episodes for LeRobot's normalisation: of each feature's numbers, and of a picture's channels in
-0..1."""
+"""Statistics of episodes for LeRobot's normalisation: of each feature's numbers, and of a picture's channels."""
 
 from __future__ import annotations
 

@@ -32,8 +32,7 @@ class Growing:
     """A CSV recording that another program is writing, in any of the text layouts."""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
-        """Follow a file, or ``path#1``, its finger 1. columns, sensor : as of `read`. Raises TactileError for a missing
-        file."""
+        """Follow a file, or ``path#1``, its finger 1. columns, sensor : as of `read`. Raises TactileError for none."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
@@ -106,8 +105,7 @@ Say = Callable[[str], None]
 
 
 def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequence[Output], say: Say, tell: Say) -> None:
-    """Show frames until the rows or an output end. say : called with lines of progress; tell : with the summary at the
-    end"""
+    """Show frames until the rows or an output end. say : called with lines of progress; tell : with the summary"""
     reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
         for rows, came in source:

@@ -115,8 +115,7 @@ def _try_press(
 
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; drift of light is added to it and the
-    baseline."""
+    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; drift of light is added, as to the baseline."""
     untouched = background + press.drift
     picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)

@@ -34,8 +34,7 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
-    """Result of a calibration.
-    calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
+    """Result. calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
 
     calibration: Calibration
     tried: list[Evaluation]

@@ -73,8 +73,7 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``
-    does."""
+    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``."""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

@@ -134,8 +134,7 @@ def _rises(table: Table, name: str) -> bool:
 
 
 def _long(table: Table) -> list[ColumnMap]:
-    """Return the maps of a long table: the column that names 19 channels in turn, with each column that may hold
-    values."""
+    """Return the maps of a long table: the column that names 19 channels in turn, with each that may hold values."""
     for place, name in enumerate(table.header):
         if name in table.words:
             held = [word.lower() for word in table.words[name]]

@@ -54,8 +54,7 @@ LEAST_APART = 100.0  # counts, root of the sum of squares: units differ by 106 t
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and the number of
-    contacts."""
+    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and the contacts' number."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
@@ -169,8 +168,7 @@ def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = 
 def flagged(
     typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
 ) -> tuple[np.ndarray, Doubt | None]:
-    """Return the flags (T,) of changes of a typical unit, with the doubt that their contacts raise together, or
-    None."""
+    """Return the flags (T,) of changes of a typical unit, with the doubt that its contacts raise together, or None."""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
         return flags, None
     contact = touching(typical) & ~quiet

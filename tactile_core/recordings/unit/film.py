@@ -210,8 +210,7 @@ def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
 
 
 def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str]:
-    """Return the most plausible thickness, by the counts at rest and enough different contacts, and the evidence in
-    words."""
+    """Return the most plausible thickness, by counts at rest and enough different contacts, and its evidence."""
     impedance = _impedance_at_rest(seen)
     doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
     at_first = seen.typical(_believed(doubt), conductivity)

@@ -1,5 +1,4 @@
-"""``<recording>.npz``: all arrays of a recording, as NumPy reads them, and labels as ``labels/<name>``; written frame
-by frame."""
+"""``<recording>.npz``: all arrays of a recording, as NumPy reads them; labels as ``labels/<name>``."""
 
 from __future__ import annotations
 
