@@ -105,6 +105,8 @@ class ShadowCaster:
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
+        """Return sight (rows, columns) at distances r from the foot, where the mapped field has heights h(r):
+        ((foot - h(r)) / r - horizon) radii, with horizon = max over steps d of (h(r - d) - h(r)) / d."""
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
             foot = np.float32(self.foot[2])

@@ -58,7 +58,10 @@ class Lit(NamedTuple):
 
 
 def lambert(surface: Surface, positions: np.ndarray) -> Lit:
-    """Return the light of LEDs at positions (L, 3) m, image frame, by Lambert's law and the inverse square."""
+    """Return the light of LEDs at positions l (L, 3) m, image frame, by Lambert's law and the inverse square.
+
+    light = (n . v) |l|^2 / |v|^3, v = l - p from the gel point p to the LED, n the unit normal at p; it is 1 for a
+    coating at the origin that faces the LED. Written out for speed: |v|^2 = |p|^2 - 2 p . l + |l|^2."""
     strengths = np.square(positions).sum(-1).astype(np.float32)
     places = np.asarray(positions, np.float32)
     right, down, height, slope_right, slope_down, inverse = surface

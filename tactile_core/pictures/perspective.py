@@ -177,8 +177,8 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
-    """See ``Perspective.__call__``; height, steepness (H W,); rows (H,), columns (W,) from the map's middle.
-    inverse : 1/m, of the camera's apparent height"""
+    """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
+    height, steepness : (H W,); rows, columns : (H,), (W,), from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)
     last_row, last_column = np.float32(2) * middle_row, np.float32(2) * middle_column

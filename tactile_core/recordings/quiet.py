@@ -126,6 +126,8 @@ def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
 
 
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
+    """Return the statistics of all windows of n frames. A window is calm if in every electrode the standard deviation
+    and the difference between the means of its halves are below CALM_STD and CALM_TREND times the noise."""
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
     medians = np.array([[median(column)] for column in electrodes.T])
@@ -203,6 +205,8 @@ def _tracked(
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
+    """Choose one of the calm windows as surely at rest: among those of lowest PDC, the first near the recording's start
+    or the last near its end; of a recording that is not raw, the one nearest to zero."""
     if windows.pdc is not None:
         low = windows.pdc[calm]
         calm = calm[low <= low.min() + 0.5 * QUIET_PDC]

@@ -98,6 +98,8 @@ def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarr
 
 
 def _closest_weights(point: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Barycentric weights (f, 3) of the place on each triangle a, b, c (f, 3) nearest to its point (f, 3): the
+    projection onto the plane where that lies inside, else the nearest place on an edge."""
     ab, ac, ap = b - a, c - a, point - a
     d = np.einsum
     g11, g12, g22 = d("fd,fd->f", ab, ab), d("fd,fd->f", ab, ac), d("fd,fd->f", ac, ac)

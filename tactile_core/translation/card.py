@@ -177,7 +177,8 @@ def _quantile(score: np.ndarray) -> float:
 
 
 def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
-    """Bound (T,) float32 m of 95 of 100 largest errors. expected : (T,) m; x : (T,) m, as in `region`"""
+    """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the region's number
+    (without contact that number, m, itself). expected : (T,) m; x : as in `region`; numbers : of `fit_bounds`"""
     where = region(x)
     return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 

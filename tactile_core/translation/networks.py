@@ -226,15 +226,15 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def encode(block: np.ndarray) -> np.ndarray:
-            """Encode (BLOCK, n, 3) m."""
+            """Encode u (BLOCK, n, 3) m: wide = W u, near = N window(u - W^T wide), scaled, with the place."""
             local = frame.to_local(block)
             place = frame.place(local)
             cells, left = frame.cells(place)
             wide = local.reshape(len(local), -1) @ tensors["wide"].T
             rest = local - (wide @ tensors["wide"]).reshape(local.shape)
             near = frame.windows(rest, cells).reshape(len(local), -1) @ tensors["near"].T
-            seen = np.concatenate([np.concatenate([wide, near], -1) / tensors["scale"], place, left], -1)
-            code = residual(seen, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
+            inputs = np.concatenate([np.concatenate([wide, near], -1) / tensors["scale"], place, left], -1)
+            code = residual(inputs, tensors, "encoder", sizes["blocks"])[:, : sizes["latent"] - PLACE]
             return np.concatenate([place, code], -1)
 
         return in_blocks(encode, displacement, (sizes["nodes"], 3), f"{net} encoder")
@@ -243,7 +243,7 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def decode(block: np.ndarray) -> np.ndarray:
-            """Decode (BLOCK, L)."""
+            """Decode (BLOCK, L) to W^T wide + N^T near, the latter in the window around the place."""
             placed, cells = self._placed(net, block)
             modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
             wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]

@@ -42,7 +42,8 @@ class Posterior:
         return state.astype(np.float32)
 
     def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-        """Return the mean state (T, STATE) of the components, weighted by their density at places (T, PLACE).
+        """Return the mean state (T, STATE) of the components, weighted by their density at places p (T, PLACE):
+        weight exp(-|(p - mean) / spread|^2 / 2) / product of the spreads.
         touched : (T,) bool, true averages the components in contact, false those without contact. (Both may lie at one
             place, because components without contact have place zero.)"""
         spread = self.spread[..., :PLACE].astype(np.float64)

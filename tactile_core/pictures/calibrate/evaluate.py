@@ -93,6 +93,8 @@ def fitted_size(calibration: Calibration, photographs: Photographs) -> Calibrati
 def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
+    """Fit the ball to a press, compare its picture (of `whole`) with the photograph, and fit the ball's light and, with
+    `search_radius`, its radius as further unknowns. working : reduced pixels, for fits"""
     sight = Sight(press)
     radius = sight.radius(radius)
     ball, _ = fit_ball(working, sight, radius)

@@ -200,7 +200,8 @@ class UnitResiduals:
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the matrix and gradient over x with the gain eliminated."""
+        """Return the matrix A - sum over channels of B C^-1 B^T and the gradient over x. The gain, of matrix C and mixed
+        terms B, is eliminated by Schur's complement; its gradient is zero at its optimum."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)

@@ -194,7 +194,10 @@ def _on_gel(
 def irradiance(
     height: np.ndarray, radiance: np.ndarray, margin: int, spacing: tuple[float, float], gather: Gather
 ) -> np.ndarray:
-    """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, in the unit of radiance.
+    """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, over pi: in the unit of radiance.
+
+    (1 / pi) times the integral of L (n . w) dw over directions w that meet gel: for each azimuth, L times the rise of
+    `_weight` from each horizon to the next.
     height : (h, w) m; radiance : (h, w, 3); spacing : (right, down) m
     margin : places on each side that give light and receive none, as far as the search reaches"""
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)

@@ -30,9 +30,9 @@ DRIVER = {"17": {"pdc": "1", "tac": "2", "tdc": "3"}}
 
 
 def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]:
-    """Guess the maps of a file's fingers, the one to read first; without electrodes where none are found.
-    names : of the columns, in lower case; of arrays, with their lengths, those as long as the electrodes
-    table : some of the columns' rows"""
+    """Guess a column map for each finger in a file, the one to read first; a map without electrodes if none are found.
+    names : of all columns, in lower case, or name -> length of all arrays (those of another length are ignored)
+    table : some rows, for columns without telling names"""
     found = []
     for each in _series(names):
         near = _as_long(names, each)

@@ -187,7 +187,10 @@ def _believed(doubt: np.ndarray) -> float:
 
 
 def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
-    """Most plausible course of the conductivity, (windows,) log over that at rest (Viterbi's algorithm)."""
+    """Most plausible course c (windows,) of the conductivity, log over that at rest, by Viterbi's algorithm.
+
+    It minimises the sum over windows of min(distance to a contact, to none)^2 / scale, on average, plus
+    c_0^2 / (2 at_start^2) and, for each step, (c_1 - c_0)^2 / (2 A_SECOND^2 seconds)."""
     still = seen.apart(seen.typical(thickness, 1.0))[2]
     scale = 2 * (len(seen.rest[0]) * (NOISE / SCALE) ** 2 + MISFIT**2 * still)
     cost = np.empty((len(seen.windows), len(CONDUCTIVITIES)))
