@@ -177,8 +177,8 @@ def _quantile(score: np.ndarray) -> float:
 
 
 def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
-    """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the region's number
-    (without contact that number, m, itself). expected : (T,) m; x : as in `region`; numbers : of `fit_bounds`"""
+    """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the region's
+    number (without contact the number itself, m). expected : (T,) m; x : as in `region`; numbers : of `fit_bounds`"""
     where = region(x)
     return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 
