@@ -36,7 +36,7 @@ def main() -> None:
     names, counts = np.unique(words, return_counts=True)
     common = names[counts.argmax()]
     right, always = np.mean(learner.predict(unseen) == truth), np.mean(truth == common)
-    print(f"{len(known)} pictures learnt, {len(unseen)} told; right: {right:.2f}, always {common!r}: {always:.2f}")
+    print(f"{len(known)} pictures learnt, {len(unseen)} told; right: {right:.2f}, always {str(common)!r}: {always:.2f}")
 
 
 if __name__ == "__main__":

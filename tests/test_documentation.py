@@ -75,6 +75,8 @@ ELSEWHERE = {
     "python3 scripts/build_extension.py": ("tests/blender/test_extension_zip.py", "build_extension"),
     "blender ": ("tests/blender/test_command_line.py", "tactile"),
     "tactile dataset phac2": ("tests/jobs/dataset/test_dataset.py", '"phac2"'),
+    "tactile simulate scenes/press --keep electrodes --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
+    "tactile dataset mine.toml": ("tests/jobs/dataset/test_dataset.py", "own.toml"),
     "tactile dataset --new mine.toml": ("tests/jobs/dataset/test_dataset.py", "guess.write"),
     "python docs/learn_from_pictures.py": ("tests/jobs/dataset/test_dataset.py", "learn_from_pictures.py"),
     "tactile adapt pressed.csv": ("tests/translation/test_force_scale.py", '"--force"'),

@@ -58,8 +58,8 @@ class Translation(Summary):
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
         and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
-    explained : (T,), 1 - |change - predicted|^2 / |change|^2, predicted being the electrodes' change that such a unit
-        shows under the translated contact; at most 1, below 0 where no change is a better guess, NaN without contact"""
+    explained : (T,), 1 - sum((change - predicted)^2) / sum(change^2), predicted being the electrodes' change that
+        such a unit shows under the translated contact; at most 1, below 0 where zero predicts better, NaN without contact"""
 
     latent_signal: np.ndarray
     latent_biotac: np.ndarray

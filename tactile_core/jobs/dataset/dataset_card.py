@@ -47,7 +47,7 @@ def card_of(
     of = recipe.source
     sections = {
         f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
-        "## What is here": _contents(source, found, summaries, layouts),
+        "## What is here": _contents(recipe, source, found, summaries, layouts),
         "## Labels": _labels(summaries),
         "## How far to trust it": [*_trust(summaries), "", *_warnings(source)],
         "## What survives of the labels": _survives(recipe, rows),
@@ -95,13 +95,17 @@ def _verdict(task: str, by: dict[str, Row]) -> str:
     return f"`{task}` is told as well as from the electrodes, within two standard errors: {told}."
 
 
-def _contents(source: Finished, found: Collected, summaries: list[Summary], layouts: Sequence[str]) -> Iterable[str]:
+def _contents(
+    recipe: Recipe, source: Finished, found: Collected, summaries: list[Summary], layouts: Sequence[str]
+) -> Iterable[str]:
     for split in dict.fromkeys(one.recording.split for one in summaries):
         frames = [one.recording.frames for one in summaries if one.recording.split == split]
         yield f"- {split}: {len(frames)} recordings, {sum(frames)} frames"
     every = source.recordings[0].every
     yield f"- one in {every} frames of the recordings" if every > 1 else "- all frames of the recordings"
-    yield f"- layouts: {', '.join(layouts)}; `index.html` to look at all recordings; `units/`: how each finger was read"
+    yield f"- layouts: {', '.join(layouts)}; `index.html` to look at all recordings"
+    if recipe.unit.found != "none":
+        yield "- `units/`: how each finger was read"
     if found.others:
         yield f"- {found.others} other files of the folder were left alone"
     yield from (f"- set aside: {_plain(name)}: {_plain(why)}" for name, why in source.aside.items())

@@ -14,7 +14,7 @@ from ..engine import inputs
 from .recipe import FORMAT, MOST_FIELDS
 
 BETWEEN = re.compile(r"[_\-./ ]")  # pieces of names
-PIECE = re.compile(r"[^_\-./ ]+|[_\-./ ]")
+PIECE = re.compile(r"(?<![^_\-./ ])-?\d+(?:\.\d+)?(?![^_\-./ ])|[^_\-./ ]+|[_\-./ ]")  # -1.5 is one piece
 MOST_PATTERNS = 8  # shapes of names, the commonest (assumed enough)
 
 TEMPLATE = """\

@@ -170,6 +170,13 @@ def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_p
     assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
 
 
+def test_a_guessed_recipe_takes_a_number_as_one_label(folder, tmp_path):
+    for number, force in enumerate(("-1.5", "2", "10")):
+        shutil.copy(folder / "ball_0.npz", tmp_path / f"{number}_force_n-{force}.npz")
+    guess.write(tmp_path / "new.toml", tmp_path)
+    assert recipes.read(str(tmp_path / "new.toml")).files == ["{label1}_force_n-{label2}.npz"]
+
+
 def small(folder: Path, recipe: Path, tmp_path: Path, *changes: tuple[str, str]) -> tuple[Path, Path, Path]:
     """Two recordings and the rest, a recipe changed so, and where the result goes."""
     (tmp_path / "in").mkdir()
