@@ -59,7 +59,7 @@ class Translation(Summary):
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
         and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
     explained : (T,), 1 - sum((change - predicted)^2) / sum(change^2), predicted being the electrodes' change that
-        such a unit shows under the translated contact; at most 1, below 0 where zero predicts better, NaN without contact"""
+        such a unit shows under the translated contact; at most 1, below 0 where zero is nearer, NaN without contact"""
 
     latent_signal: np.ndarray
     latent_biotac: np.ndarray
