@@ -314,8 +314,13 @@ def why_pip_failed(text: str, log: Path) -> str:
 
 
 def environment() -> dict[str, str]:
-    """The caller's environment without what would lead Python or pip away from the virtual environment."""
-    kept = {key: value for key, value in os.environ.items() if key not in ("PYTHONHOME", "PYTHONPATH", "PIP_USER")}
+    """The caller's environment without what would lead Python or pip away from the virtual environment.
+
+    Nor does PYTHONDONTWRITEBYTECODE stay, which containers set: the packages were installed uncompiled, and every
+    command of a test would compile them again, for five times the start of `tactile --version`.
+    """
+    dropped = ("PYTHONHOME", "PYTHONPATH", "PIP_USER", "PYTHONDONTWRITEBYTECODE")
+    kept = {key: value for key, value in os.environ.items() if key not in dropped}
     kept["PIP_DISABLE_PIP_VERSION_CHECK"] = "1"
     kept.setdefault("PIP_RETRIES", "2")  # pip's five keep a user without a network waiting for a minute
     if not kept.get("HOME") and os.name != "nt":
