@@ -83,9 +83,8 @@ def build_packages(out: Path) -> Path:
     """Build the sdist, and from it the wheel, stamped with the commit's time; returns the wheel."""
     with tempfile.TemporaryDirectory() as folder:
         python = new_environment(Path(folder), "build")
-        variables = {**os.environ, "SOURCE_DATE_EPOCH": run("git", "log", "-1", "--format=%ct")}
-        command = [str(python), "-m", "build", "--outdir", str(out), str(ROOT)]
-        subprocess.run(command, check=True, env=variables, stdout=subprocess.DEVNULL)
+        os.environ["SOURCE_DATE_EPOCH"] = run("git", "log", "-1", "--format=%ct")
+        run(str(python), "-m", "build", "--outdir", str(out), str(ROOT))
     return next(out.glob("*.whl"))
 
 
@@ -116,7 +115,7 @@ def new_environment(folder: Path, *packages: str) -> Path:
     """Make an empty virtual environment, install packages into it and return its Python."""
     venv.create(folder, with_pip=True)
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    subprocess.run([str(python), "-m", "pip", "install", "--quiet", "--no-input", *packages], check=True)
+    run(str(python), "-m", "pip", "install", "--quiet", "--no-input", *packages)
     return python
 
 
