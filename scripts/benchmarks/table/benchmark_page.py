@@ -14,7 +14,7 @@ from .method import Method
 TITLES = {
     "mechanics": "Contact mechanics", "translation": "Translation, signals to the DIGIT's gel",
     "pictures": "Pictures of known deformations", "photographs": "Pictures beside photographs",
-    "chain": "Whole chain, signals to pictures",
+    "chain": "Whole chain, signals to pictures", "peers": "Others' programs, each with its own calibration",
 }  # fmt: skip
 TABLE = "| method | ms a frame | MB | error | baseline | measured on |", "|---|---|---|---|---|---|"
 
@@ -34,8 +34,8 @@ def write_report(
 def as_line(method: Method) -> str:
     """A method as a line of the table; the fastest with the least error of its stage stand in the plot."""
     cells = [f"`{method.name}`", *map(short, (method.ms, method.mb))]
-    cells += [f"{short(method.error)} {method.unit}", f"{short(method.baseline)} {method.unit}", method.of]
-    return "| " + " | ".join(cells) + " |"
+    cells += ["" if each is None else f"{short(each)} {method.unit}" for each in (method.error, method.baseline)]
+    return "| " + " | ".join([*cells, method.of]) + " |"
 
 
 def short(value: float | None) -> str:

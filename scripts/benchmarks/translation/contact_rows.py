@@ -32,6 +32,7 @@ SETS = {
 # Of rectified signals: share of the true depth (120 of 254 um), mm, share of contacts (docs/sources.md, Targets).
 RECTIFIED_PEAK, RECTIFIED_PLACE, RECTIFIED_SILENT = 120 / 254, 0.8, 0.05
 REGIONS = {0.5: (0.45, 0.55), 0.9: (0.86, 0.94)}  # share of the posterior -> between which shares of truths lie in it
+FELT = 0.1  # of a field's peak: nodes whose error counts in `left_of_nothing`
 DRAWS = 200  # of each posterior: a share is known to .035 a contact, to .002 over 368 of them
 
 
@@ -39,7 +40,7 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
     """Medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)."""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
-    answers |= _metrics("nearest", *nearest_example(pairs, change), pairs, slice(None), bodies)
+    answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, slice(None), bodies)
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
         for metric in ("place_mm", "force_size_percent", "peak_percent", "iou"):
@@ -141,9 +142,9 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     for name, state in (("likely", posterior.likely), ("mean", mean)):
         skin, latent = nets.latents(read, state)
         gel, force = nets.decode_target(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
-        found |= _metrics(name, gel, force, pairs, part, bodies)
+        found |= metrics(name, gel, force, pairs, part, bodies)
         if name == "likely":
-            found |= _metrics("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
+            found |= metrics("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
     return found
 
 
@@ -156,7 +157,8 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
     return solved_gel.solved(arrays)["displacement_digit"]
 
 
-def _metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
+def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
+    """Errors of gels (B, M, 3) m and forces (B,) N against those of a part of the pairs, named after ``name``."""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {
@@ -167,12 +169,24 @@ def _metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: 
     }
 
 
-def nearest_example(pairs: Pairs, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Gel (C, M, 3) m and force (C,) N of the nearest example to each signal, scaled to its size."""
+def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Error (C,) of gels (C, M, 3) m over that of no displacement, rms over nodes above a tenth of the peak."""
+    size = accuracy.lengths(true)
+    felt = size > FELT * size.max(1, keepdims=True)
+    left, all_of_it = ((np.square(each) * felt).sum(1) for each in (accuracy.lengths(gel - true), size))
+    return np.sqrt(left / all_of_it)
+
+
+def nearest_example(pairs: Pairs, change: np.ndarray, press: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Gel (C, M, 3) m and force (C,) N of the nearest example to each signal, scaled to its size.
+
+    press : (C,) of each signal, whose own contacts are no examples; none where the signals are of other presses
+    """
     length = np.sqrt(np.square(change).sum(-1))
     known = np.sqrt(np.square(pairs.signal).sum(-1))
     alike = (change / length[:, None]) @ (pairs.signal / known[:, None]).T
-    alike[pairs.press[:, None] == pairs.press] = -np.inf
+    if press is not None:
+        alike[press[:, None] == pairs.press] = -np.inf
     best = alike.argmax(-1)
     factor = length / known[best]
     gel = true_displacement(pairs, "digit", best) * factor[:, None, None].astype(np.float32)

@@ -18,7 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.measured_rows import finished, parser_of, printed
-from benchmarks.translation import grips, made_up_units, recordings, sequence_rows, test_set, two_contact_rows
+from benchmarks.translation import (
+    body_rows,
+    grips,
+    made_up_units,
+    recordings,
+    sequence_rows,
+    test_set,
+    two_contact_rows,
+)
 from benchmarks.translation.model_card import renew_model_card
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
@@ -29,6 +37,7 @@ from tactile_core.translation import translate
 from tactile_core.translation.translator import Translator
 
 QUICK = 6  # recordings
+QUICK_CONTACTS = 30  # of other bodies
 QUICK_PRESSES = 7  # of as many one is looked at, or a sequence; prime to how box, ring and others take turns
 TEST_SET = Path(__file__).resolve().parents[3] / "scenes" / "training" / "test_contacts.h5"
 
@@ -82,6 +91,7 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
     found = test_set.seen_rows(network, pairs, bodies)
     found += sequence_rows.rows(network, every=QUICK_PRESSES if options.quick else 1)
+    found += body_rows.rows(network, pairs, bodies, QUICK_CONTACTS if options.quick else body_rows.COUNT)
     found += two_contact_rows.rows(pairs) + two_contact_rows.translated_rows(network, pairs)
     few = (2, 2) if options.quick else ()
     found += made_up_units.rows(network, *few) + made_up_units.reliability(network, *few)

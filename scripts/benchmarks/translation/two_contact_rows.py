@@ -18,6 +18,7 @@ from tactile_core.translation.answer import Answer
 from tactile_core.translation.simulated_likeness import residual_shares, two_contacts
 from tactile_core.translation.translator import Translation, Translator
 
+from .contact_rows import left_of_nothing
 from .test_set import as_read
 
 COUNT = 2000  # of each kind; the standard error of a share of a half is .011
@@ -26,7 +27,7 @@ BANDS = (6e-3, 8e-3), (8e-3, 10e-3), (10e-3, 14e-3), (14e-3, np.inf)  # m
 SEED = 5
 DOUBLE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "double_contacts.npz"
 METRICS = ("split", np.mean, "1"), ("gel", np.mean, "1"), ("overlap", np.mean, "1"), ("force", np.median, "%")
-FELT, HALF = 0.1, 0.5  # of a field's peak: nodes whose error counts, and those that overlap (docs/accuracy.md)
+HALF = 0.5  # of a field's peak: nodes that overlap (docs/accuracy.md)
 
 
 def rows(pairs: Pairs) -> list[Row]:
@@ -88,13 +89,11 @@ def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> l
 def _errors(found: Translation, true: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
     """Errors (C,) of translated gels against true ones (C, M, 3) m, and of forces against true ones (C,) N."""
     size, moved = lengths(true), lengths(found.displacement_digit)
-    felt = size > FELT * size.max(1, keepdims=True)
-    left = np.square(lengths(found.displacement_digit - true)) * felt
     deep, deepest = (each > HALF * each.max(1, keepdims=True) for each in (moved, size))
     both = lengths(found.force) + lengths(found.second_force)
     return {
         "split": np.isfinite(found.second_center[:, 0]),
-        "gel": np.sqrt(left.sum(1) / (np.square(size) * felt).sum(1)),
+        "gel": left_of_nothing(found.displacement_digit, true),
         "overlap": (deep & deepest).sum(1) / np.maximum((deep | deepest).sum(1), 1),
         "force": 100 * np.abs(both / force - 1),
     }

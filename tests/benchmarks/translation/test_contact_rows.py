@@ -59,7 +59,15 @@ def test_the_nearest_example_is_of_another_press_and_as_strong_as_the_signal():
     pairs = types.SimpleNamespace(
         signal=signal, press=np.array([0, 0, 1]), displacement_digit=gel, scale_digit=1e-6, force=force
     )
-    moved, load = contact_rows.nearest_example(pairs, 2 * signal)
+    moved, load = contact_rows.nearest_example(pairs, 2 * signal, pairs.press)
     factor = 200 / 50  # the first signal's size over that of the only contact of another press
     assert load[0] == pytest.approx(factor * 3)
     np.testing.assert_allclose(moved[0, :, 1], factor * 3e-6, rtol=1e-5)
+
+
+def test_of_a_field_that_is_right_nothing_is_left_and_of_none_all():
+    true = np.zeros((3, 5, 3))
+    true[:, :3, 1] = [[4.0, 2, 0.3]]  # the third node is below a tenth of the peak, and does not count
+    found = true * np.array([1.0, 0, 0.5])[:, None, None]
+    found[:, 2] = 9
+    np.testing.assert_allclose(contact_rows.left_of_nothing(found, true), [0, 1, 0.5])

@@ -1,0 +1,70 @@
+"""Measure the translation by what is pressed: the training's bodies, random ones and flat ones that no training had.
+
+Contacts are the training's but for the seed and the bodies, by the fast tier on both sensors. Baseline: the nearest
+example among the test contacts that ship, of the training's bodies; of the gel no displacement, which leaves 1.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.table.translation_methods import plain_signals
+from tactile_core.accuracy import Row, lengths, row
+from tactile_core.jobs.pairs import make_pairs
+from tactile_core.simulation.pairs_file import Pairs, read_pairs
+from tactile_core.training.step_errors import Bodies, true_displacement
+from tactile_core.translation.translator import Translator
+
+from .contact_rows import left_of_nothing, metrics, nearest_example
+from .test_set import SEED, as_read
+
+SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "scene.toml"
+COUNT, OWN_SEED = 300, 52  # contacts of each set; the training pairs have seed 0
+METRICS = {"place_mm": "mm", "force_size_percent": "%", "peak_percent": "%", "iou": "1"}
+# A plate wider than the pad, and cylinders as wide as it and wider.
+FLAT = """format = "tactile-scene-1"
+name = "flat"
+description = "What a fingertip meets as flat."
+indenters = [
+    {kind = "box", name = "plate", sizes_mm = [60.0, 60.0, 10.0], edge_mm = 2.0},
+    {kind = "lying_cylinder", name = "cylinder_20mm", radius_mm = 10.0, edge_mm = 1.0, length_mm = 60.0},
+    {kind = "lying_cylinder", name = "cylinder_80mm", radius_mm = 40.0, edge_mm = 1.0, length_mm = 60.0},
+]
+
+"""
+
+
+def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
+    """Rows of each set, all contacts: medians of place, force, depth and overlap; the mean share left of the gel."""
+    text = SCENE.read_text(encoding="utf-8")
+    presses = text[text.index("[pairs]") :]
+    scenes = {
+        "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": FLAT + presses,
+    }  # fmt: skip
+    return [one for name, scene in scenes.items() for one in _rows(name, network, _pairs(scene, count), known, bodies)]
+
+
+def _pairs(scene: str, count: int) -> Pairs:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "scene.toml").write_text(scene, encoding="utf-8")
+        make_pairs(folder, count, OWN_SEED, folder / "pairs.h5")
+        return read_pairs(folder / "pairs.h5")
+
+
+def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bodies) -> list[Row]:
+    change, every = as_read(pairs.signal, SEED), slice(None)
+    answer, nearest = network(plain_signals(change)), nearest_example(known, change)
+    errors = metrics("found", answer.displacement_digit, lengths(answer.force), pairs, every, bodies)
+    errors |= metrics("nearest", *nearest, pairs, every, bodies)
+    of = f"{len(change)} contacts of {name}"
+    made = []
+    for metric, unit in METRICS.items():
+        value, baseline = (float(np.nanmedian(errors[f"{who}_{metric}"])) for who in ("found", "nearest"))
+        made.append(row(f"bodies_{metric}", value, unit, baseline=baseline, of=of, at_least=metric == "iou"))
+    true = true_displacement(pairs, "digit", every)
+    left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
+    return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
