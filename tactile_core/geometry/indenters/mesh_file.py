@@ -23,8 +23,6 @@ MAX_BYTES, MAX_FACES = 100_000_000, 200_000
 MAX_WORDS, MAX_BINARY = 20 * MAX_FACES, 32_000_000
 EXTENT_MM = (0.2, 100.0)  # an indenter for a fingertip; outside of it the unit is wrong (assumed)
 _UNITS = {"metres": 1.0, "inches": 0.0254, "centimetres": 1e-2, "millimetres": 1e-3, "micrometres": 1e-6}
-_COPLANAR = 1e-9  # of the longest edge cubed: volumes below are those of coplanar points and of touching ones
-_PAIRS = 200_000  # candidate pairs looked at together: about 150 MB
 _ROUNDING = 1e-5  # of the largest coordinate: twice what six digits of text round off
 _LARGEST_GAP = 1e-4  # of the body, whose coordinates may be far from zero (assumed)
 _WELDED = 8  # nearest vertices that one is united with; chains of them reach further
@@ -51,10 +49,8 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
     where : the file, for its suffix and for messages; scale : m per unit of the file
     up : the file's axis, one of ``UPS``, that points out of the sensor
-    Raises TactileError unless it is closed, wound outward, does not cross itself, and has the size of an indenter.
-
-    It crosses itself when an edge goes through a triangle that it does not belong to; coplanar overlaps are left to
-    the count of crossings on the grid's columns.
+    Raises TactileError unless it is closed, wound outward, and has the size of an indenter. Whether it crosses itself
+    shows when its grid is built.
     """
     vertices, faces = _parsed(content, pathlib.Path(where))
     mesh = closed_mesh(vertices @ _turn(up).T, faces, where, scale)
@@ -179,58 +175,3 @@ def _check_solid(where: str | os.PathLike, mesh: Any) -> None:
         raise TactileError(where, "flat: it encloses nothing", "a solid body", "Give it a thickness")
     if not volume > 0:
         raise TactileError(where, "it is inside out: its volume is negative", "outward normals", "Flip its normals")
-    crossing = first_crossing(mesh)
-    if crossing is not None:
-        place = ", ".join(f"{x:.3g}" for x in crossing)
-        found = f"it crosses itself near ({place}) mm, scaled and turned"
-        raise TactileError(where, found, "a surface that does not cross itself", "Unite its parts (boolean union)")
-
-
-def first_crossing(mesh: Any) -> np.ndarray | None:
-    """Find a place (3,) mm where an edge goes through a triangle that is not its own, or None.
-
-    Pairs come from an R-tree of the triangles' boxes. Pairs that share an edge can only cross by folding flat onto each
-    other, which is not checked.
-    """
-    triangles, faces = mesh.triangles, mesh.faces
-    for first, second in _near_pairs(mesh):
-        shared = (faces[first][:, :, None] == faces[second][:, None, :]).any(axis=2).sum(axis=1)
-        first, second = first[shared < 2], second[shared < 2]
-        for one, other in ((first, second), (second, first)):
-            for k in range(3):
-                start, end = triangles[one, k], triangles[one, (k + 1) % 3]
-                through = _goes_through(start, end, triangles[other])
-                if through.any():
-                    i = int(np.flatnonzero(through)[0])
-                    return (start[i] + end[i]) / 2
-    return None
-
-
-def _near_pairs(mesh: Any):  # noqa: ANN202 (batches of two arrays of face numbers)
-    tree, corners = mesh.triangles_tree, mesh.triangles
-    boxes = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1).tolist()
-    first, second = [], []
-    for i, box in enumerate(boxes):
-        near = [j for j in tree.intersection(box) if j > i]
-        first += [i] * len(near)
-        second += near
-        if len(first) > _PAIRS:
-            yield np.array(first), np.array(second)
-            first, second = [], []
-    if first:
-        yield np.array(first), np.array(second)
-
-
-def _goes_through(start: np.ndarray, end: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Mark the segments (n, 3), (n, 3) that pass strictly through triangles (n, 3, 3), by signed volumes."""
-    a, b, c = np.moveaxis(triangles, 1, 0)
-    longest = np.max([np.linalg.norm(v, axis=1) for v in (end - start, b - a, c - b, a - c)], axis=0)
-    least = _COPLANAR * longest**3
-    above, below = _volume(a, b, c, start), _volume(a, b, c, end)
-    around = np.stack([_volume(start, end, *side) for side in ((a, b), (b, c), (c, a))])
-    opposite = (np.minimum(above, below) < -least) & (np.maximum(above, below) > least)
-    return opposite & ((around > least).all(axis=0) | (around < -least).all(axis=0))
-
-
-def _volume(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
-    return np.einsum("nd,nd->n", np.cross(b - a, c - a), d - a)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import TactileError
+from ..cubic_spline import EvenSpline
+from .mesh_distance import NearTriangles
 from .spline_grid import BAND, SplineGrid, TipGrid
 
 MARGIN = 1e-3  # m, how far the grid reaches beyond the body
@@ -20,10 +22,14 @@ _SPARE = 6  # nodes more on every side while the spline is fitted: what it assum
 _FINEST = 0.1e-3  # m: finer than the nodes of either sensor
 _CHECKED = 500  # points near the surface at which the error is measured
 _CHECKED_WITHIN_MM = 0.3  # how near
-_BATCH = 20_000  # nodes at a time: about 100 MB
-_CANDIDATES = 8
-_NEAR_MM = 2.0  # deeper and farther out than contact solvers look; beyond, a coarser grid is interpolated
-_COARSER = 4
+_ROUNDING_MM = 1e-9
+_CELLS = 200  # along a body's diagonal, at most
+# Spacings from the surface up to which distances are exact. What a spline makes of errors farther off fades by 0.27 a
+# node: to half a percent at the surface.
+_NEAR = 4
+_FAR = 12  # spacings (assumed)
+_COARSER = 4  # times the spacing, of the grid that is interpolated beyond
+_FEWEST = 5  # nodes that a cubic spline takes
 # Columns stand this part of the spacing beside the nodes, so that none meets an edge or a vertex; tried in turn.
 _BESIDE = ((1.234e-4, 0.876e-4), (-0.543e-4, 1.567e-4), (0.987e-4, -1.654e-4))
 
@@ -84,8 +90,10 @@ def _signed(
     """Signed distance (shape) mm at the nodes of a grid, mm."""
     try:
         within = inside(mesh.triangles, origin, spacing, shape)
-    except OverlapError:
-        found, expected = "parts of it overlap", "a surface that does not cross itself"
+    except OverlapError as overlap:
+        place = ", ".join(f"{x:.3g}" for x in overlap.place)
+        found = f"it crosses itself, or parts of it overlap, near ({place}) mm, scaled and turned"
+        expected = "a surface that does not cross itself"
         raise TactileError(where, found, expected, "Unite its parts (boolean union)") from None
     return signed(mesh.triangles, origin, spacing, within)
 
@@ -96,18 +104,19 @@ def error_of(
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
 
     Measured at random places over its area, of triangles that reach below the height ``top``, m, up to 0.3 mm inside
-    and outside. The signs are checked by counting how often a ray from there meets the mesh.
+    and outside. Where another face is as near as the one that a place was drawn from, the place is left out: its side
+    is not known.
     """
-    import trimesh
-
     random = np.random.default_rng(0)
     area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
     face = random.choice(len(mesh.faces), _CHECKED, p=area / area.sum())
     weights = random.dirichlet([1, 1, 1], _CHECKED)
     points = np.einsum("nk,nkd->nd", weights, mesh.triangles[face])
-    points += mesh.face_normals[face] * random.uniform(-_CHECKED_WITHIN_MM, _CHECKED_WITHIN_MM, (_CHECKED, 1))
-    exact = trimesh.proximity.closest_point(mesh, points)[1]
-    error = distance(points * 1e-3)[0] - np.where(mesh.contains(points), -exact, exact) * 1e-3
+    exact = random.uniform(-_CHECKED_WITHIN_MM, _CHECKED_WITHIN_MM, _CHECKED)
+    points += mesh.face_normals[face] * exact[:, None]
+    near = NearTriangles(mesh.triangles, max(_CHECKED_WITHIN_MM, mesh.scale / _CELLS))
+    own = near.distance(points, 2 * _CHECKED_WITHIN_MM) > np.abs(exact) - _ROUNDING_MM
+    error = distance(points[own] * 1e-3)[0] - exact[own] * 1e-3
     return np.array([np.sqrt(np.mean(error**2)), np.abs(error).max()])
 
 
@@ -115,67 +124,56 @@ def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np
     """Return the signed distance (shape) mm of nodes at ``origin`` + spacing * (i, j, k) to triangles (m, 3, 3) mm.
 
     within : bool (shape), true for nodes inside
-    Triangles are cut into pieces of two spacings; a node looks at the triangles of its nearest pieces. Beyond 2 mm a
-    grid four times coarser is interpolated by a cubic spline. What this costs in accuracy is measured when an indenter
-    is made.
+    It is exact up to _NEAR spacings from the surface; farther off a grid four times coarser is interpolated by a cubic
+    spline. What this costs in accuracy is measured when an indenter is made.
+    """
+    near = NearTriangles(triangles, 2 * spacing)
+    bound = _NEAR * spacing
+    coarse = _coarse(near, origin, spacing, within)
+    along = (EvenSpline(0, _COARSER, n).matrix(np.arange(m)) for n, m in zip(coarse.shape, within.shape, strict=True))
+    distance = coarse
+    for matrix in along:  # each takes the first axis, and leaves it behind the others
+        distance = np.tensordot(distance, matrix, axes=(0, 1))
+    close = np.flatnonzero((np.abs(distance) < bound) | ((distance < 0) != within))
+    exact = near.distance(origin + spacing * _nodes(close, within.shape), bound)
+    exact *= np.where(within.ravel()[close], -1, 1)
+    known = np.isfinite(exact)
+    distance.ravel()[close[known]] = exact[known]
+    return distance
+
+
+def _coarse(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
+    """Signed distance, mm, at every fourth node and those beyond the grid's end.
+
+    Off the surface it is that to the middle of the nearest piece; far off of the one that is nearest to the nearest
+    node that is less far: a search finds none quickly where many are equally near, as round the middle of a ball.
     """
     import scipy.ndimage
     import scipy.spatial
 
-    middles, owner = _pieces(triangles, 2 * spacing)
-    tree = scipy.spatial.cKDTree(middles)
-    distance = _unsigned(triangles, tree, owner, origin, spacing, within.shape, _NEAR_MM)
-    distance[within.ravel()] *= -1
-    far = np.flatnonzero(np.isinf(distance))
-    if len(far):
-        shape = tuple((n + _COARSER - 2) // _COARSER + 1 for n in within.shape)
-        coarse = _unsigned(triangles, tree, owner, origin, _COARSER * spacing, shape, np.inf).reshape(shape)
-        kept = within[::_COARSER, ::_COARSER, ::_COARSER]
-        coarse[tuple(slice(n) for n in kept.shape)] *= np.where(kept, -1, 1)  # nodes beyond the grid are outside
-        coarse = scipy.ndimage.spline_filter(coarse, order=3, mode="mirror")
-        for batch in np.array_split(far, len(far) // _BATCH + 1):
-            places = np.stack(np.unravel_index(batch, within.shape)) / _COARSER
-            distance[batch] = scipy.ndimage.map_coordinates(coarse, places, mode="mirror", prefilter=False)
-    return distance.reshape(within.shape)
-
-
-def _unsigned(triangles, tree, owner, origin, spacing, shape, bound: float) -> np.ndarray:  # noqa: ANN001 (cKDTree)
-    """Distance of a grid's nodes, flat; inf beyond ``bound``."""
-    import trimesh
-
-    count = min(_CANDIDATES, tree.n)
-    distance = np.full(np.prod(shape), np.inf)
-    for start in range(0, len(distance), _BATCH):
-        places = np.unravel_index(np.arange(start, min(start + _BATCH, len(distance))), shape)
-        batch = origin + spacing * np.stack(places, axis=-1)
-        near = tree.query(batch, count, distance_upper_bound=bound)[1].reshape(len(batch), count)
-        known = np.flatnonzero(near[:, 0] < tree.n)
-        near = np.where(near < tree.n, near, near[:, :1])[known]
-        at = np.repeat(batch[known], count, axis=0)
-        gap = np.linalg.norm(trimesh.triangles.closest_point(triangles[owner[near.ravel()]], at) - at, axis=1)
-        distance[start + known] = gap.reshape(-1, count).min(axis=1)
+    shape = tuple(max((n + _COARSER - 2) // _COARSER + 1, _FEWEST) for n in within.shape)
+    points = origin + _COARSER * spacing * _nodes(np.arange(np.prod(shape)), shape)
+    piece = scipy.spatial.cKDTree(near.middles).query(points, distance_upper_bound=_FAR * spacing)[1].reshape(shape)
+    known = piece < len(near.middles)
+    of = scipy.ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    distance = np.linalg.norm(points - near.middles[piece[tuple(of)].ravel()], axis=1)
+    exact = near.distance(points, _NEAR * spacing)
+    distance = np.where(np.isfinite(exact), exact, distance).reshape(shape)
+    kept = within[::_COARSER, ::_COARSER, ::_COARSER]
+    distance[tuple(slice(n) for n in kept.shape)] *= np.where(kept, -1, 1)  # nodes beyond the grid are outside
     return distance
 
 
-def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles across their longest edge until it is short; returns middles (k, 3) and triangles (k,)."""
-    owner, middles, owners = np.arange(len(triangles)), [], []
-    while len(triangles):
-        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-        done = sides.max(axis=1) <= longest
-        middles.append(triangles[done].mean(axis=1))
-        owners.append(owner[done])
-        triangles, owner, worst = triangles[~done], owner[~done], sides[~done].argmax(axis=1)
-        row = np.arange(len(triangles))
-        a, b, c = (triangles[row, (worst + k) % 3] for k in range(3))
-        half = (a + b) / 2
-        triangles = np.concatenate([np.stack([a, half, c], axis=1), np.stack([half, b, c], axis=1)])
-        owner = np.tile(owner, 2)
-    return np.concatenate(middles), np.concatenate(owners)
+def _nodes(flat: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    return np.stack(np.unravel_index(flat, shape), axis=-1)
 
 
 class OverlapError(Exception):
-    """Error for a mesh that overlaps itself: a column enters it twice before it leaves."""
+    """Error for a mesh that overlaps itself: a column enters it twice before it leaves, near ``place`` (3,)."""
+
+    def __init__(self, place: np.ndarray) -> None:
+        super().__init__(place)
+        self.place = place
 
 
 def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
@@ -189,12 +187,16 @@ def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tup
         order = np.lexsort((height, column))
         column, height, step = column[order], height[order], np.where(entering[order], 1, -1)
         layers = np.cumsum(step)
-        if np.isin(layers, (0, 1)).all() and (layers[np.flatnonzero(np.diff(column, append=-1))] == 0).all():
+        last = np.diff(column, append=-1) != 0
+        wrong = (layers < 0) | (layers > 1) | (last & (layers != 0))
+        if not wrong.any():
             first_node = np.clip(np.ceil((height - origin[2]) / spacing), 0, shape[2]).astype(int)
             change = np.zeros((shape[0] * shape[1], shape[2] + 1), np.int32)
             np.add.at(change, (column, first_node), step)
             return (np.cumsum(change, axis=1)[:, :-1] > 0).reshape(shape)
-    raise OverlapError
+    first = int(np.flatnonzero(wrong)[0])
+    across = np.array(divmod(column[first], shape[1]))
+    raise OverlapError(np.append(origin[:2] + spacing * across, height[first]))
 
 
 def _crossings(

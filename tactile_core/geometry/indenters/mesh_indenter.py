@@ -20,11 +20,11 @@ from ...files.array_cache import cache_folder
 from ...files.installed import needing
 from ...files.short_text import Summary
 from . import mesh_file, mesh_grid
-from .indenter import Indenter
+from .indenter import Indenter, lengths
 from .spline_grid import SplineGrid, TipGrid
 
 log = logging.getLogger(__name__)
-_FORMAT = 2  # raise when the meaning of the cached arrays changes
+_FORMAT = 3  # raise when the meaning of the cached arrays changes
 _ROOM = "40 MB"
 _ARRAYS = ("coefficients", "origin", "hull", "error", "stem", "stem_place")  # the last two are empty for one grid
 _SPACING = (0.01e-3, 1e-3)  # m
@@ -62,7 +62,7 @@ class MeshIndenter(Summary, Indenter):
     def from_file(
         cls, path: str | os.PathLike, scale: float = 1e-3, up: str = "z", spacing: float = 0.1e-3
     ) -> MeshIndenter:
-        """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once (up to a minute) and cached on disk.
+        """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once, in seconds, and cached on disk.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
         spacing : m, of the grid; of a body of more than 8 million nodes, that of its lowest 5 mm, and coarser above
@@ -109,7 +109,7 @@ class MeshIndenter(Summary, Indenter):
         except array_cache.DamagedError as damage:
             if (folder / array_cache.HASHES).exists():
                 log.warning("%s: damaged (%s); it is built again", folder, damage)
-            log.info("building the distance grid of %s in %s (up to a minute, once)", where, folder)
+            log.info("building the distance grid of %s in %s (once)", where, folder)
             mesh = make()
             built = cls(mesh_grid.build(mesh, where, spacing), _hull(mesh), (0.0, 0.0))
             error = mesh_grid.error_of(mesh, built.distance, getattr(built.grid, "top", np.inf))
@@ -137,7 +137,7 @@ class MeshIndenter(Summary, Indenter):
         slope, bend = self.grid.gradient_and_hessian(points)
         steepness, normal = _unit(slope)
         along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-        return along @ bend @ along / steepness[:, None, None]
+        return along @ bend @ along / np.maximum(steepness, _FLATTEST)[:, None, None]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
         """See ``Indenter.support``; computed from the mesh itself."""
@@ -156,12 +156,12 @@ def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Length (n,) of slopes (n, 3), at least _FLATTEST, and unit normals (n, 3) along them."""
-    length = np.linalg.norm(slope, axis=1)
-    flat = length < 1e-6
-    normal = slope / np.where(flat, 1, length)[:, None]
-    normal[flat] = [0.0, 0.0, -1.0]
-    return np.maximum(length, _FLATTEST), normal
+    """Length (n,) of slopes (n, 3), and unit normals (n, 3) along them."""
+    length = lengths(slope)
+    if length.min(initial=1) < 1e-6:
+        flat = length < 1e-6
+        slope, length = np.where(flat[:, None], [0.0, 0.0, -1.0], slope), np.where(flat, 1.0, length)
+    return length, slope / length[:, None]
 
 
 def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> None:

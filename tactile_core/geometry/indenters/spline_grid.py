@@ -6,13 +6,12 @@ One grid holds a body, or a fine one the part of it that may touch and a coarse 
 from __future__ import annotations
 
 import dataclasses
-import itertools
 
 import numpy as np
 
 from ...files.compiled import Loop
 from ...files.short_text import Summary
-from ..cubic_spline import bspline_slopes, bspline_weights
+from .indenter import contiguous
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -30,75 +29,77 @@ class SplineGrid(Summary):
 
     def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
-        known, beyond, away = self._split(points)
-        sums = self._sums(known, 2)
-        return sums[:, 0, 0, 0] + away, self._gradient(sums, beyond, away)
+        return _spline(contiguous(points), self.origin, self.spacing, self.coefficients, False)[:2]
 
     def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
-        known, beyond, away = self._split(points)
-        sums = self._sums(known, 3)
-        hessian = np.empty((len(points), 3, 3))
-        for i, j in itertools.product(range(3), range(3)):
-            order = np.bincount([i, j], minlength=3)
-            hessian[:, i, j] = sums[:, order[0], order[1], order[2]] / self.spacing**2
-        outside = beyond != 0
-        hessian *= ~outside[:, :, None] & ~outside[:, None, :]
-        length = np.where(away > 0, away, 1)[:, None, None]
-        hessian += (np.eye(3) * outside[:, None, :] - beyond[:, :, None] * beyond[:, None, :] / length**2) / length
-        return self._gradient(sums, beyond, away), hessian
-
-    def _gradient(self, sums: np.ndarray, beyond: np.ndarray, away: np.ndarray) -> np.ndarray:
-        inner = np.stack([sums[:, 1, 0, 0], sums[:, 0, 1, 0], sums[:, 0, 0, 1]], axis=1) / self.spacing
-        return np.where(beyond == 0, inner, beyond / np.where(away > 0, away, 1)[:, None])
-
-    def _split(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Nearest place (n, 3) in the box, in spacings; from there vector (n, 3) m and distance (n,) m."""
-        place = (points - self.origin) / self.spacing
-        known = np.clip(place, 1, np.array(self.coefficients.shape) - 2)
-        beyond = (place - known) * self.spacing
-        return known, beyond, np.linalg.norm(beyond, axis=1)
-
-    def _sums(self, place: np.ndarray, orders: int) -> np.ndarray:
-        """The spline's derivatives (n, orders, orders, orders) along x, y and z at places (n, 3) in spacings."""
-        shape = np.array(self.coefficients.shape)
-        cell = np.minimum(place.astype(np.intp), shape - 3)
-        along = (place - cell).ravel()
-        weights = np.stack([bspline_weights(along), bspline_slopes(along), _bends(along)][:orders])  # (orders, 4, 3 n)
-        by_point = np.ascontiguousarray(weights.reshape(orders, 4, -1, 3).transpose(2, 3, 0, 1))
-        return _spline_sums(self.coefficients, place, cell, by_point, orders)
-
-
-def _bends(t: np.ndarray) -> np.ndarray:
-    """Second derivatives of ``bspline_weights`` by t; (4, n)."""
-    return np.stack([1 - t, 3 * t - 2, 1 - 3 * t, t])
+        return _spline(contiguous(points), self.origin, self.spacing, self.coefficients, True)[1:]
 
 
 @Loop
-def _spline_sums(coefficients, place, cell, weights, orders):  # noqa: ANN001, ANN202
-    """Sum the spline's derivatives (n, orders, orders, orders) in cells (n, 3); weights : (n, 3, orders, 4) by axis."""
-    sums = np.zeros((len(place), orders, orders, orders))
-    along, flat = np.zeros(3), np.zeros((3, 3))
-    for p in range(len(place)):
+def _spline(points, origin, spacing, coefficients, bends):  # noqa: ANN001, ANN202
+    """Value (n,), gradient (n, 3) and, with ``bends``, second derivatives (n, 3, 3) at points (n, 3) m."""
+    value, gradient = np.empty(len(points)), np.empty((len(points), 3))
+    hessian = np.zeros((len(points) if bends else 0, 3, 3))
+    cell, beyond, weights, sums = np.zeros(3, np.int64), np.zeros(3), np.zeros((3, 3, 4)), np.zeros(10)
+    for p in range(len(points)):
+        square = 0.0
+        for i in range(3):
+            place = (points[p, i] - origin[i]) / spacing
+            known = min(max(place, 1.0), coefficients.shape[i] - 2.0)
+            beyond[i] = (place - known) * spacing
+            square += beyond[i] * beyond[i]
+            cell[i] = min(int(known), coefficients.shape[i] - 3)
+            t = known - cell[i]
+            s = 1 - t
+            # The four B-splines, their slopes and bends, by t.
+            weights[i, 0, 0], weights[i, 0, 1] = s * s * s / 6, 2 / 3 - t * t * (1 - t / 2)
+            weights[i, 0, 2], weights[i, 0, 3] = 2 / 3 - s * s * (1 - s / 2), t * t * t / 6
+            weights[i, 1, 0], weights[i, 1, 1] = -s * s / 2, (3 * t * t - 4 * t) / 2
+            weights[i, 1, 2], weights[i, 1, 3] = (4 * s - 3 * s * s) / 2, t * t / 2
+            weights[i, 2, 0], weights[i, 2, 1], weights[i, 2, 2], weights[i, 2, 3] = s, 3 * t - 2, 1 - 3 * t, t
+        x, y, z = weights[0], weights[1], weights[2]
+        i, j, k = cell[0], cell[1], cell[2]
+        block = coefficients[i - 1 : i + 3, j - 1 : j + 3, k - 1 : k + 3]  # one look for negative indices, not 64
+        sums[:] = 0.0  # value; along x, y, z; xx, yy, zz, xy, xz, yz
         for a in range(4):
-            for i in range(orders):
-                for j in range(orders):
-                    flat[i, j] = 0.0
+            flat, flat_y, flat_z, flat_yy, flat_yz, flat_zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for b in range(4):
-                for j in range(orders):
-                    along[j] = 0.0
+                along, along_z, along_zz = 0.0, 0.0, 0.0
                 for c in range(4):
-                    value = coefficients[cell[p, 0] + a - 1, cell[p, 1] + b - 1, cell[p, 2] + c - 1]
-                    for j in range(orders):
-                        along[j] += value * weights[p, 2, j, c]
-                for i in range(orders):
-                    for j in range(orders):
-                        flat[i, j] += weights[p, 1, i, b] * along[j]
-            for h in range(orders):
-                for i in range(orders):
-                    for j in range(orders):
-                        sums[p, h, i, j] += weights[p, 0, h, a] * flat[i, j]
-    return sums
+                    along += block[a, b, c] * z[0, c]
+                    along_z += block[a, b, c] * z[1, c]
+                flat += y[0, b] * along
+                flat_y += y[1, b] * along
+                flat_z += y[0, b] * along_z
+                if bends:
+                    for c in range(4):
+                        along_zz += block[a, b, c] * z[2, c]
+                    flat_yy += y[2, b] * along
+                    flat_yz += y[1, b] * along_z
+                    flat_zz += y[0, b] * along_zz
+            sums[0] += x[0, a] * flat
+            sums[1] += x[1, a] * flat
+            sums[2] += x[0, a] * flat_y
+            sums[3] += x[0, a] * flat_z
+            sums[4] += x[2, a] * flat
+            sums[5] += x[0, a] * flat_yy
+            sums[6] += x[0, a] * flat_zz
+            sums[7] += x[1, a] * flat_y
+            sums[8] += x[1, a] * flat_z
+            sums[9] += x[0, a] * flat_yz
+        away = np.sqrt(square)
+        value[p] = sums[0] + away
+        for i in range(3):
+            gradient[p, i] = sums[1 + i] / spacing if beyond[i] == 0 else beyond[i] / away
+            if not bends:
+                continue
+            for j in range(3):
+                if beyond[i] == 0 and beyond[j] == 0:
+                    hessian[p, i, j] = sums[4 + i if i == j else 6 + i + j] / spacing**2
+                elif beyond[i] != 0 and beyond[j] != 0:
+                    hessian[p, i, j] = ((i == j) - beyond[i] * beyond[j] / square) / away
+    return value, gradient, hessian
 
 
 BAND = 1e-3  # m, over which the fine grid's values pass into the coarse one's, twice continuously differentiable
@@ -114,12 +115,16 @@ class TipGrid(Summary):
 
     def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
+        if not (points[:, 2] > self.top).any():
+            return self.fine.value_and_gradient(points)
         share, slope, _ = self._share(points[:, 2])
         (near, along), (far, beyond) = (grid.value_and_gradient(points) for grid in (self.fine, self.coarse))
         return near + share * (far - near), _mixed_gradient(along, beyond, share, slope * (far - near))
 
     def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
+        if not (points[:, 2] > self.top).any():
+            return self.fine.gradient_and_hessian(points)
         share, slope, bend = self._share(points[:, 2])
         apart = self.coarse.value_and_gradient(points)[0] - self.fine.value_and_gradient(points)[0]
         (along, near), (beyond, far) = (grid.gradient_and_hessian(points) for grid in (self.fine, self.coarse))

@@ -42,10 +42,13 @@ def inside_out():
 
 
 def folded():
-    """One vertex pushed through the other side: closed and well wound, but crossing itself."""
+    """One vertex pushed through the other side: closed and well wound, but crossing itself.
+
+    Its tip is 0.4 mm wide where it comes out: what is thinner than the grid's spacing is not seen.
+    """
     ball = sphere()
     vertices = ball.vertices.copy()
-    vertices[0] *= -1.2
+    vertices[0] *= -2
     return trimesh.Trimesh(vertices, ball.faces, process=False)
 
 

@@ -1,0 +1,126 @@
+"""Exact distance to the triangles of a mesh, looked up in cells near a point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...files.compiled import Loop
+
+
+class NearTriangles:
+    """Triangles (m, 3, 3), any unit, sorted into cubes of side ``cell`` by pieces no longer than that.
+
+    middles : (k, 3), of the pieces
+    """
+
+    def __init__(self, triangles: np.ndarray, cell: float) -> None:
+        pieces, owner = _pieces(triangles, cell)
+        self.middles = pieces.mean(axis=1)
+        self._cell, self._origin = cell, pieces.min(axis=(0, 1))
+        self._triangles = np.ascontiguousarray((triangles - self._origin) / cell)
+        place = np.floor((self.middles - self._origin) / cell).astype(np.int64)
+        self._shape = place.max(axis=0) + 1
+        flat = np.ravel_multi_index(tuple(place.T), tuple(self._shape))
+        order = np.lexsort((owner, flat))
+        flat, self._members = flat[order], owner[order]
+        self._starts = np.searchsorted(flat, np.arange(np.prod(self._shape) + 1))
+        self._boxes = np.zeros((np.prod(self._shape), 2, 3))
+        first = np.flatnonzero(np.diff(flat, prepend=-1))
+        corners = (pieces[order] - self._origin) / cell
+        self._boxes[flat[first], 0] = np.minimum.reduceat(corners.min(axis=1), first)
+        self._boxes[flat[first], 1] = np.maximum.reduceat(corners.max(axis=1), first)
+
+    def distance(self, points: np.ndarray, bound: float) -> np.ndarray:
+        """Return the distance (n,) from points (n, 3) to the nearest triangle, inf where it is ``bound`` or more."""
+        farthest = int(np.ceil(bound / self._cell)) + 1  # a piece reaches into the next cell
+        along = np.arange(-farthest, farthest + 1)
+        steps = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
+        steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
+        places = (points - self._origin) / self._cell
+        cells = np.floor(places).astype(np.int64)
+        order = np.lexsort(cells.T)  # neighbours share what is looked up
+        squares = np.empty(len(points))
+        squares[order] = _least_squares(
+            places[order], cells[order], self._triangles, self._starts, self._members, self._boxes, self._shape, steps,
+            (bound / self._cell) ** 2,
+        )  # fmt: skip
+        return self._cell * np.sqrt(squares)
+
+
+def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Halve triangles across their longest edge until it is short; returns pieces (k, 3, 3) and triangles (k,)."""
+    owner, pieces, owners = np.arange(len(triangles)), [], []
+    while len(triangles):
+        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+        done = sides.max(axis=1) <= longest
+        pieces.append(triangles[done])
+        owners.append(owner[done])
+        triangles, owner, worst = triangles[~done], owner[~done], sides[~done].argmax(axis=1)
+        row = np.arange(len(triangles))
+        a, b, c = (triangles[row, (worst + k) % 3] for k in range(3))
+        half = (a + b) / 2
+        triangles = np.concatenate([np.stack([a, half, c], axis=1), np.stack([half, b, c], axis=1)])
+        owner = np.tile(owner, 2)
+    return np.concatenate(pieces), np.concatenate(owners)
+
+
+@Loop
+def _least_squares(places, cells, triangles, starts, members, boxes, shape, steps, bound):  # noqa: ANN001, ANN202
+    """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on; lengths in cells.
+
+    Cells are visited by ``steps`` (q, 3) from a place's own, where the box (2, 3) of what they hold is near enough.
+    A foot inside the triangle gives the distance to its plane, any other the distance to its nearest edge.
+    """
+    squares, normal, arm, edge = np.empty(len(places)), np.empty(3), np.empty(3), np.empty(3)
+    around, count = np.empty(len(steps), np.int64), 0
+    for p in range(len(places)):
+        if p == 0 or (cells[p] != cells[p - 1]).any():
+            count = 0
+            for q in range(len(steps)):
+                cell, within = 0, True
+                for a in range(3):
+                    at = cells[p, a] + steps[q, a]
+                    within = within and 0 <= at < shape[a]
+                    cell = cell * shape[a] + at
+                if within and starts[cell] < starts[cell + 1]:
+                    around[count] = cell
+                    count += 1
+        best = bound
+        for cell in around[:count]:
+            away = 0.0
+            for a in range(3):
+                away += max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0) ** 2
+            if away >= best:
+                continue
+            for m in range(starts[cell], starts[cell + 1]):
+                if m > starts[cell] and members[m] == members[m - 1]:
+                    continue
+                corners = triangles[members[m]]
+                for a in range(3):
+                    b, c = (a + 1) % 3, (a + 2) % 3
+                    normal[a] = (corners[1, b] - corners[0, b]) * (corners[2, c] - corners[0, c])
+                    normal[a] -= (corners[1, c] - corners[0, c]) * (corners[2, b] - corners[0, b])
+                foot_inside = True
+                for v in range(3):
+                    along, length = 0.0, 0.0
+                    for a in range(3):
+                        arm[a] = places[p, a] - corners[v, a]
+                        edge[a] = corners[(v + 1) % 3, a] - corners[v, a]
+                        along += arm[a] * edge[a]
+                        length += edge[a] * edge[a]
+                    share = min(max(along / length, 0.0), 1.0) if length > 0 else 0.0
+                    square, side = 0.0, 0.0
+                    for a in range(3):
+                        b, c = (a + 1) % 3, (a + 2) % 3
+                        square += (arm[a] - share * edge[a]) ** 2
+                        side += (normal[b] * edge[c] - normal[c] * edge[b]) * arm[a]
+                    foot_inside = foot_inside and side > 0
+                    best = min(best, square)
+                if foot_inside:
+                    height, area = 0.0, 0.0
+                    for a in range(3):
+                        height += normal[a] * arm[a]
+                        area += normal[a] * normal[a]
+                    best = min(best, height * height / area)
+        squares[p] = best if best < bound else np.inf
+    return squares

@@ -1,0 +1,32 @@
+"""Distance to triangles looked up in cells, against every triangle in turn, and thin walls."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from tactile_core.geometry.indenters import MeshIndenter
+from tactile_core.geometry.indenters.mesh_distance import NearTriangles
+
+
+@pytest.mark.parametrize("cell", [0.3, 1.0, 10.0])  # triangles are about 1 across: cut up, few a cell, all in one
+def test_nearest_of_all_triangles(cell):
+    random = np.random.default_rng(0)
+    triangles = random.uniform(-2, 2, (40, 1, 3)) + random.uniform(-0.7, 0.7, (40, 3, 3))
+    points, bound = random.uniform(-4, 4, (300, 3)), 1.5
+    tiled = np.tile(triangles, (300, 1, 1))
+    at = np.repeat(points, 40, axis=0)
+    exact = np.linalg.norm(trimesh.triangles.closest_point(tiled, at) - at, axis=1).reshape(300, 40).min(axis=1)
+    found = NearTriangles(triangles, cell).distance(points, bound)
+    assert 0.2 < np.isfinite(found).mean() < 0.8
+    np.testing.assert_allclose(found, np.where(exact < bound, exact, np.inf), rtol=1e-9)
+
+
+def test_a_thin_wall_keeps_its_thickness():
+    """A cup whose wall is twice the grid's spacing thick, so that every coarse node is near both of its faces."""
+    wall = trimesh.creation.annulus(r_min=2.3e-3, r_max=2.5e-3, height=3e-3, sections=128)
+    made = MeshIndenter.from_trimesh(wall, spacing=0.1e-3)
+    angle = np.linspace(0, 2 * np.pi, 50)
+    for radius, exact in ((2.4e-3, -0.1e-3), (2.5e-3, 0.0), (2.3e-3, 0.0), (2.6e-3, 0.1e-3), (2.1e-3, 0.2e-3)):
+        points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(50)])
+        # The middle is a crease, which a spline rounds by up to a third of the spacing, and 0.27 of that a node off.
+        np.testing.assert_allclose(made.distance(points)[0], exact, atol=35e-6 if exact < 0 else 9e-6)
