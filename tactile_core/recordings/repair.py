@@ -104,7 +104,8 @@ def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
 
 def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np.ndarray:
     """Mark (N,) runs that jump away, steeper than their neighbourhood, stay on one level and return.
-    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after; neighbour_step : (N,)"""
+    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after
+    neighbour_step : (N,) counts, the calmer of the steps just outside"""
     jump = np.minimum(np.abs(samples[1] - samples[0]), np.abs(samples[-1] - samples[-2]))
     run = samples[1:-1]
     returns = np.abs(samples[-1] - samples[0]) <= np.maximum(LEVEL, FLATNESS * jump)

@@ -94,7 +94,7 @@ def _run(folder: Path, task: Task) -> Reply:
 
 
 def _stamp(folder: Path) -> tuple[int, int]:
-    """Return a stamp of the job file, for a worker that serves several jobs in one place."""
+    """Return inode and size of the job file: a worker may serve several jobs in one place, one after another."""
     try:
         found = (folder / jobs.FILE).stat()
     except OSError as error:

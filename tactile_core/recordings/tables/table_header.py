@@ -64,13 +64,13 @@ def split(line: str, separator: str) -> list[str]:
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
     """Return the index of the first line that is no comment or title, and of the last comment before it."""
-    told = [place for place, line in enumerate(lines) if line.strip()]
-    first = next((place for place in told if not lines[place].lstrip().startswith(COMMENTS)), None)
+    filled = [place for place, line in enumerate(lines) if line.strip()]
+    first = next((place for place in filled if not lines[place].lstrip().startswith(COMMENTS)), None)
     if first is None:
-        first = told[0] if told else None
-        return first, None
-    comment = max((place for place in told if place < first), default=None)
-    widths = {place: _width(lines[place]) for place in told if first <= place <= first + LOOKED_AT}
+        return (filled[0] if filled else None), None
+    comment = max((place for place in filled if place < first), default=None)
+    widths = {place: _width(lines[place]) for place in filled if first <= place <= first + LOOKED_AT}
+    # Lines before one that is twice as wide are a title.
     wide = (place for place, width in widths.items() if width >= max(MANY, 2 * widths[first] + 1))
     return next(wide, first), comment
 
