@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Quaternion
 
 from ..settings import properties
 from . import style_nodes, styles, surfaces
 from .node_group import NodeGroup
 
 _LONG, _HIGH, _LETTERS = 18.0, 1.8, 2.3  # mm
-_EDGE, _LIFT = 1.0, 0.05  # mm of the card round what stands on it, and under it
+_EDGE, _LIFT = 1.0, 0.3  # mm of the card round what stands on it, and under it: views tell .05 apart from near alone
 _GAP = 1.5  # mm between sensor and card, as the camera sees them
 _INK, _CARD = (0.95, 0.95, 0.95), (0.03, 0.03, 0.035)
 _MIDDLE, _HALF = "Middle", "Half"
-# Without a camera: toward a new file's view, which looks down and at the base.
-_NO_CAMERA = Matrix(((0, -0.643, 0.766), (1, 0, 0), (0, 0.766, 0.643))).to_euler()
+_NEAR = 3.0  # times half a sensor's diagonal: a camera this near is the sensor's own, or a new file's hidden one
+# Without a camera to look by: the turn of a new file's view.
+_NO_CAMERA = Quaternion((0.7124, 0.4411, 0.2874, 0.4641)).normalized().to_euler()
 _Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # corners (n, 2) mm, triangles (m, 3), colours (n, 3)
 
 
@@ -88,8 +89,10 @@ def _facing() -> bpy.types.NodeTree:
     given = nodes.tree.nodes.new("NodeGroupInput")
     camera = nodes.add("GeometryNodeInputActiveCamera").outputs[0]
     seen = nodes.add("GeometryNodeObjectInfo", camera, transform_space="RELATIVE")
-    size = nodes.add("ShaderNodeVectorMath", seen.outputs["Scale"], operation="LENGTH").outputs["Value"]
-    there = nodes.add("FunctionNodeCompare", size, 0.0, operation="GREATER_THAN").outputs[0]
+    away = nodes.add("ShaderNodeVectorMath", seen.outputs["Location"], given.outputs[_MIDDLE], operation="DISTANCE")
+    half = nodes.add("ShaderNodeVectorMath", given.outputs[_HALF], operation="LENGTH").outputs["Value"]
+    near = nodes.math("MULTIPLY", half, _NEAR)
+    there = nodes.add("FunctionNodeCompare", away.outputs["Value"], near, operation="GREATER_THAN").outputs[0]
     turn = nodes.add("GeometryNodeSwitch", there, _NO_CAMERA, seen.outputs["Rotation"], input_type="ROTATION").outputs[
         0
     ]

@@ -12,7 +12,8 @@ from bpy.app.handlers import persistent
 from . import preferences
 
 CACHE, SIMULATIONS = "tactile_cache", "tactile_simulations"
-_copied: list[Path] = []  # by the save that is going on
+# By the save that is going on: what held which path, and the file if it was Blender's own.
+_named: list[tuple[bpy.types.bpy_struct, str, str, Path | None]] = []
 _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
@@ -41,42 +42,62 @@ def shown(file: Path) -> str:
 def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
     """Yield what holds a path, by which name, and which folder it belongs in."""
     for thing in bpy.data.objects:
-        if thing.tactile.recording:
-            yield thing.tactile, "recording", SIMULATIONS
+        for name in ("recording", "columns", "unit", "weights"):
+            if getattr(thing.tactile, name):
+                yield thing.tactile, name, SIMULATIONS
         for modifier in thing.modifiers:
             if modifier.type == "MESH_CACHE":
                 yield modifier, "filepath", CACHE
 
 
 @persistent
-def _move_beside(file: str, *_: object) -> None:
-    """Copy the files of a .blend that is saved for the first time beside it; called by Blender before it saves."""
-    for holder, name, kind in _held() if file else ():
-        path = Path(getattr(holder, name))
-        if path.is_absolute() and path.parent == _own(kind) and path.is_file():
-            beside = Path(file).parent / kind / path.name
+def _copy_beside(file: str, *_: object) -> None:
+    """Copy the files of a .blend to where it is saved, and name files elsewhere from there; Blender calls it before."""
+    _named.clear()
+    here, there = Path(bpy.data.filepath).parent if bpy.data.is_saved else None, Path(file).parent
+    for holder, name, kind in _held() if file and here != there else ():
+        value = getattr(holder, name)
+        path = Path(os.path.normpath(bpy.path.abspath(value)))
+        own = path.parent == _own(kind)
+        if not (own or (here and value.startswith("//"))) or not path.exists():
+            continue
+        _named.append((holder, name, value, path if own else None))
+        if own or path.parent == here / kind:
+            beside = there / kind / path.name
             beside.parent.mkdir(exist_ok=True)
             beside.unlink(missing_ok=True)
             try:
                 os.link(path, beside)
             except OSError:  # on another disk
                 shutil.copyfile(path, beside)
-            setattr(holder, name, f"//{kind}/{path.name}")
-            _copied.append(path)
+            path = beside
+        # Blender itself turns a modifier's relative path to where it saves, but no add-on's.
+        setattr(holder, name, _relative(path, here if here and kind == CACHE else there))
+
+
+def _relative(path: Path, start: Path) -> str:
+    try:
+        return f"//{os.path.relpath(path, start)}"
+    except ValueError:  # another drive of Windows
+        return os.fspath(path)
 
 
 @persistent
-def _let_go(*_: object) -> None:
-    """Remove what lies beside the .blend now; but of a copy, whose own file stays unsaved, it is named again."""
+def _let_go(file: str, *_: object) -> None:
+    """Remove what lies beside the .blend now; after saving a copy, name the files of the open one again."""
+    copied = not bpy.data.is_saved or Path(file) != Path(bpy.data.filepath)
+    for holder, name, value, own in _named:
+        if copied:
+            setattr(holder, name, value)
+        elif own is not None:
+            own.unlink(missing_ok=True)
+    _named.clear()
     _find_again()
-    for path in _copied if bpy.data.is_saved else ():
-        path.unlink(missing_ok=True)
-    _copied.clear()
 
 
 @persistent
 def _find_again(*_: object) -> None:
-    """Name files again that are elsewhere now: a copy was saved, an undo or a .blend named their former place."""
+    """Name files again that are elsewhere now: an undo or a .blend named their former place."""
     for holder, name, kind in _held():
         path = Path(bpy.path.abspath(getattr(holder, name)))
         if path.is_file() and (bpy.data.is_saved or path.is_absolute()):
@@ -89,7 +110,8 @@ def _find_again(*_: object) -> None:
 
 
 HANDLERS = (
-    (bpy.app.handlers.save_pre, _move_beside), (bpy.app.handlers.save_post, _let_go),
+    (bpy.app.handlers.save_pre, _copy_beside), (bpy.app.handlers.save_post, _let_go),
+    (bpy.app.handlers.save_post_fail, _let_go),
     (bpy.app.handlers.load_post, _find_again), (bpy.app.handlers.undo_post, _find_again),
     (bpy.app.handlers.redo_post, _find_again),
 )  # fmt: skip

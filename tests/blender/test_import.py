@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -38,6 +39,30 @@ def test_a_mesh_cache_plays_the_same(imported, nodes_of, part, scene, tmp_path):
         bpy.context.scene.frame_set(frame)
         np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=TOLERANCE)
     assert skin.modifiers["Tactile"].filepath.startswith("//tactile_cache")
+
+
+def test_save_as_elsewhere_takes_caches_along_and_finds_the_recording(imported, scene, tmp_path):
+    for name in ("a", "b", "c"):
+        (tmp_path / name).mkdir()
+    shutil.copyfile(RECORDING, tmp_path / "a" / "touch.h5")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
+    skin = imported(filepath=str(tmp_path / "a" / "touch.h5"), motion="MESH_CACHE")
+
+    def named():
+        return skin.tactile.recording, skin.modifiers["Tactile"].filepath
+
+    cache = Path(named()[1]).name
+    assert named() == ("//touch.h5", f"//tactile_cache/{cache}")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "c" / "copy.blend"), copy=True)
+    assert named() == ("//touch.h5", f"//tactile_cache/{cache}")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b" / "touch.blend"))
+    (tmp_path / "a" / "tactile_cache").rename(tmp_path / "gone")
+    for file in ("b/touch.blend", "c/copy.blend"):
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / file))
+        skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
+        assert named() == ("//../a/touch.h5", f"//tactile_cache/{cache}")
+        assert Path(bpy.path.abspath(named()[1])).is_file()
+    bpy.ops.tactile.translate()
 
 
 def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(imported, nodes_of, part, monkeypatch, tmp_path):

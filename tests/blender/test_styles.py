@@ -42,14 +42,17 @@ def test_colours_fade_below_the_expected_error(gel, part):
     assert len(gel.animation_data.drivers) == 1
 
 
-VIEWS = [(150, -60, 100), (-150, 20, 60), (10, 200, 30), (60, 35, -150), None]
+NEW_FILE = (7.3589, -6.9258, 4.9583)  # of its hidden camera, inside the skin: nothing is looked at by it
+VIEWS = [(150, -60, 100), (-150, 20, 60), (10, 200, 30), (60, 35, -150), NEW_FILE, None]
 
 
 @pytest.mark.parametrize("place", VIEWS)
 def test_legends_face_the_camera_below_their_sensors_and_apart(gel, nodes_of, place):
     bpy.ops.tactile.set_style(style="DISPLACEMENT")
     scene, camera = bpy.context.scene, None
-    turn = np.array([[0, -0.643, 0.766], [1, 0, 0], [0, 0.766, 0.643]])  # toward a new file's view
+    layout = bpy.data.screens["Layout"]
+    view = next(area for area in layout.areas if area.type == "VIEW_3D").spaces.active.region_3d
+    turn = np.array(view.view_rotation.to_matrix())  # of a new file
     if place is not None:
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(camera)
@@ -57,13 +60,13 @@ def test_legends_face_the_camera_below_their_sensors_and_apart(gel, nodes_of, pl
         camera.rotation_euler = (Vector(place) - gel.location).to_track_quat("Z", "Y").to_euler()
         scene.camera = camera
         bpy.context.view_layer.update()
-        turn = np.array(camera.matrix_world.to_3x3())
+        turn = turn if place == NEW_FILE else np.array(camera.matrix_world.to_3x3())
     boxes = []
     for sensor in (thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT")):
         legend = next(thing for thing in sensor.children if "text" in thing)
         nodes = (nodes_of(legend) + np.array(sensor.location)) @ turn  # right, up, toward
         card, title = nodes[:4], nodes[4 : len(nodes) // 2]
-        assert np.ptp(card[:, 2]) < 1e-3 and (title[:, 2] > card[0, 2]).all()  # flat, and letters before it
+        assert np.ptp(card[:, 2]) < 5e-3 and (title[:, 2] > card[0, 2]).all()  # flat (a turn of 4 digits over 20 mm)
         assert (card[1] - card[0])[0] > 10 and (card[3] - card[0])[1] > 5  # neither mirrored nor on its head
         body = (nodes_of(sensor) + np.array(sensor.location)) @ turn
         assert card[:, 1].max() < body[:, 1].min()
