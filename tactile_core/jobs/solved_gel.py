@@ -43,7 +43,14 @@ def prepare(gel: str = TARGET) -> None:
 
 
 def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET) -> dict[str, np.ndarray]:
-    """Replace the gel displacements of translated frames by solved contacts, each frame by itself."""
+    """Replace the gel displacements of translated frames by solved contacts, each frame by itself.
+
+    arrays : by the names of frames.h5, T first; frames without contact are unchanged
+    gel : the sensor that is solved; found_on : the one on which the networks find contacts
+    Returns the arrays with ``traction_digit`` (T, M, 3) Pa added, zero in frames that were not solved. A frame without
+    a solution keeps the networks' displacement and is flagged ``GEL_NOT_SOLVED``. Where `gel` differs from `found_on`,
+    a frame without a solution is at rest, contacts beside the gel are flagged as beyond it, the networks' latents are
+    left out, and errors, which are not known, are NaN."""
     moved, flags, center = arrays["displacement_digit"], arrays["flags"].copy(), arrays["contact_center"]
     own = gel == found_on
     found = moved.copy() if own else np.zeros((len(moved), len(sensors.sensor_surface(gel).rest), 3), moved.dtype)

@@ -13,7 +13,7 @@ MOST_WORDS = 20  # of a label that a summary counts one by one
 
 
 def labels_of(columns: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Return named texts, unless all empty, as (T,) object arrays of str, shortened and made fit for HDF5."""
+    """Return named texts as (T,) object arrays of str, shortened, fit for HDF5; all-empty ones are dropped."""
     found = {}
     for name, column in columns.items():
         found[_plain(name).replace("/", "_").strip(". ")] = [_plain(text) for text in column]

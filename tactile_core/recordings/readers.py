@@ -92,7 +92,7 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
 
 
 def _noted(recording: Recording, store: Store) -> Recording:
-    """Add the file's labels, and the names of arrays that the recording leaves out, unless it is a simulated one."""
+    """Add names of arrays that the recording leaves out and, unless it is simulated, the file's labels."""
     labels = {} if recording.simulated else labels_in(store, len(recording))
     return replace(recording, labels=labels, not_taken=tuple(name for name in store.shapes if name not in store.taken))
 

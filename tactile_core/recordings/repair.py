@@ -77,7 +77,7 @@ def _jumping(values: np.ndarray) -> np.ndarray:
 
 
 def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
+    """Mark (T, C) bool glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
     frames = len(values)
     found = np.zeros(values.shape, bool)
     for length in range(1, min(SHORT, frames - 2) + 1):
@@ -124,7 +124,7 @@ def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
 
 
 def _end_runs(values: np.ndarray) -> np.ndarray:
-    """Glitches of 1 to 3 samples at the first and the last sample."""
+    """Mark (T, C) bool the glitches of 1 to 3 samples at the first and the last sample."""
     found = np.zeros(values.shape, bool)
     if len(values) < 2 * END + 2:
         return found
@@ -140,7 +140,7 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
 
 
 def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
+    """Mark (T, C) bool runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
     found = np.zeros(values.shape, bool)
     large = np.array([np.abs(np.diff(values[:, j].astype(float))) > LIMIT for j in jumping])
     alone = large.sum(axis=0) <= ALONE

@@ -34,8 +34,8 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a quiet level (19,) counts is this unit at rest, judged by PDC, counts. Without PDC on both
-        sides, or with another zero of PDC, the level must be near the unit's counts at rest."""
+        """Return true if a quiet level (19,) counts is this unit at rest, judged by PDC, counts. If either has no PDC,
+        or PDC has another zero, the level must be near the unit's counts at rest."""
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
         return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())

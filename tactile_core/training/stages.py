@@ -124,8 +124,9 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. SVB is trained
-    along, to keep what separates contacts. (Likelihood alone gives no bias to fainter contacts.)"""
+    """Negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. (By likelihood a
+    contact is not estimated fainter than its signal makes it.) SVB is trained along, to keep what separates
+    contacts."""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
     found, surprise = model.given(batch.signal, batch.state)

@@ -212,7 +212,7 @@ class Networks:
         return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
-        """Apply a map to a latent whose place is replaced by its remainder after rounding to whole cells."""
+        """Map latents (T, L), joined by the remainder of their place after rounding to cells, by the network `net`."""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
         return in_blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)

@@ -33,7 +33,7 @@ class Press:
     picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
     change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large
         changes
-    region : (H, W) bool, the region of interest, found without the drift
+    region : (H, W) bool, the region of interest, from picture and background alone
     flags : what is wrong with it, in words; empty for nothing
     radius : m, of its ball; None for that of the whole set"""
 
@@ -161,7 +161,7 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool of pixels within 9 px of a change over 18 levels in any channel, drift included."""
+    """Return the mask (H, W) bool of pixels within 9 px of a change over 18 levels in any channel."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
