@@ -110,7 +110,8 @@ def render(
 
 
 def claimed(out: Path, options: Options) -> str:
-    """Check that `out` may be written and return the preset; raises TactileError, as `choose_preset` does."""
+    """Raise TactileError where `out` cannot be written or the options are wrong (`choose_preset`); return the
+    preset."""
     results.check_free(out, options.overwrite, MAKER)
     if options.scene_out is not None and not options.overwrite:
         for file in scene_files(options.scene_out):

@@ -45,7 +45,7 @@ class Surface(NamedTuple):
 
 class Lit(NamedTuple):
     """Light of L LEDs on a surface without shadows, float32.
-    near, tilt, length : (H, W), s and the third component and the length of the normal, see ``Surface``
+    near, tilt, length : (H, W), s, the normal's third component and its length, as in ``Surface``
     facing : (L, H, W) m, cosine times distance times the normal's length
     square : (L, H, W) m2, of the distance; light : (L, H, W), relative to a coating that faces the LED at the origin"""
 

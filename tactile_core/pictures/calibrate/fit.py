@@ -210,8 +210,8 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return standard errors by name, and the names of parameters that the photographs do not determine. Prior
-        knowledge of units counts as one more measurement, misfits of the model as MODEL_ERROR."""
+        """Return standard errors by name, and the names of parameters that the photographs do not determine. How units
+        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR."""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]

@@ -2,7 +2,7 @@
 
 The unknowns are the unit's numbers and three numbers a press. The gain C is linear in light, so it is solved for at
 each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by Gauss-Newton steps
-as the camera's toe and shoulder are not linear. Priors of units, one square each, determine numbers that few
+as the camera's toe and shoulder are not linear. Priors of units (assumed), one square each, determine numbers that few
 photographs do not."""
 
 from __future__ import annotations
