@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from pathlib import Path
 
 import bpy
@@ -10,7 +11,10 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...tactile_core import sensors
 from ...tactile_core.errors import TactileError
+from ...tactile_core.pictures.height_map import height_map
 from ..objects import axes, biotac_objects, curves, digit_body, digit_objects, indenter_objects
+from ..process import tracer_process
+from ..process.jobs import Job, JobFolder
 from ..settings import properties, render_settings
 from ..settings.reports import TactileOperator, require
 from . import pictures, scene_bridge, view
@@ -129,13 +133,13 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
         require("OpenEXR")
-        from ...tactile_core.pictures.height_map import height_map
-        from ...tactile_core.pictures.mitsuba.scene_file import write_scene
-
         gel = properties.needed_gel(context.scene, context.object)
         shown, moved = pictures.shown_state(gel, context.evaluated_depsgraph_get())
-        path = bpy.path.abspath(self.filepath)
-        write_scene(path, shown.unit, height_map(moved, shown.unit.camera))
+        path = os.path.abspath(bpy.path.abspath(self.filepath))
+        with JobFolder() as folder:
+            tracer_process.write_unit(folder, shown.unit)
+            np.save(folder / "heights.npy", height_map(moved, shown.unit.camera))
+            Job("picture_scene", folder, path=path).wait()
         self.report({"INFO"}, path + "; other lamps and bodies are left out" * bool(shown.around))
 
 

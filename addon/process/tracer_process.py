@@ -23,6 +23,13 @@ _LOOK = 0.05  # s between two looks at the worker and at Esc
 _IDLE = 60.0  # s
 
 
+def write_unit(folder: Path, unit: Calibration) -> None:
+    """Write a unit into a job's folder, beside it the photograph that its calibration names."""
+    calibration_file.write_calibration(folder / "unit.toml", unit)
+    if unit.photograph:
+        shutil.copyfile(unit.photograph, folder / Path(unit.photograph).name)
+
+
 class Stopped(Exception):
     """The user has pressed Esc."""
 
@@ -76,10 +83,7 @@ class Tracer:
         if key == self._unit:
             return
         self._unit = key
-        calibration_file.write_calibration(self._folder.path / "unit.toml", unit)
-        # Beside the file, as the calibration names it.
-        if unit.photograph:
-            shutil.copyfile(unit.photograph, self._folder.path / Path(unit.photograph).name)
+        write_unit(self._folder.path, unit)
         lamps = [dataclasses.asdict(lamp) for lamp in around.lamps]
         (self._folder.path / "lamps.json").write_text(json.dumps(lamps), encoding="utf-8")
         arrays = {f"vertices_{k}": body.vertices for k, body in enumerate(around.occluders)}

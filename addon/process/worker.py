@@ -226,6 +226,15 @@ def _renderer(folder: Path, preset: str) -> Any:
     return Renderer(load_calibration(folder / "unit.toml"), preset, surroundings=around)
 
 
+def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
+    """Write the scene of unit.toml and heights.npy to job["path"]; in Blenders with their own OpenEXR that crashes."""
+    from tactile_core.pictures.mitsuba.scene_file import write_scene
+    from tactile_core.sensors.calibration_file import load_calibration
+
+    heights = np.load(folder / "heights.npy", allow_pickle=False)
+    write_scene(job["path"], load_calibration(folder / "unit.toml"), heights)
+
+
 def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
     """Solve the contacts of frames.npz, which networks found on the gel job["found_on"], on the gel job["gel"].
 
@@ -285,7 +294,14 @@ def read(folder: Path, job: dict, progress: Progress) -> None:
 LIFT = "Lift it there"
 STEPS = 8  # of sinking by the free distance; each leaves a small part of it, far below a pixel after eight
 BLOCK = 16  # frames whose contacts are solved between two reports
-JOBS = {"simulate": simulate, "solve_gel": solve_gel, "render": render, "read": read, "variant": variant}
+JOBS = {
+    "simulate": simulate,
+    "solve_gel": solve_gel,
+    "render": render,
+    "picture_scene": picture_scene,
+    "read": read,
+    "variant": variant,
+}
 
 if __name__ == "__main__":
     sys.exit(main(Path(sys.argv[1])))

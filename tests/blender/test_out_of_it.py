@@ -27,11 +27,12 @@ def test_the_picture_s_scene_is_mitsuba_s(gel, part, needs, tmp_path):
         (tmp_path / name).mkdir()
     assert bpy.ops.tactile.export_mitsuba(filepath=str(tmp_path / "blender" / "gel.xml")) == {"FINISHED"}
     heights = part("tactile_core.pictures.height_map").height_map(moved, shown.unit.camera)
-    write(tmp_path / "core" / "gel.xml", shown.unit, heights)
+    part("addon.process.tracer_process").write_unit(tmp_path / "core", shown.unit)  # as Save As has it, rounded
+    load = part("tactile_core.sensors.calibration_file").load_calibration
+    write(tmp_path / "core" / "gel.xml", load(tmp_path / "core" / "unit.toml"), heights)
     for name in ("gel.xml", "gel.ply", "gel.camera.exr"):
         assert (tmp_path / "blender" / name).read_bytes() == (tmp_path / "core" / name).read_bytes()
-    unit = part("tactile_core.sensors.calibration_file").load_calibration()
-    write(tmp_path / "core" / "gel.xml", unit, heights)
+    write(tmp_path / "core" / "gel.xml", load(), heights)
     assert (tmp_path / "blender" / "gel.xml").read_bytes() != (tmp_path / "core" / "gel.xml").read_bytes()
 
 
