@@ -40,6 +40,9 @@ def write(place: Path) -> Path:
         group.asset_mark()
         group.asset_data.catalog_id, group.asset_data.description = _CATALOG, DESCRIPTIONS[style]
         group.asset_data.author = "Tactile"
+        with bpy.context.temp_override(id=group):
+            picture = Path(__file__).with_name("previews") / f"{style.lower()}.jpg"
+            bpy.ops.ed.lib_id_load_custom_preview(filepath=str(picture))
     path = place / "styles.blend"
     partial = path.with_suffix(".partial.blend")
     bpy.data.libraries.write(str(partial), set(groups.values()), fake_user=True, compress=True)

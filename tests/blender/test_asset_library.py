@@ -20,6 +20,7 @@ def test_the_library_is_listed_and_holds_the_styles_as_assets(part):
         taken.node_groups = list(held.node_groups)
     groups = {group.name: group for group in taken.node_groups}
     assert groups.keys() == NAMES
+    assert all(tuple(group.preview.image_size) == (256, 256) for group in groups.values())
     assert all(group.asset_data.catalog_id in catalogues and group.is_modifier for group in groups.values())
 
 
