@@ -23,7 +23,7 @@ RECORDING = Path(tempfile.gettempdir()) / "recordings" / SHIPPED.name
 # Where the sidebar's tab "Tactile" is drawn in a window of 1280 x 800: alone, beside a picture, in the workspace.
 TABS = {"imported": ("1043", "250"), "authored": ("705", "250")}
 IN_WORKSPACE = ("881", "250")
-SETTLE = 5.0  # s that software OpenGL takes to draw
+SETTLE = 8.0  # s that software OpenGL takes to draw, beside other programs
 BALL, KEYS = 4.0, ((1, -0.5), (6, -0.1), (12, 0.6))  # mm radius; frames and depths, mm, of the authored press
 
 
@@ -101,7 +101,7 @@ def click() -> None:
     """Open the sidebar's tab, which no script can in Blender 4.3; not waited for, as Blender has to take it in."""
     tab = TABS.get(os.environ["STAGE"], IN_WORKSPACE)
     away = ["mousemove", "300", "640"]
-    moves = [*away, "key", "Escape", "sleep", "1", "mousemove", *tab, "sleep", "1", "click", "1", "sleep", "1", *away]
+    moves = [*away, "key", "Escape", "sleep", "2", "mousemove", *tab, "sleep", "2", "click", "1", "sleep", "1", *away]
     subprocess.Popen(["xdotool", *moves])
 
 
