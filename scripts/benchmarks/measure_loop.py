@@ -5,14 +5,19 @@
 
 Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
 same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
-to the goal and five slides of 0.1 mm along the finger. Median, 95 and 99 % of CPU and wall ms a contact on one core,
-warm. Beside them the fast tier's error against the full one (`mechanics_tiers.json`). Needs the extra [fem].
+to the goal and five slides of 0.1 mm along the finger. As meshes: four bodies by formula and, at the same places and
+depths, as meshes of up to 82,000 triangles, each from nothing, and how long a mesh takes to load. Median, 95 and 99 %
+of CPU and wall ms a contact on one core, warm. Beside them the fast tier's error against the full one
+(`mechanics_tiers.json`). Needs the extra [fem].
 """
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 import time
+import unittest.mock
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -31,6 +36,7 @@ from benchmarks.mechanics.random_contacts import RandomContact, random_contacts 
 from tactile_core.accuracy import Row, row  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import compiled  # noqa: E402
+from tactile_core.geometry.indenters import Box, Cylinder, Indenter, MeshIndenter, Sphere  # noqa: E402
 from tactile_core.jobs.gel import Gel  # noqa: E402
 from tactile_core.mechanics.error_estimate import measured  # noqa: E402
 from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
@@ -88,6 +94,7 @@ def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
             if sensor == "digit" and name.endswith("path"):
                 yield from pictures(last)
     yield "digit, step and picture", gel_steps(count), "see above"
+    yield from meshes(count)
 
 
 def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
@@ -114,6 +121,46 @@ def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContac
                 times.append(took)
         last.append(solved)
     return times, last
+
+
+def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
+    """Yield the times of loading four meshes, and of contacts by formula and as meshes with the difference of force."""
+    import trimesh
+
+    made = trimesh.creation
+    bodies: list[tuple[Indenter, Any]] = [
+        (Sphere(3e-3), made.icosphere(5, 3e-3)),
+        (Sphere(12e-3), made.icosphere(6, 12e-3)),
+        (Cylinder(1.5e-3, 0.1e-3), made.cylinder(1.5e-3, 10e-3, sections=128)),
+        (Box((8e-3,) * 3, 0.1e-3), made.box((8e-3,) * 3)),
+    ]
+    compliance_of("digit")
+    loads: Times = []
+    pairs: list[tuple[Indenter, MeshIndenter]] = []
+    with tempfile.TemporaryDirectory() as folder, unittest.mock.patch.dict(os.environ, TACTILE_CACHE=folder):
+        MeshIndenter.from_trimesh(made.box((2e-3,) * 3))  # compiles the loops
+        for formula, mesh in bodies:
+            mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
+            took, loaded = timed(lambda m=mesh: MeshIndenter.from_trimesh(m))
+            loads.append(took)
+            pairs.append((formula, loaded))
+    off = f"within {1e6 * max(mesh.error[0] for _, mesh in pairs):.2g} um rms of the mesh"
+    yield "digit, a mesh is loaded", loads, off
+    times: tuple[Times, Times] = ([], [])
+    apart = []
+    for number, contact in enumerate(random_contacts(count + WARM, SEED)):
+        forces = []
+        for taken, indenter in zip(times, pairs[number % len(pairs)], strict=True):
+            pose = pose_at("digit", indenter, contact.place)
+            thick = thickness_under("digit", indenter, pose)
+            press = CorrectedPress(compliance_of("digit"), indenter, pose, DEPTH_LIMIT * thick, FRICTION)
+            took, solved = timed(lambda p=press, d=contact.depth * thick: at_depth(p, d))
+            if number >= WARM:
+                taken.append(took)
+            forces.append(np.nan if solved is None else solved.axial_force)
+        apart.append(abs(forces[1] / forces[0] - 1))
+    yield "digit, alone, four bodies by formula", times[0], "see alone"
+    yield "digit, alone, as meshes", times[1], f"{np.nanmedian(apart):.2%} of force from the formula (median)"
 
 
 def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:

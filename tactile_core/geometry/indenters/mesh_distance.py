@@ -74,7 +74,10 @@ def _least_squares(places, cells, triangles, starts, members, boxes, shape, step
     squares, normal, arm, edge = np.empty(len(places)), np.empty(3), np.empty(3), np.empty(3)
     around, count = np.empty(len(steps), np.int64), 0
     for p in range(len(places)):
-        if p == 0 or (cells[p] != cells[p - 1]).any():
+        same = p > 0
+        for a in range(3):
+            same = same and cells[p, a] == cells[p - 1, a]
+        if not same:
             count = 0
             for q in range(len(steps)):
                 cell, within = 0, True
@@ -86,7 +89,8 @@ def _least_squares(places, cells, triangles, starts, members, boxes, shape, step
                     around[count] = cell
                     count += 1
         best = bound
-        for cell in around[:count]:
+        for q in range(count):
+            cell = around[q]
             away = 0.0
             for a in range(3):
                 away += max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0) ** 2

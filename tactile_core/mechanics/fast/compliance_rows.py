@@ -189,12 +189,12 @@ def _gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns): 
         flip = mirrored[each]
         for axis in range(3):
             source, out = move[3 * rows[each] + axis], entries[3 * each + axis]
-            if not flip:
-                out[:] = source[columns]
-                continue
-            sign = np.float32(-1.0 if axis == 2 else 1.0)  # mirrored in z: of the force, and of the motion
-            out[:] = sign * source[mirrored_columns]
-            out[2::3] *= np.float32(-1.0)
+            for j in range(len(columns)):
+                if flip:  # mirrored in z: the force, and the motion
+                    value = source[mirrored_columns[j]]
+                    out[j] = value if (axis == 2) == (j % 3 == 2) else -value
+                else:
+                    out[j] = source[columns[j]]
 
 
 @Loop
@@ -213,14 +213,15 @@ def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_for
         x, y = np.float32(force[a, 0]), np.float32(force[a, 1])
         z = np.float32(-force[a, 2] if flip else force[a, 2])
         first, second, third = move[3 * rows[a]], move[3 * rows[a] + 1], move[3 * rows[a] + 2]
-        out += x * first + y * second + z * third
+        for j in range(size):  # not arrays as a whole: the first such expression costs numba seconds
+            out[j] += x * first[j] + y * second[j] + z * third[j]
     for p in range(len(inner)):
         line, load = inner_move[inner[p]], np.float32(inner_force[p])
         add_scaled(moved, load, line)
-    if any_there:
-        moved[0::3] += there[0::3][image]
-        moved[1::3] += there[1::3][image]
-        moved[2::3] -= there[2::3][image]
+    for j in range(size // 3 if any_there else 0):
+        moved[3 * j] += there[3 * image[j]]
+        moved[3 * j + 1] += there[3 * image[j] + 1]
+        moved[3 * j + 2] -= there[3 * image[j] + 2]
     return moved
 
 

@@ -130,6 +130,7 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
     s, columns, curved = len(slipping.at), bearing.shape[2], slipping.curved
     system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
     bend, at, ways, place = np.empty(s, np.int64), np.empty(s, np.int64), np.empty((2, 3)), np.empty(size, np.int64)
+    mixed = np.empty(len(rows), np.float32)
     for j in range(len(rows)):
         place[rows[j]] = j
     for a in range(s):
@@ -143,7 +144,8 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
             ways[0, i], ways[1, i] = lean[node, i] - slipping.friction * normal[node, i], across[a, i]
         for way in range(2):
             x, y, z = np.float32(ways[way, 0]), np.float32(ways[way, 1]), np.float32(ways[way, 2])
-            mixed = x * first + y * second + z * third
+            for j in range(len(rows)):
+                mixed[j] = x * first[j] + y * second[j] + z * third[j]
             for i in range(3):
                 for j in range(3 if bend[a] >= 0 else 0):
                     mixed[at[a] + j] -= np.float32(ways[way, i] * slipping.turning[bend[a], i, j])
