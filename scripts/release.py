@@ -5,7 +5,8 @@
 
 The version is the one of tactile_core/files/version.py; the manifest, CITATION.cff and the newest heading of
 CHANGELOG.md must name the same. The wheel is built from the sdist, installed into an empty environment and must convert
-the recording that ships. The same commit and packages give the same bytes: `sha256sum --check SHA256SUMS` compares.
+the recording that ships. The same commit and packages give the same wheel and zips, to the byte; the sdist holds the
+times of the checkout's files.
 """
 
 from __future__ import annotations
