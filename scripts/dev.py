@@ -33,16 +33,8 @@ DEMO_RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 TEST_PACKAGES = ("pytest", "pytest-timeout")
 # What the extension's tests need beside bpy; 4.2 to 5.0 were built for the first numpy's binary interface.
 BLENDER_PACKAGES = (
-    *TEST_PACKAGES,
-    "h5py",
-    "msgspec",
-    "scipy",
-    "cholespy",
-    "trimesh",
-    "rtree",
-    "threadpoolctl",
-    "OpenEXR",
-)
+    *TEST_PACKAGES, "h5py", "msgspec", "scipy", "cholespy", "trimesh", "rtree", "threadpoolctl", "OpenEXR",
+)  # fmt: skip
 WORKERS = 4  # processes of tests at most; each takes up to 4 GB
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 BLENDER_SECONDS = 1800  # some Blenders hang at exit (4.5 where an operator stays registered): no run may last longer
