@@ -13,6 +13,8 @@ PROPERTIES = {  # custom ones of a sensor, keyframed: for drivers of the user's 
     "electrodes": "Change of the electrodes against rest, counts",
     "pdc": "Fluid pressure as recorded, counts",
     "force": "Force of the object on the BioTac, N, along the finger, across it, and into the pad (negative Z)",
+    "second_force": "Likewise of the weaker of two contacts; 0 where one is found",
+    "second_center_mm": "Place of that contact on the unrolled DIGIT, x and z, mm",
     "confidence": "1: signals like those of the training, 0: far from them",
     "explained": "Share of the electrodes' change that the translated contact explains; 0 without contact",
     "expected_error_um": "Largest node error of this surface that half of such frames stay below, micrometres;"

@@ -59,15 +59,22 @@ class Translated:
         translation = self.translation
         values = {
             "electrodes": self.signals.change,
-            "force": translation.force[:, [0, 2, 1]] * np.array([1, 1, -1]),
+            "force": _in_blender_axes(translation.force),
             "confidence": translation.confidence,
             "explained": translation.explained,
             "expected_error_um": 1e6 * translation.expected_error_biotac,
             "flags": translation.flags,
         }
+        if self.translator.answer.contacts > 1:
+            values["second_force"] = _in_blender_axes(translation.second_force)
+            values["second_center_mm"] = 1e3 * translation.second_center
         if self.recording.pdc is not None:
             values["pdc"] = self.recording.pdc[self.chosen]
         return values
+
+
+def _in_blender_axes(force: np.ndarray) -> np.ndarray:
+    return force[:, [0, 2, 1]] * np.array([1, 1, -1])
 
 
 def in_files(motion: str, frames: int) -> bool:
@@ -76,16 +83,17 @@ def in_files(motion: str, frames: int) -> bool:
 
 
 @functools.lru_cache(maxsize=2)
-def _translator(weights: str, source: str | None, apart: bool, _changed: int) -> Translator:
+def _translator(weights: str, source: str | None, answer: Answer, _changed: int) -> Translator:
     """Load networks once, for an empty text those that ship for a sensor, whichever gel they lead to."""
-    return load_translator(weights or None, Answer(frames_apart=apart), None, source)
+    return load_translator(weights or None, answer, None, source)
 
 
 def translator_of(asked: RecordingOptions, path: str) -> Translator:
     """Return the networks in a folder, else those that ship for a recording. Raises TactileError without networks."""
     folder = _absolute(asked.weights)
     source = None if folder else readers.sensor_of_first([path])
-    return _translator(folder, source, asked.apart, _changed(os.path.join(folder, CARD_NAME)) if folder else 0)
+    answer = Answer(frames_apart=asked.apart, contacts=2 if asked.two else 1)
+    return _translator(folder, source, answer, _changed(os.path.join(folder, CARD_NAME)) if folder else 0)
 
 
 @functools.lru_cache(maxsize=8)
@@ -141,7 +149,7 @@ def load(
         asked.tare,
         asked.frames,
         asked.polarity,
-        asked.apart,
+        known.answer,
         known.sha256,
         per_metre,
         kept_files.folder(kept_files.CACHE),

@@ -48,6 +48,8 @@ class TACTILE_OT_translate(JobOperator):
         with shown(context) as progress:
             own = recording_data.translator_of(about, bpy.path.abspath(about.recording)).target
             self._target = self.to.lower() if self.properties.is_property_set("to") else own
+            if about.two and self._target != own:
+                raise TactileError("Two Contacts", "a gel that is solved", "one that is translated to", "Leave it out")
             # Another gel's contacts are solved from what is in memory.
             how = (about.motion if self._target == own else "") or "SHAPE_KEYS"
             found = recording_data.load(bpy.path.abspath(about.recording), about, progress, how, about.per_metre)

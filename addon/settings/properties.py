@@ -73,6 +73,10 @@ class RecordingOptions:
         name="Each Frame Alone", description="Translate each frame by its own signals, as snapshots without order need;"
         " else the contact is followed through the frames", options=set(),
     )  # fmt: skip
+    two: bpy.props.BoolProperty(
+        name="Two Contacts", description="Look for a second contact in each frame, of a finger that touches in two"
+        " places; a single wide contact is often taken for two", options=set(),
+    )  # fmt: skip
     weights: bpy.props.StringProperty(
         name="Weights", description="Folder of the networks, which name their two sensors; empty: those that ship for"
         " the recording's sensor", subtype="DIR_PATH", options=RELATIVE,

@@ -33,6 +33,7 @@ WORDS = (
     (r"--sensor\b", "Unit"),
     (r"--error\b", "Largest Error"),
     (r"--frames-apart\b", "Each Frame Alone"),
+    (r"--contacts( 2)?\b", "Two Contacts"),
 )  # fmt: skip
 ADVICE = "Install the extension's zip for this platform, which brings it"
 

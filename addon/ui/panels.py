@@ -46,7 +46,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "recording", text="")
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
-            for name in ("columns", "unit", "apart", "weights"):
+            for name in ("columns", "unit", "apart", "two", "weights"):
                 box.prop(skin.tactile, name)
         row = layout.row(align=True)
         row.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")
@@ -107,6 +107,9 @@ def numbers_of(skin: bpy.types.Object) -> list[str]:
     lines = [f"Confidence {skin['confidence']:.2f}"]
     if any(skin["force"]) and "explained" in skin:
         lines[0] += f", {100 * skin['explained']:.0f} % of the signals explained"
+    if skin.tactile.two and any(skin.get("second_force", ())):
+        x, z = skin["second_center_mm"]
+        lines.append(f"Second contact: {math.hypot(*skin['second_force']):.2f} N, x {x:.1f} mm, z {z:.1f} mm")
     flags = trust_words.remarks(int(skin["flags"]))
     return [*lines, f"Flags: {', '.join(flags)}"] if flags else lines
 

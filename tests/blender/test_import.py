@@ -15,7 +15,9 @@ TOLERANCE = 1e-3  # mm: ten times what float32 rounds coordinates of 30 mm to, t
 
 
 def _translated(part, frames="40:140"):
-    asked = SimpleNamespace(tare="auto", polarity="auto", frames=frames, weights="", columns="", unit="", apart=False)
+    asked = SimpleNamespace(
+        tare="auto", polarity="auto", frames=frames, weights="", columns="", unit="", apart=False, two=False
+    )
     return part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None, "SHAPE_KEYS", 1000.0)
 
 

@@ -64,7 +64,7 @@ def test_the_menus_list_the_sensors_that_are_there_the_usual_pair_first(part):
 def test_another_gel_is_solved_under_the_contact_that_the_networks_find(on_both, nodes_of, part):
     scene, (digit, mini) = bpy.context.scene, on_both
     files = {"weights": "", "columns": "", "unit": ""}
-    asked = SimpleNamespace(tare="auto", polarity="auto", frames="55:85:6", apart=False, **files)
+    asked = SimpleNamespace(tare="auto", polarity="auto", frames="55:85:6", apart=False, two=False, **files)
     path = str(ROOT / "scenes/press_roll_slide/press_roll_slide.h5")
     found = part("addon.operators.recording_data").load(path, asked, lambda share: None, "", 1000.0).translation
     arrays = {name: getattr(found, name) for name in ("displacement_digit", "contact_center", "force", "flags")}

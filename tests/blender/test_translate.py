@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 import pytest
 
-RECORDING = Path(__file__).resolve().parents[2] / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+SCENES = Path(__file__).resolve().parents[2] / "scenes"
+RECORDING = SCENES / "press_roll_slide" / "press_roll_slide.h5"
 TOLERANCE = 1e-3  # mm: ten times what float32 rounds coordinates of 30 mm to
 
 
@@ -24,7 +25,9 @@ def gel(imported):
 
 
 def _translation(part):
-    asked = SimpleNamespace(tare="auto", polarity="auto", frames="40:140", weights="", columns="", unit="", apart=False)
+    asked = SimpleNamespace(
+        tare="auto", polarity="auto", frames="40:140", weights="", columns="", unit="", apart=False, two=False
+    )
     return (
         part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None, "", 1000.0).translation
     )
@@ -214,3 +217,40 @@ def test_a_unit_s_file_is_told_and_moves_the_skin_too(imported, part, tmp_path, 
     assert f"{100 * explained:.0f} % of the signals explained" in lines[0]
     bpy.ops.tactile.translate()  # again: nothing else was chosen
     assert len(skin.children) == markers
+
+
+@pytest.fixture
+def two_balls(tmp_path, part):
+    """A recording of two balls pressed at once, a press of .4 s between parts without contact."""
+    rest = part("tactile_core.sensors").REST_COUNTS
+    with np.load(SCENES / "training" / "double_contacts.npz") as double:
+        change = double["signal"][1]
+    share = np.concatenate([np.zeros(60), np.linspace(0, 1, 10), np.ones(20), np.linspace(1, 0, 10), np.zeros(30)])
+    np.savez(tmp_path / "two.npz", electrodes=np.rint(rest + share[:, None] * change), time=np.arange(130) / 100)
+    return tmp_path / "two.npz"
+
+
+def test_a_second_contact_is_looked_for_and_said_where_asked(two_balls, part):
+    bpy.ops.tactile.import_recording(filepath=str(two_balls), two=True)
+    bpy.ops.tactile.translate()
+    scene, words = bpy.context.scene, part("addon.ui.panels").numbers_of
+    skin = scene.objects["BioTac skin"]
+    moved = {}
+    for two in (True, False):
+        skin.tactile.two = two
+        bpy.ops.tactile.translate()
+        scene.frame_set(80)
+        moved[two] = part("addon.objects.digit_objects").displacement_of(
+            scene.objects["DIGIT gel"], bpy.context.evaluated_depsgraph_get()
+        )
+        assert any(line.startswith("Second contact: ") for line in words(skin)) == two
+    assert skin["second_force"][2] < 0  # into the pad
+    assert np.abs(moved[True] - moved[False]).max() > 0.1e-3
+    scene.frame_set(10)
+    assert not any(skin["second_force"])
+
+
+def test_two_contacts_on_a_gel_that_is_solved_are_refused(two_balls):
+    bpy.ops.tactile.import_recording(filepath=str(two_balls), two=True)
+    with pytest.raises(RuntimeError, match="Two Contacts"):
+        bpy.ops.tactile.translate(to="GELSIGHT_MINI")
