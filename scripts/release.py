@@ -45,6 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--no-zips", action="store_true", help="leave out the extension's zips")
     parser.add_argument("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="new or empty (default: dist)")
     options = parser.parse_args(arguments)
+    options.out = options.out.resolve()  # commands run in the checkout
     try:
         version = agreed_version(ROOT)
         check_clean(options.out)
@@ -99,7 +100,7 @@ def try_wheel(wheel: Path, version: str) -> None:
         if told != f"tactile {version}":
             raise ReleaseError(f"the wheel says {told!r}, not 'tactile {version}'")
         run(*tactile, "scenes", "copy", folder=folder)
-        recording = next(folder.rglob("press_roll_slide.h5"))
+        recording = next((folder / "scenes").rglob("press_roll_slide.h5"))
         run(*tactile, "convert", str(recording), "--out", "results", folder=folder)
 
 

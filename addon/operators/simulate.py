@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.files import atomic
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..objects import motion
 from ..process.jobs import Job, JobFolder
@@ -84,8 +85,8 @@ class TACTILE_OT_simulate(JobOperator):
         if skin is None:
             return
         path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(self._thing)}.h5"
-        path.parent.mkdir(exist_ok=True)
-        shutil.copyfile(self._folder.path / "recording.h5", path)
+        with atomic.new_file(path) as partial:
+            shutil.copyfile(self._folder.path / "recording.h5", partial)
         skin.tactile.recording, skin.tactile.tare, skin.tactile.known = kept_files.shown(path), "auto", ""
         skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
         skin.tactile.samples = SAMPLE_RATE / scene_bridge.rate_of(context.scene)

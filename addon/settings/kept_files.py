@@ -1,5 +1,7 @@
 """Files that belong to a .blend: in folders beside it, and where Blender keeps them until it is saved."""
 
+import filecmp
+import itertools
 import os
 import shutil
 import time
@@ -55,7 +57,8 @@ def _copy_beside(file: str, *_: object) -> None:
     """Copy the files of a .blend to where it is saved, and name files elsewhere from there; Blender calls it before."""
     _named.clear()
     here, there = Path(bpy.data.filepath).parent if bpy.data.is_saved else None, Path(file).parent
-    for holder, name, kind in _held() if file and here != there else ():
+    moves = file and not (here and there.exists() and here.samefile(there))
+    for holder, name, kind in _held() if moves else ():
         value = getattr(holder, name)
         path = Path(os.path.normpath(bpy.path.abspath(value)))
         own = path.parent == _own(kind)
@@ -63,16 +66,28 @@ def _copy_beside(file: str, *_: object) -> None:
             continue
         _named.append((holder, name, value, path if own else None))
         if own or path.parent == here / kind:
-            beside = there / kind / path.name
-            beside.parent.mkdir(exist_ok=True)
-            beside.unlink(missing_ok=True)
+            path = _copied(path, there / kind)
+        # Blender itself turns a modifier's relative path to where it saves, but no add-on's.
+        setattr(holder, name, _relative(path, here if here and kind == CACHE else there))
+
+
+def _copied(path: Path, folder: Path) -> Path:
+    """Put a file into a folder, under a free name where another .blend's has its own; returns where it is.
+
+    A link will do: all that the add-on writes replaces a file and leaves its former bytes to whoever else names them.
+    """
+    folder.mkdir(exist_ok=True)
+    for name in itertools.chain([path.name], (f"{path.stem}_{n}{path.suffix}" for n in itertools.count(2))):
+        beside = folder / name
+        if not beside.exists():
             try:
                 os.link(path, beside)
             except OSError:  # on another disk
                 shutil.copyfile(path, beside)
-            path = beside
-        # Blender itself turns a modifier's relative path to where it saves, but no add-on's.
-        setattr(holder, name, _relative(path, here if here and kind == CACHE else there))
+            return beside
+        if beside.samefile(path) or filecmp.cmp(path, beside, shallow=False):
+            return beside
+    raise AssertionError
 
 
 def _relative(path: Path, start: Path) -> str:

@@ -104,5 +104,5 @@ def describe_choice(name: str, error: float) -> str:
 
 
 def _ms(ms: dict[str, float], variant: str) -> float:
-    """Return the time of a preset, ms, without Mitsuba or by a variant; that of the slowest for an unmeasured one."""
+    """Return the time of a preset, ms, without Mitsuba or by a variant; infinity for an unmeasured one."""
     return ms.get("numpy", ms.get(variant, float("inf")))

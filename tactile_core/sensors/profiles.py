@@ -17,8 +17,8 @@ _AROUND = 72  # angles of a station, every 5 degrees
 
 def read_radii(path: Path) -> np.ndarray:
     """Read a skin's stations (n, 72, 5): x, angle and radii of outer skin, inner skin and core, mm and degrees; NaN
-    where a ray missed. Raises TactileError for angles that are not even around the axis, and for an outer skin with
-    gaps."""
+    where a ray missed. Raises TactileError for stations that do not have every 5 degrees from -180 to 175, for fewer
+    than two with the outer skin all round, and for gaps in it between the first and the last of these."""
     rows = _table(path, _RADII)
     angles = -180 + 360 / _AROUND * np.arange(_AROUND)
     if len(rows) % _AROUND or not (rows[:, 1].reshape(-1, _AROUND) == angles).all():

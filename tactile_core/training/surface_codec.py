@@ -143,7 +143,7 @@ class SurfaceCodec:
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, of places (B, 2) from the contacts'; silent samples count 0."""
+        """Return the mean distance, in cells, of places (B, 2) from the contacts'; silent samples count LEAST_AWAY."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 

@@ -67,6 +67,29 @@ def test_save_as_elsewhere_takes_caches_along_and_finds_the_recording(imported, 
     bpy.ops.tactile.translate()
 
 
+def test_save_as_by_another_path_to_the_same_folder_keeps_the_cache(imported, scene, tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "a", target_is_directory=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
+    skin = imported(motion="MESH_CACHE")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "link" / "again.blend"))
+    assert Path(bpy.path.abspath(skin.modifiers["Tactile"].filepath)).is_file()
+
+
+def test_save_as_leaves_the_recordings_of_another_blend_alone(imported, scene, part, tmp_path):
+    simulated = tmp_path / "a" / "tactile_simulations" / "Ball.h5"
+    another = tmp_path / "b" / "tactile_simulations" / "Ball.h5"
+    for file, content in ((simulated, RECORDING.read_bytes()), (another, b"another's")):
+        file.parent.mkdir(parents=True)
+        file.write_bytes(content)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a" / "touch.blend"))
+    skin = imported(filepath=str(simulated))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b" / "touch.blend"))
+    assert another.read_bytes() == b"another's"
+    assert skin.tactile.recording == "//tactile_simulations/Ball_2.h5"
+    assert Path(bpy.path.abspath(skin.tactile.recording)).read_bytes() == RECORDING.read_bytes()
+
+
 def test_a_long_recording_has_a_mesh_cache_that_goes_with_the_file(imported, nodes_of, part, monkeypatch, tmp_path):
     monkeypatch.setattr(part("addon.operators.recording_data"), "LONG", 50)
 

@@ -65,9 +65,10 @@ PICTURES = sorted((Path(__file__).parents[2] / "scenes").glob("*/picture.png"))
 def test_a_scenes_picture_has_the_shipped_background(path):
     background = Renderer(preset="fast").background
     off = np.abs(read_photograph(path).astype(float) - background).mean(axis=2)
-    # Nothing touches the corners: the gel that a nut of 5 N moves makes them up to 4.4 levels off, another unit 30.
-    ends = (slice(20), slice(-20, None))
-    assert max(off[rows, columns].mean() for rows in ends for columns in ends) < 5
+    # Nothing touches the corners: light that the walls return makes them up to 0.4 levels off, the gel
+    # that a nut of 5 N moves 4.4, another unit 30 to 60.
+    ends, most = (slice(20), slice(-20, None)), 5 if path.parent.name == "hex_nut" else 2
+    assert max(off[rows, columns].mean() for rows in ends for columns in ends) < most
 
 
 def test_all_are_here():

@@ -139,7 +139,8 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
     from ...jobs.engine import inputs
     from ...jobs.engine import job as jobs
 
-    there = jobs.read(folder) if jobs.exists(folder) else None
+    read = jobs.read if options.status or options.verify else jobs.read_to_run
+    there = read(folder) if jobs.exists(folder) else None
     if not options.inputs:
         if there is None:
             raise TactileError(folder, "no job here", "INPUTS, or the folder of a job", "Name recordings to convert")
@@ -182,6 +183,7 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
 
 
 def _status(folder: Path, job: Job) -> int:
+    from ...jobs.engine import job as jobs
     from ...jobs.engine import manifest
 
     found = manifest.status(folder, job)
@@ -190,7 +192,7 @@ def _status(folder: Path, job: Job) -> int:
     tell(f"set aside   {len(found.aside)}")
     for name, why in found.aside.items():
         tell(f"  {name}: {why}")
-    tell("complete" if found.complete else "not complete: the same command goes on")
+    tell("complete" if found.complete else f"not complete: {jobs.completion(job)}")
     return 0
 
 

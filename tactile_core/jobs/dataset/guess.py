@@ -14,7 +14,8 @@ from ..engine import inputs
 from .recipe import FORMAT, MOST_FIELDS
 
 BETWEEN = re.compile(r"[_\-./ ]")  # pieces of names
-PIECE = re.compile(r"(?<![^_\-./ ])-?\d+(?:\.\d+)?(?![^_\-./ ])|[^_\-./ ]+|[_\-./ ]")  # -1.5 is one piece
+# -1.5 is one piece; of 2024.01.05 and run.1.2, whose dots stand between names, each number is
+PIECE = re.compile(r"(?<![^_\-/ ])-?\d+\.\d+(?![^_\-./ ]|\.\d)|(?<![^_\-./ ])-?\d+(?![^_\-./ ])|[^_\-./ ]+|[_\-./ ]")
 MOST_PATTERNS = 8  # shapes of names, the commonest (assumed enough)
 
 TEMPLATE = """\

@@ -81,8 +81,14 @@ def read_to_run(folder: Path) -> Job:
     return job
 
 
+def completion(job: Job) -> str:
+    """Return the words on how a job that is not complete is completed."""
+    same = job.recipe.version == __version__
+    return "the same command goes on" if same else f"version {job.recipe.version}, which began it, goes on with it"
+
+
 def read(folder: Path) -> Job:
-    """Read the job of a folder. Raises TactileError for no job, and for one that is damaged or of another version."""
+    """Read the job of a folder. Raises TactileError for no job, and for one that is damaged or of another format."""
     file = folder / FILE
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job[Recipe])

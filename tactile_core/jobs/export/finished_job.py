@@ -117,7 +117,8 @@ def load(folder: Path) -> Finished:
     status = manifest.status(folder, job)
     unread = [one for one in job.inputs if one.name in status.aside]
     if status.there < status.shards or status.prepared + len(unread) < status.recordings or not status.there:
-        found, advice = f"{status.there} of {status.shards} shards", "Finish it: tactile batch --out DIR"
+        found = f"{status.there} of {status.shards} shards"
+        advice = f"Finish it by tactile batch --out DIR: {jobs.completion(job)}"
         raise TactileError(folder, found, "a finished job", advice)
     recordings = []
     for index, one in enumerate(job.inputs):

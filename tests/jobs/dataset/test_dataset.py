@@ -170,6 +170,14 @@ def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_p
     assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
 
 
+@pytest.mark.parametrize(("name", "numbers"), [
+    ("angle_1.5.csv", ["1.5"]), ("x_-10_y_0.6.csv", ["-10", "0.6"]), ("run.1.2.csv", ["1", "2"]),
+    ("2024.01.05_a.csv", ["2024", "01", "05"]),
+])  # fmt: skip
+def test_dots_between_numbers_are_no_decimal_points(name, numbers):
+    assert [piece for piece in guess.PIECE.findall(name) if piece[-1].isdigit()] == numbers
+
+
 def test_a_guessed_recipe_takes_a_number_as_one_label(folder, tmp_path):
     for number, force in enumerate(("-1.5", "2", "10")):
         shutil.copy(folder / "ball_0.npz", tmp_path / f"{number}_force_n-{force}.npz")

@@ -133,13 +133,18 @@ def test_a_job_file_of_others_is_checked(new_job):
             jobs.read(folder)
 
 
-def test_a_job_of_another_version_is_read_but_not_gone_on_with(new_job):
+def test_a_job_of_another_version_is_read_but_not_gone_on_with(new_job, capsys):
     folder, _ = new_job()
     text = json.loads((folder / jobs.FILE).read_text())
     (folder / jobs.FILE).write_text(json.dumps(text | {"recipe": text["recipe"] | {"version": "0"}}))
     assert jobs.read(folder).recipe.version == "0"
     with pytest.raises(TactileError, match=r"made by version 0; expected version"):
         jobs.read_to_run(folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*.json")}
+    assert main(["batch", "--out", str(folder)]) == 2
+    assert {path: path.read_bytes() for path in folder.rglob("*.json")} == before
+    assert main(["batch", "--out", str(folder), "--status"]) == 0
+    assert "version 0, which began it, goes on" in capsys.readouterr().out
 
 
 def test_a_refused_batch_leaves_no_folder(tmp_path, capsys):
