@@ -4,25 +4,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...files.compiled import Loop
+from ...files.compiled import Loop, available
+
+_LONGEST = 700_000  # cells, all triangles' longest edges together: some 1.6 million pieces of slender ones
+_TOGETHER = 20_000  # points that are looked up together where nothing is compiled
 
 
 class NearTriangles:
     """Triangles (m, 3, 3), any unit, sorted into cubes of side ``cell`` by pieces no longer than that.
 
-    middles : (k, 3), of the pieces
+    Of many long triangles the cubes are larger. middles : (k, 3), of the pieces
     """
 
     def __init__(self, triangles: np.ndarray, cell: float) -> None:
-        pieces, owner = _pieces(triangles, cell)
+        cell = max(cell, float(_sides(triangles).max(axis=1).sum()) / _LONGEST)
+        pieces, self._owner = _pieces(triangles, cell / np.sqrt(2))  # their diagonals are then about as long as a cell
         self.middles = pieces.mean(axis=1)
+        self._reach = np.linalg.norm(pieces - self.middles[:, None], axis=2).max()
         self._cell, self._origin = cell, pieces.min(axis=(0, 1))
         self._triangles = np.ascontiguousarray((triangles - self._origin) / cell)
         place = np.floor((self.middles - self._origin) / cell).astype(np.int64)
         self._shape = place.max(axis=0) + 1
         flat = np.ravel_multi_index(tuple(place.T), tuple(self._shape))
-        order = np.lexsort((owner, flat))
-        flat, self._members = flat[order], owner[order]
+        order = np.lexsort((self._owner, flat))
+        flat, self._members = flat[order], self._owner[order]
         self._starts = np.searchsorted(flat, np.arange(np.prod(self._shape) + 1))
         self._boxes = np.zeros((np.prod(self._shape), 2, 3))
         first = np.flatnonzero(np.diff(flat, prepend=-1))
@@ -32,6 +37,8 @@ class NearTriangles:
 
     def distance(self, points: np.ndarray, bound: float) -> np.ndarray:
         """Return the distance (n,) from points (n, 3) to the nearest triangle, inf where it is ``bound`` or more."""
+        if not available():
+            return self._by_tree(points, bound)
         farthest = int(np.ceil(bound / self._cell)) + 1  # a piece reaches into the next cell
         along = np.arange(-farthest, farthest + 1)
         steps = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -46,20 +53,49 @@ class NearTriangles:
         )  # fmt: skip
         return self._cell * np.sqrt(squares)
 
+    def _by_tree(self, points: np.ndarray, bound: float) -> np.ndarray:
+        """See ``distance``: of whole arrays, with more and more near pieces until no other can be nearer."""
+        import scipy.spatial
+        import trimesh
+
+        triangles, tree = self._triangles * self._cell + self._origin, scipy.spatial.cKDTree(self.middles)
+        least = np.full(len(points), np.inf)
+        for left in np.array_split(np.arange(len(points)), len(points) // _TOGETHER + 1):
+            count = 4
+            while len(left):
+                count = min(4 * count, tree.n)
+                away, piece = tree.query(points[left], np.arange(count) + 1, distance_upper_bound=bound + self._reach)
+                row, column = np.nonzero(np.isfinite(away))
+                at = points[left[row]]
+                foot = trimesh.triangles.closest_point(triangles[self._owner[piece[row, column]]], at)
+                np.minimum.at(least, left[row], np.linalg.norm(foot - at, axis=1))
+                left = left[(away[:, -1] - self._reach < least[left]) & (away[:, -1] < np.inf) & (count < tree.n)]
+        return np.where(least < bound, least, np.inf)
+
+
+def _sides(corners: np.ndarray) -> np.ndarray:
+    """Lengths (k, n) of the edges of polygons (k, n, 3)."""
+    return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+
 
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Halve triangles across their longest edge until it is short; returns pieces (k, 3, 3) and triangles (k,)."""
-    owner, pieces, owners = np.arange(len(triangles)), [], []
-    while len(triangles):
-        sides = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    """Cut triangles until each edge is short; returns four-sided pieces (k, 4, 3) and their triangles (k,).
+
+    Two opposite edges are halved at a time, at first those beside a triangle's shortest: of a slender one, that makes
+    as many pieces as it is long, not its square.
+    """
+    order = (_sides(triangles).argmin(axis=1)[:, None] + [0, 1, 2, 2]) % 3  # the last edge but one has no length
+    whole, owner, pieces, owners = np.take_along_axis(triangles, order[:, :, None], 1), np.arange(len(order)), [], []
+    while len(whole):
+        sides = _sides(whole)
         done = sides.max(axis=1) <= longest
-        pieces.append(triangles[done])
+        pieces.append(whole[done])
         owners.append(owner[done])
-        triangles, owner, worst = triangles[~done], owner[~done], sides[~done].argmax(axis=1)
-        row = np.arange(len(triangles))
-        a, b, c = (triangles[row, (worst + k) % 3] for k in range(3))
-        half = (a + b) / 2
-        triangles = np.concatenate([np.stack([a, half, c], axis=1), np.stack([half, b, c], axis=1)])
+        whole, owner, worst = whole[~done], owner[~done], sides[~done].argmax(axis=1)
+        row = np.arange(len(whole))
+        a, b, c, d = (whole[row, (worst + k) % 4] for k in range(4))
+        e, f = (a + b) / 2, (c + d) / 2
+        whole = np.concatenate([np.stack([a, e, f, d], axis=1), np.stack([e, b, c, f], axis=1)])
         owner = np.tile(owner, 2)
     return np.concatenate(pieces), np.concatenate(owners)
 

@@ -14,7 +14,7 @@ from .mesh_distance import NearTriangles
 from .spline_grid import BAND, SplineGrid, TipGrid
 
 MARGIN = 1e-3  # m, how far the grid reaches beyond the body
-MAX_NODES = 8_000_000  # 32 MB kept, about 300 MB while it is built
+MAX_NODES = 8_000_000  # 32 MB kept, 200 to 650 MB more while it is built
 _STEP_UP = 1.1  # step in the search of a spacing
 REACH = 5e-3  # m above the lowest point: deeper than any dent of a gel or skin (assumed)
 _STEM = 4  # times the spacing, at least, beyond what may touch
@@ -25,9 +25,12 @@ _CHECKED_WITHIN_MM = 0.3  # how near
 _ROUNDING_MM = 1e-9
 _CELLS = 200  # along a body's diagonal, at most
 # Spacings from the surface up to which distances are exact. What a spline makes of errors farther off fades by 0.27 a
-# node: to half a percent at the surface.
-_NEAR = 4
+# node: to half a percent at the surface. No whole number: flat faces lie whole spacings from nodes, where rounding
+# would decide.
+_NEAR = 4.1
 _FAR = 12  # spacings (assumed)
+_ROWS = 500_000  # of columns, each of one triangle, looked at together: about 200 MB
+_GRAZES = 1e-6  # spacings beside a triangle at which a column is looked at: rounding
 _COARSER = 4  # times the spacing, of the grid that is interpolated beyond
 _FEWEST = 5  # nodes that a cubic spline takes
 # Columns stand this part of the spacing beside the nodes, so that none meets an edge or a vertex; tried in turn.
@@ -104,8 +107,7 @@ def error_of(
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (mm) near the surface.
 
     Measured at random places over its area, of triangles that reach below the height ``top``, m, up to 0.3 mm inside
-    and outside. Where another face is as near as the one that a place was drawn from, the place is left out: its side
-    is not known.
+    and outside.
     """
     random = np.random.default_rng(0)
     area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
@@ -115,9 +117,20 @@ def error_of(
     exact = random.uniform(-_CHECKED_WITHIN_MM, _CHECKED_WITHIN_MM, _CHECKED)
     points += mesh.face_normals[face] * exact[:, None]
     near = NearTriangles(mesh.triangles, max(_CHECKED_WITHIN_MM, mesh.scale / _CELLS))
-    own = near.distance(points, 2 * _CHECKED_WITHIN_MM) > np.abs(exact) - _ROUNDING_MM
-    error = distance(points[own] * 1e-3)[0] - exact[own] * 1e-3
+    gap = near.distance(points, 2 * _CHECKED_WITHIN_MM)
+    for i in np.flatnonzero(gap < np.abs(exact) - _ROUNDING_MM):  # another face is nearer: its side is not known
+        exact[i] = gap[i] * (-1 if _turns(mesh.triangles - points[i]) > 0.5 else 1)
+    error = distance(points * 1e-3)[0] - exact * 1e-3
     return np.array([np.sqrt(np.mean(error**2)), np.abs(error).max()])
+
+
+def _turns(triangles: np.ndarray) -> float:
+    """Winding number of closed triangles (m, 3, 3) about the origin, 1 inside: solid angles, Van Oosterom 1983."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    x, y, z = np.linalg.norm(triangles, axis=2).T
+    volume = np.einsum("nk,nk->n", a, np.cross(b, c))
+    dots = (np.einsum("nk,nk->n", p, q) * r for p, q, r in ((a, b, z), (b, c, x), (c, a, y)))
+    return float(np.arctan2(volume, x * y * z + sum(dots)).sum() / (2 * np.pi))
 
 
 def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
@@ -204,19 +217,35 @@ def _crossings(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Crossings of columns and triangles: column (k,) int, height (k,), true (k,) where going up enters the body."""
     flat = (triangles[:, :, :2] - origin[:2]) / spacing
-    low = np.clip(np.ceil(flat.min(axis=1)), 0, None).astype(int)
-    high = np.minimum(np.floor(flat.max(axis=1)).astype(int), np.array(shape[:2]) - 1)
-    size = np.maximum(high - low + 1, 0)
-    count = size[:, 0] * size[:, 1]
-    triangle = np.repeat(np.arange(len(triangles)), count)
-    k = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
-    place = low[triangle] + np.column_stack([k // size[triangle, 1], k % size[triangle, 1]])
+    low = np.clip(np.ceil(flat[:, :, 0].min(axis=1)), 0, None).astype(int)
+    rows = np.maximum(np.minimum(np.floor(flat[:, :, 0].max(axis=1)).astype(int), shape[0] - 1) - low + 1, 0)
+    if rows.sum() > _ROWS and len(triangles) > 1:
+        halves = [_crossings(half, origin, spacing, shape) for half in np.array_split(triangles, 2)]
+        column, height, entering = (np.concatenate(each) for each in zip(*halves, strict=True))
+        return column, height, entering
+    triangle, along = _counted(rows)
+    along += low[triangle]
+    start, step = flat[triangle], np.roll(flat, -1, axis=1)[triangle] - flat[triangle]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = (along[:, None] - start[:, :, 0]) / step[:, :, 0]
+        across = start[:, :, 1] + share * step[:, :, 1]
+    met = (share >= 0) & (share <= 1)
+    low = np.clip(np.ceil(np.where(met, across, np.inf).min(axis=1) - _GRAZES), 0, shape[1]).astype(int)
+    high = np.clip(np.floor(np.where(met, across, -np.inf).max(axis=1) + _GRAZES), -1, shape[1] - 1).astype(int)
+    row, column = _counted(np.maximum(high - low + 1, 0))
+    triangle, place = triangle[row], np.column_stack([along[row], low[row] + column])
     arm = flat[triangle] - place[:, None]
     weights = np.stack([_cross(arm[:, (i + 1) % 3], arm[:, (i + 2) % 3]) for i in range(3)], axis=1)
     met = (weights > 0).all(axis=1) | (weights < 0).all(axis=1)
     weights, triangle, place = weights[met], triangle[met], place[met]
     height = np.einsum("nk,nk->n", weights, triangles[triangle, :, 2]) / weights.sum(axis=1)
     return place[:, 0] * shape[1] + place[:, 1], height, weights.sum(axis=1) < 0
+
+
+def _counted(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Repeat each index as often as its count says; returns indices (n,) and the repetition's number (n,)."""
+    index = np.repeat(np.arange(len(counts)), counts)
+    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,10 +1,10 @@
-"""Distance to triangles looked up in cells, against every triangle in turn, and thin walls."""
+"""Distance to triangles looked up in cells, against every triangle in turn, slender ones, and thin walls."""
 
 import numpy as np
 import pytest
 import trimesh
 
-from tactile_core.geometry.indenters import MeshIndenter
+from tactile_core.geometry.indenters import MeshIndenter, mesh_grid
 from tactile_core.geometry.indenters.mesh_distance import NearTriangles
 
 
@@ -16,9 +16,37 @@ def test_nearest_of_all_triangles(cell):
     tiled = np.tile(triangles, (300, 1, 1))
     at = np.repeat(points, 40, axis=0)
     exact = np.linalg.norm(trimesh.triangles.closest_point(tiled, at) - at, axis=1).reshape(300, 40).min(axis=1)
-    found = NearTriangles(triangles, cell).distance(points, bound)
-    assert 0.2 < np.isfinite(found).mean() < 0.8
-    np.testing.assert_allclose(found, np.where(exact < bound, exact, np.inf), rtol=1e-9)
+    near = NearTriangles(triangles, cell)
+    for found in (near.distance(points, bound), near._by_tree(points, bound)):
+        assert 0.2 < np.isfinite(found).mean() < 0.8
+        np.testing.assert_allclose(found, np.where(exact < bound, exact, np.inf), rtol=1e-9)
+
+
+def test_uncompiled_grids_are_the_same(compiled_loops):
+    ring = trimesh.creation.annulus(r_min=1.0, r_max=2.0, height=1.0, sections=40)
+    grids = []
+    for on in (True, False):
+        compiled_loops(on)
+        grids.append(mesh_grid.build(ring, "ring", 0.2e-3))
+    # m; kept in four bytes
+    np.testing.assert_allclose(grids[0].coefficients, grids[1].coefficients, rtol=1e-6, atol=1e-12)
+
+
+def test_slender_triangles_are_cut_along_their_length():
+    """Pieces grow as length over cell, not its square; of so many long triangles that they do not fit, cells grow."""
+    few, many = (trimesh.creation.cylinder(5.0, 30.0, sections=n).triangles for n in (1000, 10_000))
+    for triangles, cell, grown in ((few, 0.2, False), (few, 0.1, False), (many, 0.2, True)):
+        near = NearTriangles(triangles, cell)
+        longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+        rows = np.ceil(np.log2(longest / cell) + 0.5)
+        most = 2 * (2**rows).sum()  # each is halved until its edges fit; beside its shortest, both at once
+        assert len(near.middles) <= (0.5 * most if grown else most)
+        assert len(near.middles) < 2_000_000
+        random = np.random.default_rng(0)
+        angle, height = random.uniform(0, 2 * np.pi, 100), random.uniform(-14, 14, 100)
+        points = np.column_stack([5.1 * np.cos(angle), 5.1 * np.sin(angle), height])
+        # Facets of 31 um lie up to 5 (1 - cos(pi / 1000)) = 25 nm under the circle.
+        np.testing.assert_allclose(near.distance(points, 0.4), 0.1, atol=3e-5)
 
 
 def test_a_thin_wall_keeps_its_thickness():

@@ -35,6 +35,22 @@ def test_error_is_measured(ball):
     assert 0 < rms < 1e-6 and rms < largest < 4e-6  # against the mesh itself, so without the facets
 
 
+def test_error_is_measured_at_edges_too():
+    """Of a box, whose distance is known: also at the places that another face is nearer to."""
+    box, asked = trimesh.creation.box((3, 3, 3)), []
+    half = box.extents / 2
+
+    def exact(points):
+        asked.append(points)
+        beyond = np.abs(points * 1e3) - half
+        outside = np.linalg.norm(np.maximum(beyond, 0), axis=1)
+        return (outside + np.minimum(beyond.max(axis=1), 0)) * 1e-3, points
+
+    assert mesh_grid.error_of(box, exact).max() < 1e-12  # m: rounding
+    inner = np.sort(half - np.abs(asked[0] * 1e3), axis=1)
+    assert len(inner) == 500 and (np.ptp(inner[:, :2], axis=1) < 0.1).sum() > 10  # some are as near to another face
+
+
 def test_normal_and_curvature_belong_to_the_level_surface(ball):
     points = near_ball(300)
     value, slope = ball.grid.value_and_gradient(points)
