@@ -77,17 +77,18 @@ def _copied(path: Path, folder: Path) -> Path:
     A link will do: all that the add-on writes replaces a file and leaves its former bytes to whoever else names them.
     """
     folder.mkdir(exist_ok=True)
-    for name in itertools.chain([path.name], (f"{path.stem}_{n}{path.suffix}" for n in itertools.count(2))):
-        beside = folder / name
-        if not beside.exists():
-            try:
-                os.link(path, beside)
-            except OSError:  # on another disk
-                shutil.copyfile(path, beside)
-            return beside
-        if beside.samefile(path) or filecmp.cmp(path, beside, shallow=False):
-            return beside
-    raise AssertionError
+    names = itertools.chain([path.name], (f"{path.stem}_{n}{path.suffix}" for n in itertools.count(2)))
+    beside = next(file for file in (folder / name for name in names) if not file.exists() or _same(path, file))
+    if not beside.exists():
+        try:
+            os.link(path, beside)
+        except OSError:  # on another disk
+            shutil.copyfile(path, beside)
+    return beside
+
+
+def _same(one: Path, other: Path) -> bool:
+    return one.samefile(other) or filecmp.cmp(one, other, shallow=False)
 
 
 def _relative(path: Path, start: Path) -> str:
