@@ -75,7 +75,7 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Row (m,) of ``move`` for each touchable node; (m,) bool, if it is the image's; all mirror images (n,)."""
+        """Row (m,) of ``move`` for each touchable node; if that is its image's, (m,) bool; all mirror images (n,)."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
@@ -88,7 +88,7 @@ ARRAYS = ("move", "watch", "watch_gap", "pressure", "inner_move", "inner_watch",
 
 @functools.cache
 def compliance_of(sensor: str) -> Compliance:
-    """Return the compliance of a sensor that is there; built in about a minute, then read from the cache."""
+    """Return the compliance of a sensor, by its name; built in about a minute, then read from the cache."""
     return _cached(solid_of(sensor))
 
 
@@ -103,7 +103,7 @@ class Solid(NamedTuple):
 
 
 def solid_of(sensor: str) -> Solid:
-    """Return the solid of a sensor that is there."""
+    """Return the solid of a sensor, by its name."""
     lattice, material = sensors.sensor_surface(sensor), sensors.describe(sensor).material
     touchable = np.arange(len(lattice.rest)) if sensors.is_gel(sensor) else _touchable_skin(sensor)
     return Solid(sensor, lattice, touchable, solid_mesh(sensor), material)

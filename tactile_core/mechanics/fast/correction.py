@@ -65,7 +65,7 @@ class Learned:
     trust: np.ndarray
 
     def log_factor(self, features: np.ndarray) -> float:
-        """Logarithm of the force's factor."""
+        """Return the logarithm of the factor by which the linear model's force is too small."""
         every = self._near(features, ALL, self._all, self.widths[0]) @ self.force_weights[0]
         few = self._near(features, ESSENTIAL, self._few, self.widths[1]) @ self.force_weights[1]
         return self._trusted(features, 1) * float(every + few) / 2
@@ -100,7 +100,7 @@ class Correction:
     rubbing: Learned
 
     def factor(self, features: np.ndarray) -> float:
-        """Factor of the force."""
+        """Return the factor by which the linear model's force is too small."""
         return float(np.exp(self._blend(features, Learned.log_factor)))
 
     def field(self, features: np.ndarray) -> np.ndarray:
@@ -246,7 +246,7 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
 
 
 def correct(compliance: Compliance, contact: Contact) -> Corrected:
-    """Correct a fast contact to what the full tier gives at the same depth; not on a sensor without a correction."""
+    """Correct a fast contact to what the full tier gives at the same depth; as it is where no correction ships."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return Corrected(contact.displacement, 1.0)

@@ -39,7 +39,7 @@ class Points(NamedTuple):
     """Points of an iterate: what they bear and where they stand.
 
     force : (k, 3) N; core : (c,) N; active : (k + c,) bool, which touch; slips : (k,) bool
-    normal, lean : (k, 3), unit, of the indenter and of the friction of slipping nodes
+    normal, lean : (k, 3), unit, of the indenter, and along friction (0 where nodes stick): f = p (normal + mu lean)
     gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, from the spots where nodes stick
     """
 
@@ -65,7 +65,7 @@ class Motion(NamedTuple):
 class Slipping(NamedTuple):
     """Slipping nodes ``at`` (s,), and how their forces may change.
 
-    normal, lean : (k, 3) of all nodes; across : (s, 3) unit, across normal and friction
+    normal, lean : (k, 3) of all nodes, as in ``Points``; across : (s, 3) unit, across normal and friction
     pressing, limit : (s,) N, of the normal force and of friction
     against : (s,) m/N, slip along friction over its limit: how far a node moves across friction under 1 N
     curved : (q,), which of them have normals that turn; bend : (q, 3, 3) 1/m, second derivatives of the distance there
@@ -107,7 +107,7 @@ class Sorted(NamedTuple):
 def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001, ANN201
     """Reduce guessed forces to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
 
-    Returns the directions t (k, 3) of friction; a node without any sticks from now on.
+    Returns the unit directions t (k, 3) of friction, ``lean`` elsewhere; a node without any sticks from now on.
     """
     k = force.shape[0]
     lean = np.zeros((k, 3))
@@ -263,7 +263,7 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 
 @Loop
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
-    """Let nodes that touch again slip, in place, for sticking drew them off the indenter before, and mark who ``left``.
+    """Let nodes slip that ``left`` (k,) and touch again: sticking drew them off. Changes force, ``after``, ``left``.
 
     Returns the largest gap, m, of what touches now.
     """

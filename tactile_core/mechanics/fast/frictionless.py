@@ -103,7 +103,7 @@ class Frictionless:
 
     rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
     faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
-    most_curved : tangent directions in the Newton step: more cost more than the iterations they save
+    most_curved : tangent directions taken into the Newton step; more cost more time than they save iterations
     """
 
     most_curved = 20

@@ -122,10 +122,10 @@ def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
 
 @Loop
 def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
-    """System (2 s, 2 s) float32 and right (2 s, r) of the unknowns of slipping nodes: way along friction, and turn.
+    """Build the system (2 s, 2 s) and right (2 s, r) of slipping nodes: their way, m, along friction, and its turn, N.
 
-    Its rows demand that no force is left along t - mu n, and that friction turns as the slip across it does.
-    rows : (j,) of the inverse, among ``size`` degrees of freedom
+    Its rows demand that no force is left along t - mu n (``lean``, ``normal``), and that t turns as its slip does.
+    inverse : (j, j) N/m, of the compliance; rows : (j,), its places among ``size``; bearing : (s, 3, r), of ``borne``
     """
     s, columns, curved = len(slipping.at), bearing.shape[2], slipping.curved
     system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))

@@ -83,7 +83,7 @@ class CorrectedPress:
             return None
 
     def nearest(self) -> FastContact | None:
-        """Return the last contact, none beyond the limit, that a search for a force found on its way, and stay there.
+        """Return the last contact within the limit that ``at_force`` found on its way; the next solve goes on from it.
 
         None where it found none. Raises PenetrationError as ``at_depth`` does.
         """
