@@ -13,7 +13,7 @@ _STEP = 0.1  # s between two looks at the worker
 
 
 class JobOperator(TactileOperator):
-    """``begin`` starts a job, or none where there is nothing to wait for; ``finish`` takes its result."""
+    """Subclasses' ``begin`` sets ``_job``, or leaves it None with nothing to wait for; ``finish`` takes the result."""
 
     stopped: ClassVar[str] = "Stopped; the scene is as it was"
     _job: Job | None = None
@@ -21,7 +21,7 @@ class JobOperator(TactileOperator):
     _timer: bpy.types.Timer | None = None
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Set ``_folder`` and ``_job``; raises TactileError."""
+        """Set ``_folder`` and ``_job``, or neither with nothing to wait for; raises TactileError."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context) -> None:

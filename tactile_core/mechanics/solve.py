@@ -70,11 +70,11 @@ def solve_path(
     friction: float = FRICTION,
     limit: float | None = None,
 ) -> Iterator[Solution]:
-    """Yield the solutions along a path, each going on from the one before; those already yielded are kept on an error.
+    """Yield the solution of each step of a path; where nodes stick to the indenter goes on from the step before.
 
     steps : taken one by one in the fast tier; all at once in the others, whose mesh is made for the deepest
     limit : m, the greatest depth (default: 60 % of the thickness there)
-    Raises what ``solve`` raises.
+    Raises what ``solve`` raises; solutions already yielded hold.
     """
     if tier not in TIERS:
         raise TactileError("solve, tier", repr(tier), "fast, full or reference")

@@ -75,8 +75,8 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """Return the height of the LED's centre above the horizon, in LED radii, from -1 (hidden) to 1 (fully visible),
-        for a box of pixels (h, w), and that box; it is 1 everywhere else.
+        """Return the height (h, w) of the LED's centre above the horizon, in LED radii from -1 (hidden) to 1 (fully
+        visible), at the pixels of the returned box of rows and columns; the LED is fully visible from all others.
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may cast shadows"""
         reach = self.reach(float(height[box].max()), float(height.min()))
         rows = _span(self.row[box], self.polar_shape[0] - 1)

@@ -131,7 +131,7 @@ def _differences(values: np.ndarray, axis: int, step: float) -> np.ndarray:
 
 
 def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Interpolate values (h, w), 2 x 2 or more, at fractional places within them; float32."""
+    """Return float32 values (h, w), 2 x 2 or more, interpolated at fractional rows and columns within them."""
     if available() and values.dtype == row.dtype == column.dtype == np.float32 and row.ndim == 2:
         return interpolate(*map(np.ascontiguousarray, (values, row, column)))  # one kind of arrays is compiled
     height, width = values.shape
@@ -178,7 +178,8 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
     """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
-    height, steepness : (H W,); rows, columns : (H,), (W,), from the map's middle; inverse : 1 / apparent height, 1/m"""
+    height, steepness : (H W,), m and as ``_steepness`` has it; start, start_near, start_nearest : (H, W), of ``_begin_at``
+    rows, columns : (H,), (W,) px, from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)
     last_row, last_column = np.float32(2) * middle_row, np.float32(2) * middle_column

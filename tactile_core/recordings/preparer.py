@@ -43,8 +43,8 @@ class Preparer:
         self._doubts = np.uint16(0)  # of the first part's polarity, which hold for all
 
     def __call__(self, part: Recording, frames: slice | np.ndarray = EVERY) -> Signals:
-        """Prepare the next part; frames : those whose signals are returned. Raises TactileError like `prepare`. The
-        first part decides kind, unit, polarity and film; a later one without a rest takes that of the part before."""
+        """Prepare the next part; frames : those whose signals are returned. The first part decides kind, scale,
+        polarity and film for all; a later one without a rest takes that of the part before. Raises as `prepare`."""
         options, rest = self._options, self._rest
         first = rest is None
         if not first and options.tare not in (None, "none"):  # frames that the user named lie in the first part

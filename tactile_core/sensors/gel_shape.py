@@ -43,9 +43,9 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the height of the resting gel above its flat back, m, at (x, z) in m: even in z, smooth. It is the
-        thickness without a [dome]; else a least squares fit to the profile table (of a faceted mesh, hence the
-        smoothing) by Chebyshev polynomials along and even powers across."""
+        """Return the height of the resting gel above its flat back, m, at (x, z) in m: the thickness, or with a [dome]
+        a smooth fit to its profile (of a faceted mesh; least squares by Chebyshev polynomials in x, even powers of z),
+        less the edge's drop near the outline."""
         x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
         edge = np.clip(1 - self.outline_distance(x, z) / self._body.edge_width, 0, 1)
         dome = self.descriptor.dome

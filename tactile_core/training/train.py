@@ -95,7 +95,8 @@ def quiet(share: float, text: str) -> None:
 
 
 def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLike) -> Split:
-    """Return the split less the contacts kept from training; raises TactileError for an unknown indenter."""
+    """Return the split less all contacts that ``options.without`` (indenters) and ``without_below_x`` keep apart.
+    path : of the pairs, for errors. Raises TactileError for an unknown indenter, or a part that is left empty."""
     names = pairs.indenter_names
     for name in options.without:
         if name not in names:

@@ -158,7 +158,8 @@ KINDS = ("signed", "rectified")
 
 
 def region(x: np.ndarray) -> np.ndarray:
-    """Return the number (T,) int of a contact's region. x : (T,) m, place along the finger; NaN without contact"""
+    """Return the region (T,) int of each contact: 0 where x is NaN (no contact), else 1 (tip) to REGIONS - 1 (base).
+    x : (T,) m, place along the finger"""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 

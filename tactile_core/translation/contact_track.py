@@ -80,7 +80,8 @@ class _Course(NamedTuple):
 
 
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
-    """Estimate the contact's state (T, STATE) float32 at times (T,) s from posteriors, smoothed both ways."""
+    """Estimate the contact's state (T, STATE) float32 at times (T,) s from all frames' posteriors: the place smoothed
+    forward and back, force by its smoothed ratio to the signals' size, depth as each frame has it."""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)
     elapsed = _elapsed(time)
@@ -108,7 +109,7 @@ def _span(block: int, count: int) -> tuple[int, int]:
 
 
 class Tracker:
-    """Contact in a whole recording, smoothed both ways: block by block, computed on demand."""
+    """Contact in a whole recording, by ``track``: computed on demand, block by block."""
 
     def __init__(self, read: Read, count: int) -> None:
         """Take read(start, stop), which gives times and evidence of these frames; count : frames in all."""
@@ -116,7 +117,7 @@ class Tracker:
         self._kept: tuple[int, Evidence, np.ndarray] | None = None
 
     def __call__(self, frames: np.ndarray) -> tuple[Evidence, np.ndarray]:
-        """Return evidence and states (n, STATE) of rising frames (n,), whichever others are asked for."""
+        """Return evidence and states (n, STATE) of rising frames (n,); which others are asked for changes none."""
         blocks, parts, states = frames // BLOCK, [], []
         for block in np.unique(blocks):
             evidence, state = self._block(int(block))
@@ -135,7 +136,7 @@ class Tracker:
 
 
 class ForwardTracker:
-    """Contact in a recording that grows: the same filter run forward alone, one frame after another."""
+    """Contact in a recording that grows: ``track`` without what comes later. Call it once a frame, in order."""
 
     def __init__(self) -> None:
         self._time, self._score, self._frame = -np.inf, np.zeros(0), _Frame(*(np.zeros(0),) * 3)  # of the frame before
@@ -143,7 +144,7 @@ class ForwardTracker:
         self._ratio: tuple[np.ndarray, np.ndarray] | None = None  # its mean and variance; None without contact
 
     def __call__(self, evidence: Evidence, time: float) -> np.ndarray:
-        """Estimate the state (1, STATE) float32 of a contact from the posterior of one frame at `time` s."""
+        """Take the next frame's posterior, at ``time`` s, and return the contact's state (1, STATE) float32 there."""
         now, elapsed = _components(evidence), _elapsed(np.array([time]), self._time)
         best, free, score = now.weight[0].argmax(), True, now.weight[0]
         step = _step(elapsed, evidence.rectified)

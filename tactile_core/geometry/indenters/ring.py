@@ -67,7 +67,8 @@ def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.n
 
 
 def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance``: 1 / length round the wire, and along it."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance`` d. With r from the axis their eigenvalues are
+    1 / d (round the wire), (r - radius) / (d r) (along it) and 0 (outward)."""
     around, radial, arm, length = _arms(points, radius)
     turn = np.column_stack([-arm[:, 1:] * radial, arm[:, 0]])
     along = np.column_stack([-radial[:, 1], radial[:, 0], np.zeros(len(points))])

@@ -46,7 +46,7 @@ class Local:
         self._todo.put(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
+        """Yield each task with its reply as it comes, while ``count()``, the number still awaited, is above 0."""
         while count():
             found = self._done.get()
             if isinstance(found, BaseException):
@@ -157,7 +157,7 @@ class InProcess:
         self._todo.append(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
+        """Do the submitted tasks in order; yield each with its reply while ``count()``, those awaited, is above 0."""
         while count():
             task = self._todo.popleft()
             yield task, msgspec.convert(tasks.run(str(self._folder), msgspec.to_builtins(task)), Reply)

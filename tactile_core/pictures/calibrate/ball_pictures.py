@@ -68,7 +68,7 @@ class BallPictures(abc.ABC):
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return the ambient light (3, H, W) that grows with the seen height (H, W) m, in the unit of ``lights``."""
+        """Return the ambient light (3, H, W), by LED, that seen heights (H, W) m add, over the LED's ``facing`` light."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:

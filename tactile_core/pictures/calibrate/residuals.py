@@ -200,8 +200,8 @@ class UnitResiduals:
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the matrix A - sum over channels of B C^-1 B^T and the gradient over x. The gain (matrix C, mixed
-        terms B) is eliminated by Schur's complement; its gradient is zero at its optimum."""
+        """Return Gauss-Newton's matrix and gradient over x with the gain eliminated (Schur's complement): A - sum over
+        channels of B G^-1 B^T, A of x alone, G of the gain, B mixed. The gain's own gradient is zero at its optimum."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
