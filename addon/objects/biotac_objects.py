@@ -17,14 +17,14 @@ _MARGIN, _ANGLE_MARGIN = 0.1e-3, np.radians(5.0)  # m and rad
 
 
 def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    """Make a collection in the scene."""
+    """Make a collection in the scene and return it."""
     group = bpy.data.collections.new(name)
     scene.collection.children.link(group)
     return group
 
 
 def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensors.SOURCE) -> bpy.types.Object:
-    """Add the resting outer skin of a sensor."""
+    """Add the resting outer skin of a sensor and return it."""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} skin"
     skin = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
@@ -36,7 +36,7 @@ def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensor
 
 
 def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.Object:
-    """Add the rigid core under the pad, and the bone and nail that hold it: children of the skin."""
+    """Add the rigid core under the pad, and the bone and nail that hold it, to the skin; return the core."""
     sensor = properties.sensor_name(skin)
     shape = sensors.skin_of(sensor)
     known = shape.descriptor.core

@@ -17,12 +17,12 @@ _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0,
 
 
 def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
-    """The gel's parts that a scene shows; with a gel that is appended alone Blender brings others, out of sight."""
+    """Return the gel's parts that are in a scene; appending a gel alone brings its others too, in none."""
     return [thing for thing in gel.children_recursive if thing.users_scene]
 
 
 def has_body(gel: bpy.types.Object) -> bool:
-    """Return true if a body was made for the gel: without LEDs it is then dark. A gel appended alone has none."""
+    """Return true if the gel has a body: then its LEDs alone light it. A gel that was appended alone has none."""
     return any(thing.tactile.role == "BODY" for thing in parts_of(gel))
 
 

@@ -30,7 +30,7 @@ class ShownUnit:
 
 
 def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
-    """Read the objects; parts that a scene has none of are the calibration's. Raises TactileError."""
+    """Return the unit as the scene shows it; parts that the scene lacks are those of ``unit``. Raises TactileError."""
     reflectance = gel.evaluated_get(depsgraph).tactile.object_reflectance or unit.object_reflectance
     unit = dataclasses.replace(unit, object_reflectance=reflectance)
     if not digit_body.has_body(gel):

@@ -22,7 +22,7 @@ def add(
     """Give an object's mesh the attribute ``name``.
 
     values : (T, k), bool or float; first, step : scene frame of the first row, and frames a row
-    column : int attribute that holds each node's column; each node has its own without it
+    column : name of the int attribute that holds each node's column of ``values``; None: node i has column i
     """
     rows, columns = values.shape
     words = name.replace("_", " ")

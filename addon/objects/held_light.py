@@ -40,7 +40,7 @@ def write(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def held_light(unit: Calibration) -> np.ndarray:
-    """Compute levels (n, 3, 3), channel by LED, that the picture at rest has at the nodes over its lamps' light."""
+    """Compute the grey levels (n, channel, LED) that the picture at rest has at the nodes beyond its lamps' light."""
     radiance = open_radiance(unit)
     levels = by_led(unit, radiance)
     diagonal = np.arange(3)
@@ -75,8 +75,8 @@ def _lamp_light(unit: Calibration) -> np.ndarray:
 def add_nodes(material: bpy.types.Material) -> None:
     """Let a coating glow by the attributes, on its inner side and toward a camera alone.
 
-    There it throws no light back onto itself either: on the calibrated gel that is a part of a level, but Blender's
-    gel has the public mesh's dome, three times as high, and the light held has all of it at rest.
+    Its inner side reflects no light onto itself either: the held light has all that the gel reflects so at rest, a
+    part of a level, and Blender's gel, whose dome (the public mesh's) is three times as high, would add more.
     """
     nodes, links, math = material.node_tree.nodes, material.node_tree.links, digit_materials.math
     for left in [node for node in nodes if node.name.startswith(NODE)]:
@@ -111,7 +111,7 @@ def add_nodes(material: bpy.types.Material) -> None:
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
     """Let each part follow its LED's power in its own colour; works without the add-on.
 
-    full : Blender's power of each LED's lamp, W, at the calibration's
+    full : Blender's power, W, of each LED's lamp as bright as the calibration has it
     """
     for k, name in enumerate(COLOURS):
         socket = material.node_tree.nodes[attribute(name)].outputs[0]

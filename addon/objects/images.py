@@ -38,9 +38,9 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
 
 
 def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
-    """Make an image of values (H, W) bool from a PNG of one bit a pixel that it holds; a former one of its name goes.
+    """Make an image of values (H, W) bool, packed as a PNG of one bit a pixel, in place of one of its name.
 
-    Set as pixels, those of a long recording would take gigabytes for a moment.
+    Set as pixels, a long recording's values would take gigabytes for a moment.
     """
     former = bpy.data.images.get(name)
     if former is not None:

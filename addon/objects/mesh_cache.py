@@ -62,14 +62,14 @@ class Writer:
         self._patch += [] if patch is None else [patch]
 
     def motion(self, file: Path) -> Motion:
-        """Return what was written, by the name that it has now."""
+        """Return the movement that was written; file : where it lies, once it is whole."""
         patch = np.concatenate(self._patch) if self._patch else None
         return Motion(np.concatenate(self._dent), patch, file=file)
 
 
 @contextlib.contextmanager
 def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[Writer]:
-    """Write a file whole or not at all. Raises TactileError where there is no room."""
+    """Yield the writer of a file that appears whole or not at all. Raises TactileError where there is no room."""
     room = atomic.writing(file, "room in a writable folder", "Save the .blend elsewhere")
     with room, atomic.new_file(file) as partial, open(partial, "wb") as stream:
         yield Writer(stream, sensor, per_metre, frames)
@@ -77,7 +77,7 @@ def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[
 
 
 def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
-    """Write a movement in memory to a file of this name in its folder; one that is in a file stays there."""
+    """Write a movement in memory to a file in the caches' folder and return it so; one in a file stays there."""
     if moved.file is not None:
         return moved
     token = hashlib.sha256(moved.displacement.tobytes()).hexdigest()[:8]

@@ -29,7 +29,7 @@ def remove_legend(thing: bpy.types.Object) -> None:
 
 
 def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
-    """Add a card with a colour bar and a scale bar of 5 mm to a sensor, in place of another; plays without the add-on.
+    """Add a card with a colour bar and a scale bar of 5 mm to a sensor, in place of another; works without the add-on.
 
     title : what the colours say; ends : what stands at the bar's ends, None where there is no bar
     """

@@ -33,7 +33,7 @@ def get_ready(thing: bpy.types.Object) -> None:
 def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
     """Give a sensor one style in place of another.
 
-    largest : the object's units or counts, at the colours' upper end; exaggeration : how many times the dent is drawn
+    largest : value at the colours' upper end, object's units or counts; exaggeration : how many times the dent is drawn
     """
     old = thing.modifiers.get(MODIFIER)
     if old is not None:

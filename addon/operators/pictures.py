@@ -72,9 +72,9 @@ def _drawn_of(
 
 
 def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Compute what a picture's pixels see of a gel, float32 (H, W, channels): Height and Displacement in mm, Normal.
+    """Compute what a picture's pixels see of a gel, float32 (H, W, channels), vectors in the gel object's axes.
 
-    And Contact, the share that is touched. Vectors are in the gel object's axes. Raises as ``draw`` does.
+    Height and Displacement, mm; Normal; Contact, the share that is touched. Raises as ``draw`` does.
     """
     shown, moved = shown_state(gel, depsgraph, size)
     unit = shown.unit
@@ -95,7 +95,7 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Start the worker of a preset of Mitsuba's, in a window, so that it has compiled before its first picture.
 
-    What a picture cannot be made of is said when one is asked for.
+    What stands in the way of a picture is no error here: ``draw`` raises it.
     """
     gel = properties.gel_of(scene)
     if bpy.app.background or gel is None or reports.missing("mitsuba"):
@@ -141,12 +141,12 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
 
 
 def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the gel whose picture was drawn last, else the one that is meant."""
+    """Return the gel whose picture was drawn last, else ``properties.gel_of`` the scene."""
     last = None if _drawn is None else scene.objects.get(_drawn[0])
     return last if last is not None and last.tactile.role == "DIGIT" else properties.gel_of(scene)
 
 
 def forget() -> None:
-    """Take the picture to be of nothing that is known: another file is open."""
+    """Forget what the picture was drawn of, as another file is open: ``follow`` then draws it again."""
     global _drawn
     _drawn = None

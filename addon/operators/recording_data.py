@@ -50,7 +50,7 @@ class Translated:
     gel: Motion
 
     def fits(self, motion: str) -> bool:
-        """Return true if its movements are held as they are to be stored."""
+        """Return true if its movements are in files, and these exist, or in memory, as ``in_files`` has it."""
         files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 

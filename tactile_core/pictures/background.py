@@ -60,13 +60,13 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Ambient light (3, H, W) float32, levels of each LED's band, of gel seen at heights (H, W) m less that at zero."""
+    """Return the ambient light (3, H, W) float32, levels by LED's band, that heights (H, W) m add to height zero's."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Grey levels (H, W, 3, 3), channel by LED, of the gel at rest: coating of radiance (H, W, 3) and ambient light."""
+    """Return grey levels (H, W, channel, LED) of the gel at rest: LEDs' radiance (H, W, 3), and ambient light."""
     right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
     ambient = np.zeros((*unit.camera.shape, 3))
     table = np.asarray(unit.ambient)
@@ -81,8 +81,7 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 def fit_ambient(
     picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
 ) -> tuple[tuple[float, ...], ...]:
-    """Fit the ambient light (3, n) by least squares, so that the modelled picture at rest is nearest to `picture` (H,
-    W, 3).
+    """Fit the ambient light (3, n) by least squares of the modelled picture at rest from ``picture`` (H, W, 3).
     radiance : (H, W, 3) of the coating at rest; degree : of the polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE"""
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)

@@ -99,7 +99,7 @@ class ShadowCaster:
         return bilinear(sight, row, column), pixels
 
     def reach(self, highest: float, lowest: float) -> int:
-        """Return the columns that the longest shadow of such heights covers."""
+        """Return the polar columns that the longest shadow covers; highest, lowest : m, of the mapped field."""
         rise = self.foot[2] - highest
         slope = max(rise / float(self.distance[-1]) - 1 / float(self.radii[:, -1].min()), SMALLEST_SLOPE)
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1

@@ -13,8 +13,8 @@ def heights_above(  # noqa: ANN201
 ):  # fmt: skip
     """Find heights (n,) float32 m of the gel points displaced to places x, z (n,) m, and how many were not found.
 
-    It is ``HeightMapper._source`` place by place, and the height at its end, by the cubic B-splines of
-    ``geometry.cubic_spline.bspline_weights`` written out.
+    It does what ``HeightMapper._source`` does, place by place, then takes the height there; the cubic B-splines of
+    ``geometry.cubic_spline.bspline_weights`` are written out.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
     to_x, to_z, miss : (2, n), rows of the inverse Jacobian and the residual of each place at the start
     start, step : (2,) m, of the coefficients' grid"""

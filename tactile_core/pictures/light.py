@@ -93,8 +93,7 @@ def lambert(surface: Surface, positions: np.ndarray) -> Lit:
 
 
 def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
-    """Return strength facing / (length square^1.5), the light of one LED; strength : m2, its squared distance from the
-    origin"""
+    """Return strength facing / (length square^1.5), the light of one LED; strength : m2, its |l|^2 in ``lambert``"""
     return facing / (square * np.sqrt(square) * length) * strength
 
 

@@ -178,7 +178,7 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
     """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
-    height, steepness : (H W,), m and as ``_steepness`` has it; start, start_near, start_nearest : (H, W), of ``_begin_at``
+    height : (H W,) m; steepness : (H W,), of ``_steepness``; start, start_near, start_nearest : (H, W), ``_begin_at``
     rows, columns : (H,), (W,) px, from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)

@@ -20,7 +20,7 @@ SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, abou
 class Gather:
     """Resolution at which the gel's own light is gathered.
     step : pixels between places; azimuths : directions around each
-    growth : of the steps outward, each that share of the distance, at least one place; bounces : 1 or more"""
+    growth : each step outward as a share of the distance, at least one place; bounces : 1 or more"""
 
     step: int
     azimuths: int

@@ -121,7 +121,7 @@ def _check_whole(content: bytes, path: pathlib.Path) -> None:
 
 
 def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Raise TactileError for vertices (n, 3) and faces (m, 3) that are no triangles of an indenter's number."""
+    """Raise TactileError for vertices (n, 3) and faces (m, 3) that are no triangles, or more than MAX_FACES."""
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         found = f"vertices {vertices.shape}, faces {faces.shape}"
         raise TactileError(where, found, "three coordinates, three corners")

@@ -52,9 +52,9 @@ def _shape(extent: np.ndarray, spacing: float) -> tuple[int, ...]:
 def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid | TipGrid:
     """Build the grid of a solid mesh's signed distance (a trimesh, mm).
 
-    where : names the mesh in messages; spacing : m. Where the whole body takes more than MAX_NODES nodes, it is that of
-        its lowest REACH, which may touch; the rest has a coarser one.
-    Raises TactileError where that takes too many, too, and for a mesh that overlaps itself.
+    where : names the mesh in messages; spacing : m; of a body of more than MAX_NODES nodes, that of its lowest REACH,
+        which may touch, and coarser above
+    Raises TactileError where the lowest part alone has too many, and for a mesh that overlaps itself.
     """
     extent = np.ptp(mesh.bounds, axis=0) * 1e-3
     if np.prod(_shape(extent, spacing)) <= MAX_NODES:

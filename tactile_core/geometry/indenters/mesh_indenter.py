@@ -46,8 +46,7 @@ class MeshIndenter(Summary, Indenter):
     """A rigid body bounded by a triangle mesh.
 
     Its surface is where a tricubic spline of the mesh's signed distance is zero: smooth, with sharp edges rounded over
-    about one grid spacing. Normals and curvatures are exactly those of the spline's level
-    surfaces.
+    about one grid spacing. Normals and curvatures are exactly those of the spline's level surfaces.
 
     grid : the spline, m, fine where the body may touch; hull : (k, 3) m, vertices of the mesh's convex hull
     error : rms and largest difference, m, of ``distance`` from the mesh's, at 500 random places within 0.3 mm of it
@@ -68,10 +67,9 @@ class MeshIndenter(Summary, Indenter):
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
         spacing : m, of the grid; of a body of more than 8 million nodes, that of its lowest 5 mm, and coarser above
-            The body's lowest point, or the middle of its lowest flat, becomes the own origin.
-            Raises TactileError for anything that is no closed, outward surface of an indenter's size, and for one that
-            crosses itself, where the crossing is wider than the grid's spacing; narrower ones are not seen;
-            ModuleNotFoundError without the extra [fem].
+        The body's lowest point, or the middle of its lowest flat, becomes the own origin.
+        Raises TactileError for anything that is no closed, outward surface of an indenter's size, and for one that
+        crosses itself by more than the grid's spacing (less is not seen); ModuleNotFoundError without extra [fem].
         """
         _check(path, scale, up, spacing)
         content = mesh_file.read_bytes(path)

@@ -68,7 +68,7 @@ class BallPictures(abc.ABC):
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return the ambient light (3, H, W), by LED, that seen heights (H, W) m add, over the LED's ``facing`` light."""
+        """Return the ambient light (3, H, W) by LED that seen heights (H, W) m add, over the LED's ``facing`` light."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -76,7 +76,7 @@ class BallPictures(abc.ABC):
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the light (H, W, 3), grey levels, of a ball that is as bright as a coating that faces the LEDs."""
+        """Return the grey levels (H, W, 3) that a ball as bright as a coating facing the LEDs adds from behind it."""
         share = contact_share(self._view(self.heights(ball)) - self._view.start)
         return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
 
@@ -115,7 +115,7 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return the class that draws balls by a preset; raises TactileError for one of Mitsuba's where LLVM is missing."""
+    """Return what makes a unit's ``BallPictures`` by a preset; raises TactileError for Mitsuba's without LLVM."""
     if preset == FAST:
         return FastPictures
     if trouble := missing_mitsuba():

@@ -38,7 +38,7 @@ CLEARLY = 0.8  # of what one way leaves, that another may leave and be no better
 
 
 class Way(NamedTuple):
-    """Transformation of a picture: transposed, then rows and columns reversed, and red exchanged with blue."""
+    """Steps that turn a picture, each if true: transpose, then reverse rows, columns, and exchange red with blue."""
 
     transposed: bool
     rows: bool
@@ -65,8 +65,8 @@ def check_orientation(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Raise TactileError, with each way's share, for photographs that another orientation or order of colours explains
-    clearly better.
+    """Raise TactileError for photographs that another orientation or order of colours explains clearly better; it names
+    what each of these ways leaves unexplained.
 
     ball_diameter : m; progress : called with (ways tried, in all)
     Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Ways that

@@ -31,7 +31,7 @@ def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, 
 
 
 def material(coating: Coating, gel_index: float) -> dict[str, Any]:
-    """Return a coating as Mitsuba's plugin."""
+    """Return a coating, under gel of a refractive index, as Mitsuba's plugin."""
     albedo = {"type": "rgb", "value": list(coating.albedo)}
     if coating.bsdf == DIFFUSE:
         return {"type": "diffuse", "reflectance": albedo}

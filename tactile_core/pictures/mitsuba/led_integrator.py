@@ -60,9 +60,9 @@ def direct(
 def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
-    """Radiance (n, 3) that n surface interactions show of light that was reflected once before.
+    """Return the radiance (n, 3) of n surface interactions by light that other places have reflected onto them, once.
     meet : function that intersects rays; hit : the interactions, each DIRECTIONS times in a row
-    phase : 0..1 of each, rotates its directions; lobe : as in ``direct``, of the place of that reflection"""
+    phase : 0..1 of each, rotates its directions; lobe : as in ``direct``, at those other places"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS

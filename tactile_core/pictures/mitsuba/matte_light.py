@@ -43,8 +43,7 @@ class MatteLight:
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
-        """Return the radiance (H, W, 3) float32 of heights (H, W) by the LEDs alone, and the surface that pixels
-        saw."""
+        """Return the radiance (H, W, 3) float32 of heights (H, W) m by the LEDs alone, and the surface seen."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)
@@ -124,7 +123,7 @@ def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray
     Without occluders such a cloud lights exactly as its middle would: the light of a point falls on a surface as the
     gradient of 1 / distance, to which Newton's shell theorem applies. Seen from the picture's middle they are a
     sunflower.
-    turn, depth : 0..1, where the pattern starts across and along that line"""
+    turn, depth : 0..1, where the pattern starts, across and along the line from there"""
     number = np.arange(count)
     radius = np.sqrt((number + (turn * 7 % 1)) / count)  # the rings move as the pattern turns
     angle = number * _GOLDEN_ANGLE + 2 * np.pi * turn

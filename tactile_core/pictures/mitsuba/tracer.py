@@ -44,8 +44,7 @@ class Tracer(abc.ABC):
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         """Trace the pixels' rays to the gel, and from there to points (n, 3) m, 1 <= n <= 32.
         shift : pixels to the right and down from each pixel's middle
-        Returns places (H, W, 3) float32 m, and seen (H, W) uint32, bit k for point k: not occluded, and on the gel's
-        front."""
+        Returns places (H, W, 3) float32 m, and seen (H, W) uint32, bit k: point k lights the gel's front there."""
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:

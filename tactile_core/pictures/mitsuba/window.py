@@ -26,7 +26,7 @@ def window_height(camera: Camera) -> float:
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Return the air, m, between window and pinhole that puts it at the camera's height on the axis (Snell's law)."""
+    """Return the air, m, between window and pinhole with which that appears at the camera's height (Snell's law)."""
     return (camera.apparent_height - window_height(camera)) / index
 
 

@@ -1,6 +1,4 @@
-"""NPZ with electrodes (T, 19) and, if present, time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no
-pickle.
-"""
+"""NPZ with electrodes (T, 19) and maybe time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no pickle."""
 
 from __future__ import annotations
 
