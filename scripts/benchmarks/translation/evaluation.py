@@ -5,13 +5,13 @@
     python scripts/evaluate_translation.py --recordings DIR         on real recordings: slides (but sample 7 of each
                                                                     material) or grips; --quick: six slides
 
-Prints a table; exits 1 when an error row misses its target. Needs scipy, of the extra [fem]. The recordings'
-translations are left in --out, in the form that judge_recordings.py, the tool beside the recordings, reads.
+Prints a table; exits 1 when an error row misses its target. Needs scipy, of the extra [fem].
 """
 
 from __future__ import annotations
 
 import argparse
+import functools
 import sys
 from pathlib import Path
 
@@ -22,15 +22,14 @@ from benchmarks.translation import (
     body_rows,
     grips,
     made_up_units,
-    recordings,
     sequence_rows,
+    slides,
     test_set,
     two_contact_rows,
 )
 from benchmarks.translation.model_card import renew_model_card
 from tactile_core.accuracy import Row
 from tactile_core.errors import TactileError
-from tactile_core.recordings import electrode_gains
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training.step_errors import our_bodies
 from tactile_core.translation import translate
@@ -57,7 +56,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--recordings", metavar="DIR", help=real)
     parser.add_argument("--weights", metavar="FOLDER", help="networks of your own training instead of the shipped ones")
     parser.add_argument("--sensor", metavar="FILE", help="gains and offsets of their sensor, from `tactile adapt`")
-    parser.add_argument("--out", default="out/translated", metavar="FOLDER", help="translations (default: %(default)s)")
     parser.add_argument(
         "--card", metavar="FILE", help="renew the tables of this model card, and CSV and picture beside it"
     )
@@ -76,12 +74,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]:
     """Rows of real recordings: grips of the PHAC set, or slides."""
-    folder, file = Path(options.recordings), options.sensor
+    folder = Path(options.recordings)
     if grips.find(folder):
         return grips.rows(folder, network, read_pairs(options.test_set))
-    sensor = None if file is None else electrode_gains.read(file).gains_for(folder, "unit", file)
-    most = QUICK if options.quick else None
-    return recordings.rows(folder, network, options.out, most, sensor)
+    as_asked = functools.partial(translate.translate, sensor=options.sensor, weights=options.weights)
+    return slides.rows(folder, as_asked, QUICK if options.quick else None)
 
 
 def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:

@@ -22,7 +22,7 @@ from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, posterior_rows, rectified_rows
-from .slide_metrics import rank_correlation
+from .slides import rank_correlation
 
 # Targets (docs/sources.md, Targets), without shear, depth bins and indenters alike.
 TARGETS = {
