@@ -77,7 +77,7 @@ def test_lights_stand_where_another_fit_to_real_pictures_puts_them() -> None:
     position = np.array([led.position for led in DIGIT_LEDS])
     azimuth = np.degrees(np.arctan2(-position[:, 1], position[:, 0])) % 360
     elevation = np.degrees(np.arctan2(position[:, 2], np.hypot(*position[:, :2].T)))
-    np.testing.assert_allclose(azimuth, [45, 147, 276], atol=10)  # docs/sources.md, DIGIT LEDs: another camera model
+    np.testing.assert_allclose(azimuth, [45, 147, 276], atol=10)  # docs/sources.md, DIGIT camera: another camera model
     # The other fit has 21 to 26. A coating that spreads light and LEDs that stand lower soften a print's rim alike:
     # photographs of one unit leave some seven degrees between the two.
     assert ((elevation > 14) & (elevation < 27)).all()
