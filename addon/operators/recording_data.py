@@ -110,7 +110,7 @@ def fingers(path: str) -> list[str]:
 
 
 def write_columns(path: str, asked: RecordingOptions) -> str:
-    """Write the map of columns that was named, guessed, where there is none yet; what was done in words, or nothing."""
+    """Guess the map of columns that was named where its file is missing; return what was written in words, or ""."""
     file = _absolute(asked.columns)
     if not file or os.path.lexists(file):
         return ""

@@ -198,7 +198,7 @@ def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.
 
 
 def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object:
-    """Return the gel that is meant, as ``gel_of``. Raises TactileError where the scene itself has none."""
+    """Return the gel that ``gel_of`` does. Raises TactileError where the scene itself has none."""
     gel = gel_of(scene, near)
     if gel is not None:
         return gel

@@ -29,10 +29,10 @@ def preset_of(scene: bpy.types.Scene) -> str:
 
 
 def calibration_of(scene: bpy.types.Scene, sensor: str, size: tuple[int, int] | None = None) -> Calibration:
-    """Return a gel's unit, its picture (width, height) pixels large: of the file that a scene names for such a gel.
+    """Return the calibration of a gel's sensor, at a picture of ``size`` (width, height) px.
 
-    Else the preferences', of a DIGIT, or that of the sensor's descriptor. Raises TactileError, also for a file of a
-    sensor that the scene has no gel of.
+    It is that of the file that the scene names, else (for a DIGIT) that of the preferences, else the one that ships.
+    Raises TactileError, also for a file of a sensor that the scene has no gel of.
     """
     path = scene.tactile_render.calibration
     if not path and sensor == sensors.TARGET:

@@ -98,7 +98,7 @@ class TactileOperator(bpy.types.Operator):
 
 @contextmanager
 def shown(context: bpy.types.Context) -> Iterator[Callable[[float], None]]:
-    """Show the progress of what runs inside an operator at the mouse pointer; gives what takes the share done, 0..1."""
+    """Show an operator's progress at the mouse pointer; yields the function to call with the share done, 0..1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:

@@ -171,7 +171,7 @@ class Prepared:
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
-        """Return the times (n,) s and signals of rising frames (n,), with the first one's `rest`."""
+        """Return the times (n,) s and signals of rising frames (n,); ``rest`` is that of the first."""
         start, about = int(frames[0]), self.about()
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:

@@ -208,7 +208,8 @@ class Placement:
     """Place and angle of an indenter, the same for both sensors.
 
     x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto it
-    tilt : rad, angle between the indenter's axis and the surface normal; tilt_heading : rad, direction of that lean
+    tilt : rad, between the indenter's axis and the surface normal
+    tilt_heading : rad, the way its upper end leans: 0 toward +x, pi / 2 toward -z
 
     >>> tactile.Placement(x=2e-3, z=0.0, tilt=0.1)
     """

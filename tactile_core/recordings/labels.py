@@ -47,7 +47,7 @@ def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) 
 
 
 def unfold(runs: Runs) -> dict[str, np.ndarray]:
-    """Return the labels (T,) of runs."""
+    """Return the labels, (T,) texts by name, that runs shorten."""
     return {
         name: np.array([text for text, frames in each for _ in range(frames)], dtype=object)
         for name, each in runs.items()

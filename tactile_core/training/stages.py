@@ -61,7 +61,7 @@ class Model(nn.Module):
         return biotac, torch.where(rectified[:, 0], *surprises)
 
     def across(self, latent_source: Tensor) -> Tensor:
-        """Map latent_source to latent_target."""
+        """Map latent_source to latent_target, by M2MPN alone."""
         return self.M2MPN(self.MVB.placed(latent_source))
 
     def to_target(self, state: Tensor, latent_source: Tensor) -> Tensor:

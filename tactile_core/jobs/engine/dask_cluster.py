@@ -64,7 +64,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
+        """Yield each task with its reply as it comes, while ``count()``, the number still awaited, is above 0."""
         while count():
             future = self._next()
             yield self._tasks.pop(future.key)[0], self._reply(future)

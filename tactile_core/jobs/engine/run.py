@@ -29,7 +29,7 @@ class Place(Protocol):
         """Submit a task; `results` gives its reply."""
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Yield replies as they come, while `count` returns a number of awaited ones above 0."""
+        """Yield each task with its reply as it comes, while ``count()``, the number still awaited, is above 0."""
 
     def __enter__(self) -> Self: ...
 

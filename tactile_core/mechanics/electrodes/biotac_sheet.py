@@ -171,7 +171,7 @@ _PAD = -2e-3  # m, y below which dents lie
 
 
 class ReducedSheet:
-    """Resistances of a sheet from potentials among ``fields`` (n - 1, r), those of all its nodes but the first."""
+    """Resistances of a sheet whose potentials are sums of ``fields`` (n - 1, r), given at all nodes but the first."""
 
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields

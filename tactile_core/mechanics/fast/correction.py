@@ -231,7 +231,7 @@ def learned() -> dict[str, Correction]:
 
 @dataclasses.dataclass(frozen=True)
 class Corrected:
-    """A fast contact with its correction. displacement : (n, 3) m; factor : of all forces."""
+    """A fast contact with its correction. displacement : (n, 3) m; factor : times all its forces."""
 
     displacement: np.ndarray
     factor: float

@@ -47,7 +47,7 @@ class Body:
     def contact(
         self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
     ) -> FiniteStrainContact:
-        """An indenter in front of this body, which will come ``depth`` m in at most.
+        """Return the contact problem of this body and an indenter that will come ``depth`` m in at most.
 
         every_edge : hold out edges between nodes, too, that come to lie too deep under the resting nodes to be seen
             from them
@@ -73,7 +73,7 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
-        """Return the surface's penetration, m, between nodes. Raises PenetrationError where it strays too far."""
+        """Return the surface's penetration, m, between nodes. Raises PenetrationError where it is too much."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)

@@ -116,7 +116,7 @@ class ContactSet:
         self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 
     def begin(self, at: np.ndarray) -> np.ndarray:
-        """Look at the obstacle from where the nodes are; frames (k, 3, 3) with the normal as first axis.
+        """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first axis.
 
         One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
         """

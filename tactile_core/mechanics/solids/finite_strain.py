@@ -251,7 +251,7 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """Return the internal force (3 n,) N; ``condensed`` as the Newton step needs it."""
+        """Return the internal force (3 n,) N, of ``condensed``, which the Newton step needs, or of ``residual``."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)

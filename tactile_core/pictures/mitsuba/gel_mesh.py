@@ -26,7 +26,7 @@ class GelMesh:
     the picture are not."""
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
-        """Take spacing : m between vertices, rounded to whole pixels; square : scale up so that pixels are square."""
+        """Take spacing : m between vertices, in whole pixels; square : true scales the up axis for square pixels."""
         self.camera = camera
         right, down = camera.pixel_size
         self.up_scale = right / down if square else 1.0

@@ -51,7 +51,7 @@ class Stream:
 
     @property
     def sensor(self) -> str:
-        """Name of the sensor; empty where none has so many electrodes."""
+        """Return the name of the sensor that has as many electrodes; empty for none."""
         return sensor_with(self.hand[self.number].electrodes)
 
 

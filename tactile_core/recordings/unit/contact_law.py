@@ -77,8 +77,7 @@ def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float]:
-    """Fit gains to changes (n, 19) in contact; return the drop of the unexplained share, and the gains' log rms,
-    centred."""
+    """Fit gains to changes (n, 19) in contact; return the unexplained share's drop, and the gains' spread (log rms)."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     even, log_gain = change, np.zeros(change.shape[1])
     for _ in range(FITS):
