@@ -129,7 +129,8 @@ def test_at_limit_full() -> Found:
 
 
 @case("ten_steps_at_once_full", "load step ten times too large", MECHANICS_FULL,
-      "the same answer to 1 um without friction: equilibrium knows no path")  # fmt: skip
+      "the same answer to 1 um without friction: equilibrium knows no path",
+      slow=["ten_steps_at_once_full"])  # fmt: skip
 def test_steps_full() -> Found:
     """0.8 mm at once and in ten steps."""
     depth = 0.8e-3

@@ -50,7 +50,7 @@ def test_fast(name: str, sensor: str) -> Found:
 
 @case("{}_{}_full", HARD_OF, MECHANICS_FULL,
       "no node in the indenter or pulled, forces balanced, no cell inside out; or says that it cannot", *EACH,
-      slow=["biotac"])  # fmt: skip
+      slow=["biotac", f"{SUNK}_digit_full"])  # fmt: skip
 def test_full(name: str, sensor: str) -> Found:
     _, indenter, place, depth, friction = CONTACTS[name]
     if name == SUNK:
