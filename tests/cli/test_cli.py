@@ -104,37 +104,15 @@ def test_one_bad_recording_is_named_and_the_others_go_on(tactile, slide_csv, tmp
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a", "b"]
 
 
-def truncated(lines: list[str]) -> list[str]:
-    return [*lines[:-1], lines[-1][: len(lines[-1]) // 2]]
-
-
-def without_ele7(lines: list[str]) -> list[str]:
-    at = lines[0].split(",").index("ele7")
-    return [",".join(line.split(",")[:at] + line.split(",")[at + 1 :]) for line in lines]
-
-
 def text_cell(lines: list[str]) -> list[str]:
     cells = lines[10].split(",")
     return [*lines[:10], ",".join([*cells[:28], "broken", *cells[29:]]), *lines[11:]]
 
 
-def time_goes_back(lines: list[str]) -> list[str]:
-    return [*lines[:40], lines[41], lines[40], *lines[42:]]
-
-
-def biotac_sp(lines: list[str]) -> list[str]:
-    return [",".join(f"ff_e{i}" for i in range(1, 25)), *[",".join(["3000"] * 24)] * 50]
-
-
-# What a user can give `convert`: how the file is damaged, the exit status, and words of the message or warning.
+# How a file is damaged, the exit status, and words of the message or warning; more of them in tests/recordings.
 DAMAGES = {
-    "truncated": (truncated, 0, "line 151"),
-    "missing electrode": (without_ele7, 0, "no readings of E7"),
     "text cell": (text_cell, 0, "line 11, ele3"),
     "empty": (lambda lines: [], 2, "empty"),
-    "header only": (lambda lines: lines[:1], 2, "without data rows"),
-    "24 electrodes": (biotac_sp, 2, "BioTac SP"),
-    "time goes back": (time_goes_back, 0, "time stamps"),
     "shorter than the tare window": (lambda lines: lines[:6], 0, "no quiet part"),
     "no recording": (lambda lines: ["name,colour", "apple,red"], 2, "no known recording"),
 }

@@ -66,14 +66,6 @@ def test_the_dropout_of_mat5_50_is_repaired(slide):
     assert any(warning.startswith("line 7: glitch in") for warning in signals.warnings)
 
 
-def test_biotac_sp_recordings_are_refused(outside_data):
-    paths = sorted(outside_data("biotac_sp").glob("*/**/*.csv"))
-    assert paths
-    for path in paths:
-        with pytest.raises(TactileError, match="24 electrodes"):
-            recordings.read(path)
-
-
 @pytest.mark.parametrize("topic", ["cw", "cp"])
 def test_wrench_and_pose_files_are_no_recordings(topic, outside_data):
     path = next((outside_data("biotac_recordings") / "slide").glob(f"*_{topic}.csv"))

@@ -1,4 +1,4 @@
-"""Dask as one more place: the same bytes, over TLS too. Workers are threads."""
+"""Dask as one more place, over TLS too; test_same_bytes has its bytes. Workers are threads."""
 
 from __future__ import annotations
 
@@ -38,16 +38,6 @@ def run_on(folder, job, address):
 def workers(**more):
     few = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None, "host": "127.0.0.1"}
     return distributed.LocalCluster(**few, loop=loop(), **more)
-
-
-def test_dask_makes_the_same_bytes(new_job, do, content):
-    folder, job = new_job("local")
-    do(folder, job)
-    other, same = new_job("dask")
-    with workers(protocol="tcp://") as cluster:
-        assert run_on(other, same, cluster.scheduler_address).made == 5
-        assert run_on(other, same, cluster.scheduler_address).kept == 5
-    assert content(folder) == content(other)
 
 
 def test_dask_renders(tmp_path):
