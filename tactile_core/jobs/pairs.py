@@ -9,14 +9,12 @@ import os
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
-from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
@@ -30,7 +28,7 @@ from .engine import run as runs
 from .engine.inputs import Input, load_scene_of, read_scene
 from .engine.job import Job
 from .engine.local import InProcess
-from .engine.recipes import InputFacts, Law, Pairs
+from .engine.recipes import InputFacts, Pairs
 from .engine.run import Place, Progress
 
 GROWS = True
@@ -48,7 +46,6 @@ def make_pairs(
     out: str | os.PathLike,
     progress: Progress = lambda done, known: None,
     place: Callable[[Path], Place] = InProcess,
-    electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> None:
@@ -57,14 +54,13 @@ def make_pairs(
     progress : called with (blocks of presses done, known so far). Blocks are kept in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
     place : executor, by the job's folder
-    electrodes : the law of their counts, of ``biotac_sheet.LAWS``; pair : the sensors, source and target
-    keep : words of ``pairs_file.KEEPABLE``
+    pair : the sensors, source and target; keep : words of ``pairs_file.KEEPABLE``
     Raises TactileError for a bad scene or count, and for parts of another scene or seed."""
     out = Path(out)
-    job, names, text = plan(scene_path, count, seed, out, electrodes, pair, keep)
+    job, names, text = plan(scene_path, count, seed, out, pair, keep)
     compliance_of(pair[1]), compliance_of(pair[0])  # built once here, not by every worker at the same time
     with runs.completed(out, job, place, progress) as folder:
-        merge(blocks(folder, job), count, out, Made(text, names, seed, electrodes, pair, keep))
+        merge(blocks(folder, job), count, out, Made(text, names, seed, pair, keep))
         atomic.write_json(card_path(out), card(out, *pair))
 
 
@@ -73,7 +69,6 @@ def plan(
     count: int,
     seed: int,
     out: Path,
-    electrodes: str = SHEET,
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> tuple[Job[Pairs], list[str], str]:
@@ -89,9 +84,7 @@ def plan(
         spec.build()  # an impossible one is refused before anything is written
     atomic.claim(out)
     surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
-    job = jobs.make(
-        inputs, Pairs(count, seed, surfaces, files, cast(Law, electrodes), source, target, list(keep)), None
-    )
+    job = jobs.make(inputs, Pairs(count, seed, surfaces, files, source, target, list(keep)), None)
     names = [spec.name for spec in scene.indenters]
     return job, names + [NAME] * (scene.pairs.random_bodies > 0), text
 
@@ -112,9 +105,8 @@ def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
         return False
     scene = _scene(one, tuple(job.recipe.files))
     recipe = job.recipe
-    pair = recipe.source, recipe.target
     presses = range(number * BLOCK, (number + 1) * BLOCK)
-    way = recipe.electrodes, pair, recipe.keep
+    way = (recipe.source, recipe.target), recipe.keep
     rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, *way)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     array_pack.write(file, columns | {COUNT: np.array(len(rows))})

@@ -16,14 +16,13 @@ import re
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from ..errors import TactileError
 from ..files import array_pack, atomic, checksummed
-from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..simulation.scene import Scene, check, to_toml
@@ -33,7 +32,7 @@ from .engine import run as runs
 from .engine.inputs import load_scene_of, read_scene
 from .engine.job import Job
 from .engine.local import InProcess
-from .engine.recipes import InputFacts, Law, Simulate
+from .engine.recipes import InputFacts, Simulate
 from .engine.run import Place, Progress
 
 MOST = 100_000  # combinations (assumed to be more than anyone simulates)
@@ -167,18 +166,16 @@ def plan(
     out: str | os.PathLike,
     seed: int = 0,
     keep: Sequence[str] = DEFAULT,
-    electrodes: str = SHEET,
 ) -> Job[Simulate]:
     """Return the job: the [recording] of a scene for each combination of the values in ``grid``.
     seed : of the first recording, each next one has one more; keep : words of ``scene_recording.outputs``
-    electrodes : the law of their counts, of ``biotac_sheet.LAWS``
     Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)
     scene, _, inputs, files = read_scene(scene_path, [name_of(one) for one in values])
     for one in values:
         check_places(scene_path, recording_of(with_values(scene, one, str(scene_path)), scene_path))
     atomic.claim(out)
-    return jobs.make(inputs, Simulate(seed, values, files, list(keep), cast(Law, electrodes)), None)
+    return jobs.make(inputs, Simulate(seed, values, files, list(keep)), None)
 
 
 def _put_together(folder: Path, job: Job[Simulate], out: Path) -> None:
@@ -213,8 +210,7 @@ def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
     scene = with_values(scene, values, one.path)
     with tempfile.TemporaryDirectory() as name:
         out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
-        electrodes, loaded = job.recipe.electrodes, (scene, to_toml(varied))
-        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=loaded, electrodes=electrodes)
+        simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=(scene, to_toml(varied)))
         array_pack.write_files(file, Path(name))
     return True
 

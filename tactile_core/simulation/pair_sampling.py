@@ -11,7 +11,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.biotac_sheet import SHEET, signal_of
+from ..mechanics.electrodes.biotac_sheet import signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import Placement, depth_at, on_gel, pose_at
@@ -27,7 +27,7 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 
 
 def press_rows(
-    scene: Scene, seed: int, press: int, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
+    scene: Scene, seed: int, press: int, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
     """Return the contacts of one press: force grows by the scene's ratio until the first sensor reaches its greatest
     depth.
@@ -35,7 +35,7 @@ def press_rows(
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
     with its slide, at the force it had reached, along the same path on both sensors. A scene with ``depth_steps`` pairs
     contacts of the same depth in place of those of the same force.
-    electrodes : their law, of ``biotac_sheet.LAWS``; pair : the sensors, source and target; keep : see ``pair_row``"""
+    pair : the sensors, source and target; keep : see ``pair_row``"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)
@@ -50,7 +50,7 @@ def press_rows(
             "slide": np.array(step.slide, np.float32),
             "place": stood,
         }
-        rows.append({**named, **pair_row(biotac, digit, electrodes, pair, keep)})
+        rows.append({**named, **pair_row(biotac, digit, pair, keep)})
     return rows
 
 
@@ -129,7 +129,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 
 
 def pair_row(
-    biotac: Solution, digit: Solution, electrodes: str = SHEET, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
+    biotac: Solution, digit: Solution, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
     """Return the arrays stored of one paired contact, see ``units``; keep : fields of both solutions to add."""
     source, target = pair
@@ -138,7 +138,7 @@ def pair_row(
         **{f"{word}_{name}": getattr(found, word).astype(np.float32) for word in keep for name, found in both},
         f"displacement_{source}": quantise(biotac.displacement),
         f"displacement_{target}": quantise(digit.displacement),
-        "signal": signal_of(biotac, electrodes, source).astype(np.float32),
+        "signal": signal_of(biotac, source).astype(np.float32),
         "gap": biotac.electrode_gaps.astype(np.float32),
         "force": biotac.force.astype(np.float32),
         f"force_{target}": digit.force.astype(np.float32),

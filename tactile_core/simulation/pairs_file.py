@@ -14,7 +14,6 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked
-from ..mechanics.electrodes.biotac_sheet import LAWS
 from ..sensors import PAIR
 from ..sensors.descriptor import NODES, pair_of
 from ..sensors.fluid_sensor import FALLS
@@ -119,10 +118,6 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             if attributes["polarity"] != FALLS:
                 expected = f"{FALLS!r}, as raw counts do where a film thins"
                 raise TactileError(f"{os.fspath(path)}, polarity", repr(attributes["polarity"]), expected, ADVICE)
-            if attributes["electrodes"] not in LAWS:
-                raise TactileError(
-                    f"{os.fspath(path)}, electrodes", repr(attributes["electrodes"]), ", ".join(LAWS), ADVICE
-                )
             names = _named(pair)
             shapes = DATASETS | {"signal": ((sensors.electrode_count(pair[0]),), "f")}
             arrays = {name: _dataset(file, shapes[name], names, names[name], path) for name in DATASETS}

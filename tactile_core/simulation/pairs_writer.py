@@ -17,7 +17,6 @@ from ..files import array_pack, atomic
 from ..files.hdf5_writer import Disk
 from ..files.provenance import sha256
 from ..files.version import __version__
-from ..mechanics.electrodes.biotac_sheet import SHEET
 from ..sensors import PAIR, SOURCE, TARGET
 from ..sensors.descriptor import NODES
 from ..sensors.fluid_sensor import FALLS
@@ -92,12 +91,11 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """Origin of contacts: scene's text, indenters' names, seed, electrodes' law, sensors, words of ``KEEPABLE``."""
+    """Origin of contacts: scene's text, indenters' names, seed, sensors, words of ``KEEPABLE``."""
 
     scene: str
     indenters: list[str]
     seed: int
-    electrodes: str = SHEET
     pair: tuple[str, str] = PAIR
     keep: Sequence[str] = ()
 
@@ -112,7 +110,7 @@ def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) 
                 "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
                 "indenters": json.dumps(made.indenters),
                 **{f"{sensor}{NODES}": sensors.sensor_surface(sensor).sha256 for sensor in made.pair},
-                "polarity": FALLS, "electrodes": made.electrodes,
+                "polarity": FALLS, "electrodes": "sheet",
             })  # fmt: skip
             done, unit_of = 0, units(*made.pair, made.keep)
             for path in files:

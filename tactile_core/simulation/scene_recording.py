@@ -14,7 +14,7 @@ from ..errors import TactileError
 from ..files import atomic
 from ..files.version import __version__
 from ..geometry.indenters import Indenter
-from ..mechanics.electrodes.biotac_sheet import SHEET, signal_of
+from ..mechanics.electrodes.biotac_sheet import signal_of
 from ..mechanics.force_search import UnreachableError
 from ..mechanics.placement import Placement, on_gel
 from ..mechanics.solution import Sensor, Solution, Tier
@@ -62,7 +62,6 @@ def simulate_recording(
     keep: Collection[str] = DEFAULT,
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
-    electrodes: str = SHEET,
 ) -> None:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
 
@@ -71,7 +70,6 @@ def simulate_recording(
     progress : called with (frames done, frames)
     keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default
     loaded : a scene and its text in place of the file's, whose name then only serves messages
-    electrodes : the law of their counts, of ``biotac_sheet.LAWS``
     Raises TactileError for a scene without a recording, forces beyond the linear model's range, and tractions of
     another tier than the fast one."""
     scene, text = loaded or load_scene(scene_path)
@@ -93,7 +91,7 @@ def simulate_recording(
             except TactileError as error:
                 error.second = t
                 raise
-            known[x, z, newtons] = _frame(solved, keep, electrodes)
+            known[x, z, newtons] = _frame(solved, keep)
         frames.append(known[x, z, newtons])
         if progress:
             progress(len(frames), len(time))
@@ -104,7 +102,7 @@ def simulate_recording(
         electrode_counts, pdc = readings(change, time, _wiring(spec), seed), pdc_counts(pressure)
         still = np.full(len(time), _STILL_COUNT, np.int16)
         fluid = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
-        fluid += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the {electrodes} law."
+        fluid += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the sheet law."
     made_by = ", ".join(["mechanics.recording", *map(" ".join, sorted((tiers or {}).items()))])
     write_simulated(
         out, time=time, electrodes=electrode_counts, pdc=pdc, tac=still, tdc=still,
@@ -177,13 +175,13 @@ def _solve(
     return found
 
 
-def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str], law: str) -> _Frame:
+def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str]) -> _Frame:
     """Return what is kept of a frame's contacts. The force is the first sensor's: the BioTac's where it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))
     first = next(iter(solved.values()))
-    change = signal_of(solved[SOURCE], law) if "electrodes" in keep else np.zeros(sensors.ELECTRODES)
+    change = signal_of(solved[SOURCE]) if "electrodes" in keep else np.zeros(sensors.ELECTRODES)
     centre = next((each.centre for sensor, each in solved.items() if sensors.is_gel(sensor)), np.full(2, np.nan))
     return _Frame(moved, pressed, first.force, first.pressure, change, centre)
 

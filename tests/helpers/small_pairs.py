@@ -78,7 +78,7 @@ def write_pairs(
                 "indenters": json.dumps(["sphere"]),
                 "format": "tactile-pairs-2",
                 "polarity": "falls",
-                "electrodes": "gap",
+                "electrodes": "sheet",
             }
         )
     return path

@@ -11,12 +11,11 @@ from conftest import SLIDE_HEADER
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.mechanics.electrodes.biotac_sheet import signal_of_gaps
 from tactile_core.mechanics.fast.sensing_points import electrode_feet
 from tactile_core.recordings import electrode_gains, prepare, read
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
 from tactile_core.recordings.flags import Flag
-from tactile_core.sensors import REST_COUNTS, electrodes
+from tactile_core.sensors import COUNT_SIGN, REST_COUNTS, electrodes
 from tactile_core.translation import adapt, reference_signals, weights
 
 ONES, ZEROS = [1.0] * 19, [0.0] * 19
@@ -24,7 +23,7 @@ CARD = {"format": weights.CARD_FORMAT, "polarity": "falls"}
 
 
 def contacts(count: int, seed: int, places: np.ndarray | None = None) -> np.ndarray:
-    """(count, 19) counts: dents of the film under a place, and as much bulge around, through the electrodes' law."""
+    """(count, 19) counts: dents of the film under a place, as much bulge around, read as one over its thickness."""
     random = np.random.default_rng(seed)
     if places is None:
         places = np.column_stack([random.uniform(-20e-3, 2e-3, count), random.uniform(-6e-3, 6e-3, count)])
@@ -33,7 +32,8 @@ def contacts(count: int, seed: int, places: np.ndarray | None = None) -> np.ndar
     depth = random.uniform(0.05e-3, 0.8e-3, (count, 1))
     width = random.uniform(2e-3, 4e-3, (count, 1))
     dent = np.exp(-distance / (2 * width**2)) - 0.3 * np.exp(-distance / (2 * (3 * width) ** 2))
-    return signal_of_gaps(electrode_feet().gap - depth * dent)
+    rest = electrode_feet().gap
+    return COUNT_SIGN * 0.1 * (1 / np.maximum(rest - depth * dent, 20e-6) - 1 / rest)
 
 
 def readings(change: np.ndarray, gain: np.ndarray, offset: np.ndarray, rectified: bool, seed: int) -> np.ndarray:

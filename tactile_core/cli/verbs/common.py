@@ -37,9 +37,6 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "--smooth": {"type": int, "metavar": "N", "help":
         "average over N frames, odd (default: 3 if rectified, else 1)"},
     "--no-drift": {"action": "store_true", "help": "do not remove drift"},
-    "--electrodes": {"choices": ("sheet", "gap"), "default": "sheet", "help":
-        "law from the fluid film's thickness to counts: sheet, current in a conducting sheet, 3 ms a contact; gap,"
-        " one over the thickness under each electrode, at no cost and less like real fingers (default: sheet)"},
     "--answer": {"choices": ("likely", "mean"), "default": "likely", "help":
         "estimate of a frame: likely, its most plausible contact; mean, the mean over all its plausible contacts,"
         " each frame alone, which is blurred where two places fit the signals (default: likely)"},

@@ -41,7 +41,6 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"
     )
-    add(verb, "--electrodes")
     engine.parts_arguments(verb)
     add(verb, "--progress")
 
@@ -58,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
     pair = options.source, options.target
     keep = () if options.keep is None else results.parse_words(options.keep, tuple(KEEPABLE))
     if options.plan:
-        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, options.electrodes, pair, keep)
+        job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, pair, keep)
         for line in plan.of_pairs(options.count, pair).lines():
             say(line)
         engine.tell_planned_parts(runs.write(options.out, job))
@@ -66,9 +65,8 @@ def run(options: argparse.Namespace) -> int:
     place = engine.place_of(options)
     with bar("pairs", "block", options.progress) as shown:
         pairs.make_pairs(
-            options.scene, options.count, options.seed, options.out, progress=shown, place=place,
-            electrodes=options.electrodes, pair=pair, keep=keep,
-        )  # fmt: skip
+            options.scene, options.count, options.seed, options.out, progress=shown, place=place, pair=pair, keep=keep
+        )
     tell(options.out)
     next_step(f"tactile train {quote(options.out)} --out trained")
     return 0

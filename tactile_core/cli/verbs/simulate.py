@@ -51,7 +51,6 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " traction_biotac,traction_digit, or traction for both: Pa on each surface node, by the fast tier alone;"
         " displacement_NAME and traction_NAME of any other sensor, too",
     )
-    add(verb, "--electrodes")
     add(verb, "--error", bound="um of the surface, such as 50um")
     verb.add_argument(
         "--yes", action="store_true", help="begin at once, however long the tier that --error picks will take"
@@ -85,9 +84,7 @@ def run(options: argparse.Namespace) -> int:
         from ...simulation.scene_recording import simulate_recording
 
         tiers = {} if options.error is None else _tiers(options, keep)
-        simulate_recording(
-            options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers, electrodes=options.electrodes
-        )
+        simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
     tell(options.out)
     if "electrodes" in keep:
         next_step(f"tactile convert {quote(options.out)} --out results")
@@ -139,7 +136,7 @@ def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
     from ...jobs import simulate
     from ...jobs.engine import run as runs
 
-    job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep, options.electrodes)
+    job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep)
     if options.plan:
         engine.tell_planned_parts(runs.write(options.out, job))
         return 0

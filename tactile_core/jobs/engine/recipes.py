@@ -15,7 +15,7 @@ import dataclasses
 import importlib
 from collections.abc import Callable
 from types import ModuleType
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
@@ -31,9 +31,6 @@ from ..results import TRANSLATED, GelKind
 SHARD_FRAMES = 1000  # frames a task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
 PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
-
-
-Law = Literal["sheet", "gap"]  # of electrodes
 
 
 class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -84,7 +81,6 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     seed: int
     surfaces: list[str]
     files: list[str]
-    electrodes: Law = "sheet"
     source: str = SOURCE
     target: str = TARGET
     keep: list[str] = []
@@ -100,7 +96,6 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
     values: list[dict[str, float | str]]
     files: list[str]
     keep: list[str]
-    electrodes: Law = "sheet"
     version: str = __version__
 
 

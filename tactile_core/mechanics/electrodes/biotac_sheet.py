@@ -7,7 +7,7 @@ thickness near an electrode is left out.
 
 The reduced sheet is cheap enough for every contact of a simulation. Galerkin's method: potentials are sought among the
 combinations of fixed fields, those of the electrodes at rest and the principal ones of sheets with random dents.
-``signal_of`` makes counts of it, or by a simpler law of gaps.
+``signal_of`` makes counts of it.
 """
 
 from __future__ import annotations
@@ -18,13 +18,12 @@ import functools
 import numpy as np
 
 from ... import sensors
-from ...errors import TactileError
 from ...geometry.lattice import Lattice, cap_faces
 from ...sensors import divider
 from ...sensors.fluid_sensor import FluidFilm
 from ...sensors.unrolling import closest_on_triangles
 from ..fast.contact_state import Contact
-from ..fast.sensing_points import electrode_feet, sensing_nodes
+from ..fast.sensing_points import sensing_nodes
 from ..solids.biotac_core import above_core
 from ..solids.hex_mesh import skin_mesh
 from ..solids.sparse_cholesky import factor
@@ -141,24 +140,8 @@ def _connected(faces: np.ndarray) -> np.ndarray:
     return faces[piece == np.bincount(piece).argmax()]
 
 
-# counts m: assumed. No gap law is published (docs/sources.md); this one puts the 95th percentile of the largest change
-# a press makes near 150 counts, as of the networks' prototype. One constant for all electrodes: against the thin
-# sheet it leaves 9 counts rms of 20 over 240 contacts, a constant for each electrode 7
-# (`scripts/benchmarks/mechanics/electrode_law.py` of commit d537259).
-FILM_CONSTANT = 0.1
-
-
-def signal_of_gaps(gaps: np.ndarray, sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Noise-free change (..., e) of the raw counts against rest for film thicknesses (..., e) m.
-
-    b (1 / max(gap, floor) - 1 / gap at rest), the sign as in ``sensors.COUNT_SIGN``.
-    """
-    rest = electrode_feet(sensor).gap
-    return sensors.COUNT_SIGN * FILM_CONSTANT * (1 / np.maximum(gaps, film_floor(sensor)) - 1 / rest)
-
-
 def film_floor(sensor: str) -> float:
-    """Thickness, m, of the thinnest film of a sensor that the laws know."""
+    """Thickness, m, of the thinnest film of a sensor that the law knows."""
     return sensors.skin_of(sensor).descriptor.fluid.thinnest
 
 
@@ -221,22 +204,11 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
     return [np.maximum(films, sheet.fluid.thinnest) for films in found]
 
 
-SHEET, GAP = LAWS = ("sheet", "gap")
-
-
-def signal_of(contact: Contact | Solution, law: str = SHEET, sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Noise-free change (e,) of the raw counts against rest, of a unit that rests at ``rest_counts``.
-
-    law : ``"sheet"``, the film as a conducting sheet, 3 ms; ``"gap"``, one over the film's thickness, at no cost
-    Raises TactileError for another law.
-    """
-    if law == SHEET:
-        films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
-        rest = rest_counts(sensor)
-        return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest
-    if law == GAP:
-        return signal_of_gaps(contact.electrode_gaps, sensor)
-    raise TactileError("electrodes", repr(law), ", ".join(LAWS))
+def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.ndarray:
+    """Noise-free change (e,) of the raw counts against rest, of a unit that rests at ``rest_counts``; 3 ms."""
+    films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
+    rest = rest_counts(sensor)
+    return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest
 
 
 @functools.cache

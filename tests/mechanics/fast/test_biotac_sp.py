@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.mechanics.electrodes.biotac_sheet import GAP, SHEET, rest_counts, signal_of
+from tactile_core.mechanics.electrodes.biotac_sheet import rest_counts, signal_of
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
 from tactile_core.mechanics.solve import solve
@@ -48,9 +48,8 @@ def test_counts_fall_where_it_is_squeezed():
     squeezed = int(
         np.argmin(pressed.electrode_gaps - solve(NAME, BALL, Placement(-9.5e-3, 0.0), depth=0.0).electrode_gaps)
     )
-    for law in (SHEET, GAP):
-        change = signal_of(pressed, law, NAME)
-        assert change.shape == (24,) and change[squeezed] < 0 and np.isfinite(change).all()
+    change = signal_of(pressed, NAME)
+    assert change.shape == (24,) and change[squeezed] < 0 and np.isfinite(change).all()
     assert pressed.pressure > 0 and pressed.axial_force > 0
     rest = rest_counts(NAME)
     assert rest.shape == (24,) and (rest > 2500).all() and (rest < 4000).all()  # as real units': 2,840 to 3,720
@@ -58,7 +57,7 @@ def test_counts_fall_where_it_is_squeezed():
 
 def test_a_press_gives_pairs_with_the_digit():
     scene, _ = load_scene(SCENE)
-    rows = press_rows(scene, 3, 1, SHEET, (NAME, "digit"), keep=["traction"])
+    rows = press_rows(scene, 3, 1, (NAME, "digit"), keep=["traction"])
     assert len(rows) > 3 and rows[0]["signal"].shape == (24,)
     for row in rows:
         ratio = np.linalg.norm(row["force"]) / np.linalg.norm(row["force_digit"])
