@@ -1,10 +1,117 @@
-"""Measure speed against error of every stage: runs `benchmarks/table/speed_error.py`, see --help."""
+"""Speed against error of every stage, in one run on one machine: a table, a plot, rows.
+
+    python scripts/benchmark.py                      everything; writes docs/benchmark.*
+    python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
+    python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
+    python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
+
+Stages: contact mechanics by tier and sensor; translation; pictures by preset; the whole chain from signals to pictures;
+pictures by others' programs, where they are installed.
+Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
+beside that of doing nothing. Then the errors that are promised are held against those that are found: exits with 1
+where a bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
+named. Needs the extras [fem] and [render].
+"""
 
 from __future__ import annotations
 
+import argparse
+import concurrent.futures
+import importlib
+import multiprocessing
 import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 
-from benchmarks.table.speed_error import main
+from benchmarks.measured_rows import finished, parser_of, printed
+from benchmarks.table.method import ROOT, Method
+
+from tactile_core.errors import TactileError
+from tactile_core.files import threads
+
+STAGES = ("mechanics", "translation", "pictures", "chain", "peers", "photographs")
+WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
+LEAVE_TRUTH = ("pictures", "chain")  # whose first method leaves the truth that the others are measured against
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Measure, print and write the results; returns the exit status."""
+    parser = parser_of(__doc__)
+    parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
+    parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")
+    parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
+    options = parser.parse_args(arguments)
+    unknown = [each for each in options.only if each.split(" ")[0] not in STAGES]
+    if unknown:
+        parser.error(f"--only: no stage {', '.join(unknown)}; there are {', '.join(STAGES)}")
+    threads.one_thread()  # here and in the processes that this starts: times are of one core
+    missing: dict[str, str] = {}
+    try:
+        methods = list(all_measured(options, missing))
+        rows = [each for method in methods for each in method.rows()]
+        if not options.only:
+            from benchmarks.table.promised import promised
+
+            found, tables = promised(options.quick)
+            rows += found
+    except TactileError as error:
+        print(error, file=sys.stderr)
+        return 2
+    printed(rows)
+    for name, why in missing.items():
+        print(f"left out: {name}, {why}", file=sys.stderr)
+    if not (options.quick or options.only):
+        from benchmarks.table.benchmark_page import write_report
+
+        write_report(ROOT / "docs", methods, rows, missing, tables)
+    return finished(rows, options.json)
+
+
+def stage_measured(
+    stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
+) -> Iterator[Method]:
+    """Measure every method of a stage; those that cannot run here are noted in ``missing``.
+
+    file : where the first method of pictures and chain leaves the others' truth; the photographs
+    only : words that name a stage, or a stage and a method; none for all
+    """
+    names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
+    wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
+    if wanted and stage in LEAVE_TRUTH:
+        wanted = list(dict.fromkeys([names[0], *wanted]))
+    for name in wanted:
+        began = time.perf_counter()
+        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            try:
+                found = pool.submit(one_measured, stage, name, quick, file).result()
+            except ModuleNotFoundError as error:
+                missing[f"{stage} {name}"] = f"no {error.name}"
+                continue
+        print(f"{stage} {name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+        if found is not None:
+            yield found
+
+
+def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
+    """Measure one method, in a process of its own, so that its memory and its first call are its own."""
+    measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
+    return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)
+
+
+def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
+    """Measure every method of every requested stage."""
+    methods = []
+    with tempfile.TemporaryDirectory() as scratch:
+        for stage in STAGES:
+            file = options.presses if stage == "photographs" else str(Path(scratch) / f"{stage}.npz")
+            if file is None:
+                missing[stage] = "no PRESSES given"
+            else:
+                methods += stage_measured(stage, options.quick, file, missing, options.only)
+    return methods
+
 
 if __name__ == "__main__":
     sys.exit(main())

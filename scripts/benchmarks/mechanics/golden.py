@@ -7,8 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tactile_core import accuracy
-from tactile_core.accuracy import Row, order, row
+from tactile_core.accuracy import Row, row
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
 from tactile_core.mechanics.finite_strain.solved_contact import ContactState
@@ -55,7 +54,6 @@ def rows(quick: bool) -> Iterator[Row]:
     yield row("golden_smallest_volume_ratio_1.8mm", quality, "1", 0.5, of=of, at_least=True)
     yield row("golden_time", time.perf_counter() - started, "s", of="five depths")
     if not quick:
-        yield from refinement()
         yield from in_space()
 
 
@@ -77,43 +75,3 @@ def in_space() -> Iterator[Row]:
             name = f"golden_quarter_{depth * 1e3:.1f}mm"
             yield row(f"{name}_error", error, "percent", TARGET, baseline=-100.0, of=of)
             yield row(f"{name}_time", time.perf_counter() - started, "s", of=of)
-
-
-def refinement() -> Iterator[Row]:
-    """Force and surface against a mesh of half the spacing, and the orders that follow."""
-    spacings = [0.4e-3, 0.2e-3, 0.1e-3, 0.05e-3]
-    finest = disc(0.025e-3)
-    exact = list(path(finest))
-    errors: dict[str, list[float]] = {"force": [], "shape": []}
-    for spacing in spacings:
-        contact = disc(spacing)
-        of = f"nodes {spacing * 1e3:g} mm apart, against 0.025 mm"
-        found = list(path(contact))
-        for index in (1, 3):
-            force = 100 * (found[index].force[1] / exact[index].force[1] - 1)
-            depth = f"{found[index].depth * 1e3:.1f}mm"
-            yield row(f"disc_force_error_{depth}_{spacing * 1e3:g}", force, "percent", of=of)
-            shape, largest = _shape(contact, found[index], finest, exact[index])
-            yield row(f"disc_shape_rms_{depth}_{spacing * 1e3:g}", 1e6 * shape, "um", of=of)
-            yield row(f"disc_shape_max_{depth}_{spacing * 1e3:g}", 1e6 * largest, "um", of=of)
-        errors["force"].append(abs(force))
-        errors["shape"].append(shape)
-    for name, values in errors.items():
-        # the contact's edge falls between nodes: the first order in the spacing is certain, the second usual
-        yield row(f"disc_{name}_order", order(spacings, values), "1", 1.0, of="1.4 mm deep", at_least=True)
-
-
-def _shape(
-    contact: FiniteStrainContact, touch: ContactState, finer: FiniteStrainContact, exact: ContactState
-) -> tuple[float, float]:
-    """Vector rms over surface nodes that move more than 10 um, and the maximum, m."""
-    import scipy.interpolate
-
-    def moved(of: FiniteStrainContact, at: ContactState):  # noqa: ANN202
-        surface = of.solid.mesh.surface
-        return of.solid.mesh.nodes[surface, 0], at.state.displacement[surface]
-
-    radii, displacement = moved(contact, touch)
-    truth = scipy.interpolate.CubicSpline(*moved(finer, exact))(radii)
-    pair = displacement[None], truth[None]
-    return float(accuracy.rms_in_contact(*pair)[0]), float(accuracy.max_error(*pair)[0])

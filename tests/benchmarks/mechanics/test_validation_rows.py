@@ -5,8 +5,8 @@ import shutil
 from pathlib import Path
 
 import pytest
+import validate_mechanics
 from benchmarks.measured_rows import read_table
-from benchmarks.mechanics import validate
 from benchmarks.mechanics.golden import GOLDEN_FORCE
 
 from tactile_core.accuracy import failed, line, order, row
@@ -14,7 +14,7 @@ from tactile_core.accuracy import failed, line, order, row
 
 @pytest.fixture
 def script():
-    return validate
+    return validate_mechanics
 
 
 def test_a_row_is_judged_by_its_size_or_from_below():
@@ -41,7 +41,7 @@ def test_report_holds_every_row(tmp_path):
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
     page = Path(__file__).parents[3] / "docs" / "mechanics.md"
     shutil.copy(page, tmp_path)
-    validate.write(tmp_path / "mechanics.md", {"Golden": forces, "Speed": speed})
+    validate_mechanics.write(tmp_path / "mechanics.md", {"Golden": forces, "Speed": speed})
     text = (tmp_path / "mechanics.md").read_text(encoding="utf-8")
     table = read_table(tmp_path / "mechanics.csv")
     assert [each["name"] for each in table] == [each["name"] for each in forces + speed]

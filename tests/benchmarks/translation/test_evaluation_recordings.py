@@ -7,9 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import evaluate_translation
 import numpy as np
 import pytest
-from benchmarks.translation import evaluation, slides
+from benchmarks.translation import slides
 from conftest import SLIDE_HEADER
 
 from tactile_core.errors import TactileError
@@ -183,11 +184,11 @@ def test_our_rows_are_the_numbers_that_the_tool_prints(judged):
 
 
 def test_the_script_prints_its_rows_and_tells_bad_input(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(evaluation.translate, "translate", lambda recording, **options: network(recording))
+    monkeypatch.setattr(evaluate_translation.translate, "translate", lambda recording, **options: network(recording))
     arguments = ["--recordings", str(tmp_path), "--json", str(tmp_path / "rows.json")]
-    assert evaluation.main(arguments) == 2 and "no *_bio.csv" in capsys.readouterr().err
+    assert evaluate_translation.main(arguments) == 2 and "no *_bio.csv" in capsys.readouterr().err
     write_slide(tmp_path, "mat1_1")
-    status = evaluation.main(arguments)
+    status = evaluate_translation.main(arguments)
     printed = capsys.readouterr()
     assert "recordings_force_rank_median" in printed.out and (tmp_path / "rows.json").exists()
     assert status == int("MISSED" in printed.err)

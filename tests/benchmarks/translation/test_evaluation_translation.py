@@ -7,10 +7,11 @@ import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
+import evaluate_translation
 import numpy as np
 import pytest
 from benchmarks.measured_rows import read_table
-from benchmarks.translation import evaluation, test_set
+from benchmarks.translation import test_set
 from benchmarks.translation.test_set import GAIN, NOISE, as_read
 from small_pairs import bodies, write_pairs
 
@@ -154,8 +155,12 @@ def test_the_patch_of_a_dent_is_where_it_bends_inward():
 def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(request.config.rootpath)
     shutil.copy("docs/translation.md", tmp_path / "card.md")
-    monkeypatch.setattr(evaluation, "QUICK_PRESSES", 29)  # prime as well; targets are met on the whole set alone
-    status = evaluation.main(["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")])
+    monkeypatch.setattr(
+        evaluate_translation, "QUICK_PRESSES", 29
+    )  # prime as well; targets are met on the whole set alone
+    status = evaluate_translation.main(
+        ["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")]
+    )
     rows = json.loads((tmp_path / "rows.json").read_text())
     missed = [row["name"] for row in rows if row["ok"] is False and row["unit"] not in COSTS]
     assert status == int(bool(missed))
@@ -174,7 +179,7 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
 
 def test_a_file_that_is_no_test_set_is_refused(tmp_path, capsys):
     (tmp_path / "a.h5").write_bytes(b"nothing")
-    assert evaluation.main(["--test-set", str(tmp_path / "a.h5")]) == 2
+    assert evaluate_translation.main(["--test-set", str(tmp_path / "a.h5")]) == 2
     assert "a.h5" in capsys.readouterr().err
 
 
