@@ -44,19 +44,6 @@ TOOLS = {
     "docs": (["sphinx", "--fail-on-warning", "--keep-going", "-q", "docs", "out/site"],),
 }
 STAMP = "tactile-dev.json"
-LOG = "tactile-install.log"
-NETWORK_SIGNS = (
-    "NewConnectionError",
-    "NameResolutionError",
-    "ConnectTimeoutError",
-    "ReadTimeoutError",
-    "ProxyError",
-    "Max retries exceeded",
-    "Failed to establish",
-    "Temporary failure",
-    "SSLError",
-    "(from versions: none)",
-)
 
 
 class SetupError(Exception):
@@ -223,10 +210,13 @@ def install(
     if "train" in missing:
         say("torch takes up to 3,000 MB; its CPU build 190: PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu")
     write_stamp(folder, dict(wanted, extras=[], state="installing"))
-    failure = run_pip(python, folder, what, numpy)
-    write_stamp(folder, dict(wanted, extras=[] if failure else sorted(there | {"", *extras}), state="ready"))
-    if failure:
-        raise SetupError(failure)
+    installed = run_pip(python, folder, what, numpy)
+    write_stamp(folder, dict(wanted, extras=sorted(there | {"", *extras}) if installed else [], state="ready"))
+    if not installed:
+        raise SetupError(
+            "pip could not install the packages; its reason is above. Where it reaches no package index, check the "
+            "network, or set PIP_INDEX_URL or HTTPS_PROXY; then run this again"
+        )
     return python
 
 
@@ -274,8 +264,8 @@ def why_unusable(python: Path, have: dict) -> str | None:
     return None if found == python_version() else f"it holds Python {found}, this is {python_version()}"
 
 
-def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> str | None:
-    """Run pip, showing its downloads and keeping all it says in a log. Returns why it failed, or None."""
+def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> bool:
+    """Run pip, which says itself what it does; returns false where it failed."""
     constraints = ROOT / "constraints.txt"
     if numpy:
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))
@@ -283,36 +273,7 @@ def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None
         constraints.write_text(text, encoding="utf-8")
     # Python compiles what it imports; of all that lies in these packages that is a small part.
     command = [str(python), "-m", "pip", "install", "--no-input", "--no-compile", "--constraint", str(constraints)]
-    log = folder / LOG
-    started = subprocess.Popen(
-        [*command, *what],
-        cwd=str(ROOT),
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        stdin=subprocess.DEVNULL,
-    )
-    with started as process, open(str(log), "w", encoding="utf-8") as record:
-        for raw in process.stdout:
-            line = raw.decode(errors="replace")
-            record.write(line)
-            if line.lstrip().startswith("Downloading"):
-                print("  " + line.strip(), flush=True)
-    return why_pip_failed(log.read_text(encoding="utf-8"), log) if process.returncode else None
-
-
-def why_pip_failed(text: str, log: Path) -> str:
-    """Return one sentence from pip's output."""
-    if any(sign in text for sign in NETWORK_SIGNS):
-        return (
-            "the package index cannot be reached, or lacks a package. Check the network, or set PIP_INDEX_URL or "
-            f"HTTPS_PROXY, and run this again; pip's words are in {log}"
-        )
-    if "No space left on device" in text:
-        return f"the disk is full. Make room and run this again; pip's words are in {log}"
-    errors = [line.strip() for line in text.splitlines() if line.lstrip().lower().startswith("error")]
-    last = errors[-1] if errors else "it gave no reason"
-    return f"pip could not install the packages: {last}. Its words are in {log}"
+    return not subprocess.call([*command, *what], cwd=str(ROOT), env=environment())
 
 
 def environment() -> dict[str, str]:

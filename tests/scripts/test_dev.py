@@ -24,14 +24,14 @@ def dev():
 
 @pytest.fixture
 def pip(dev, monkeypatch):
-    """A pip that does nothing but note what it was asked for; set ``pip.failure`` to make it fail."""
+    """A pip that does nothing but note what it was asked for; set ``pip.works`` false to make it fail."""
 
     class Pip(list):
-        failure = None
+        works = True
 
         def __call__(self, python, folder, what, numpy):
             self.append((what[-1], numpy))
-            return self.failure
+            return self.works
 
     pip = Pip()
     monkeypatch.setattr(dev, "run_pip", pip)
@@ -73,10 +73,10 @@ def test_other_versions_install_again(change, dev, pip, venv, monkeypatch):
 
 
 def test_a_failed_installation_is_told_and_tried_again(dev, pip, venv):
-    pip.failure = "no network"
-    with pytest.raises(dev.SetupError, match="no network"):
+    pip.works = False
+    with pytest.raises(dev.SetupError, match="pip could not install"):
         dev.install(venv, ())
-    pip.failure = None
+    pip.works = True
     dev.install(venv, ())
     dev.install(venv, ())
     assert len(pip) == 2
@@ -90,7 +90,7 @@ def test_an_interrupted_installation_is_made_anew(dev, venv, monkeypatch, capsys
     with pytest.raises(KeyboardInterrupt):
         dev.install(venv, ())
     (venv / "debris").write_text("x")
-    monkeypatch.setattr(dev, "run_pip", lambda *arguments: None)
+    monkeypatch.setattr(dev, "run_pip", lambda *arguments: True)
     dev.install(venv, ())
     assert "again: its installation was interrupted" in capsys.readouterr().out
     assert not (venv / "debris").exists()
@@ -128,26 +128,13 @@ def test_old_pythons_can_read_the_script_far_enough_to_be_told():
     ast.parse(SCRIPT.read_text(encoding="utf-8"), feature_version=(3, 7))
 
 
-@pytest.mark.parametrize(
-    ("said", "reported"),
-    [
-        ("WARNING: Retrying ... NewConnectionError(...)\nERROR: No matching distribution found", "cannot be reached"),
-        ("ERROR: [Errno 28] No space left on device", "disk is full"),
-        ("Collecting numpy\nERROR: No matching distribution found for numpy==9", "No matching distribution found for"),
-        ("", "no reason"),
-    ],
-)
-def test_the_failures_of_pip_are_told_in_a_sentence(said, reported, dev):
-    assert reported in dev.why_pip_failed(said, Path("log"))
-
-
-def test_pip_without_a_network_is_told_in_one_line(dev, tmp_path, monkeypatch):
+def test_pip_without_a_network_is_told(dev, tmp_path, monkeypatch):
     """The real pip, on an index that nobody serves."""
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     for name, value in {"INDEX_URL": "http://127.0.0.1:9/simple", "CONFIG_FILE": os.devnull, "RETRIES": "0"}.items():
         monkeypatch.setenv(f"PIP_{name}", value)
-    with pytest.raises(dev.SetupError, match="the package index cannot be reached"):
+    with pytest.raises(dev.SetupError, match="reaches no package index, check the network"):
         dev.install(tmp_path / "venv", ())
 
 
