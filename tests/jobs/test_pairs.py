@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from msgspec import structs
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
+from tactile_core.jobs import pairs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.local import InProcess, Local
 from tactile_core.jobs.pairs import make_pairs, plan, wanted
@@ -22,6 +24,7 @@ from tactile_core.simulation.pairs_writer import card, card_path
 from tactile_core.simulation.scene import load_scene
 
 SCENE = "scenes/press_sphere"
+COUNT = 40  # contacts
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +35,7 @@ def scene(request):
 @pytest.fixture(scope="module")
 def made(scene, tmp_path_factory):
     out = tmp_path_factory.mktemp("pairs") / "pairs.h5"
-    make_pairs(scene, 40, 7, out)
+    make_pairs(scene, COUNT, 7, out)
     return out
 
 
@@ -44,7 +47,7 @@ def test_file_holds_what_it_says(made):
         assert file.attrs["biotac_nodes_sha256"] == sensors.biotac_surface().sha256
         assert json.loads(file.attrs["indenters"]) == ["sphere_7mm", "sphere_14mm"]
         assert set(file) == set(pairs_writer.units())
-        assert all(len(file[name]) == 40 and file[name].attrs["unit"] for name in file)
+        assert all(len(file[name]) == COUNT and file[name].attrs["unit"] for name in file)
         biotac, digit = file["force"][()], file["force_digit"][()]
         depth, press = file["depth_biotac"][()], file["press"][()]
         moved = file["displacement_digit"][()] * file["displacement_digit"].attrs["scale"]
@@ -54,7 +57,7 @@ def test_file_holds_what_it_says(made):
     # the same axial force on both; the lateral parts differ with the shape of the surface
     np.testing.assert_allclose(np.linalg.norm(biotac, axis=1), np.linalg.norm(digit, axis=1), rtol=0.05)
     assert patch.any(axis=1).all()
-    for contact in range(40):
+    for contact in range(COUNT):
         deepest = np.argmax(np.linalg.norm(moved[contact], axis=1))
         touched = sensors.digit_surface().rest[patch[contact]]
         apart = np.linalg.norm(touched - sensors.digit_surface().rest[deepest], axis=1).min()
@@ -63,34 +66,45 @@ def test_file_holds_what_it_says(made):
 
 def test_the_card_lies_beside_the_file(made):
     beside = json.loads(card_path(made).read_text(encoding="utf-8"))
-    assert beside == card(made) and beside["contacts"] == 40
+    assert beside == card(made) and beside["contacts"] == COUNT
 
 
-def interrupt(scene, out):
-    """Start to make pairs and stop after the first block."""
+def parts_of(out):
+    return out.with_name(out.name + ".parts")
+
+
+@pytest.fixture(scope="module")
+def begun(scene, tmp_path_factory):
+    """Pairs that were stopped after the first block."""
+    out = tmp_path_factory.mktemp("begun") / "pairs.h5"
 
     def stop(done, known):
-        if list(out.with_name(out.name + ".parts").glob("shards/*.h5")):
+        if list(parts_of(out).glob("shards/*.h5")):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        make_pairs(scene, 40, 7, out, progress=stop)
+        make_pairs(scene, COUNT, 7, out, progress=stop)
+    return out
 
 
-def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, tmp_path):
-    resumed = tmp_path / "resumed.h5"
+@pytest.fixture
+def interrupted(begun, tmp_path):
+    """Where a run of one's own was stopped after its first block."""
+    shutil.copytree(parts_of(begun), parts_of(tmp_path / begun.name))
+    return tmp_path / begun.name
 
-    interrupt(scene, resumed)
-    assert not resumed.exists() and resumed.with_name("resumed.h5.parts").exists()
-    make_pairs(scene, 40, 7, resumed, place=lambda folder: Local(folder, 2))
-    assert resumed.read_bytes() == made.read_bytes()
-    assert not resumed.with_name("resumed.h5.parts").exists()
+
+def test_two_workers_and_a_resumed_run_make_the_same_bytes(made, scene, interrupted):
+    assert not interrupted.exists() and parts_of(interrupted).exists()
+    make_pairs(scene, COUNT, 7, interrupted, place=lambda folder: Local(folder, 2))
+    assert interrupted.read_bytes() == made.read_bytes()
+    assert not parts_of(interrupted).exists()
 
 
 def test_parts_of_an_array_make_the_same_bytes(made, scene, tmp_path):
     """Two runners share the job of a plan, and a third puts together what they made."""
     out = tmp_path / "pairs.h5"
-    job, _, _ = plan(scene, 40, 7, out)
+    job, _, _ = plan(scene, COUNT, 7, out)
     with runs.begun(out, job) as folder:
         pass
     shards = []
@@ -99,7 +113,7 @@ def test_parts_of_an_array_make_the_same_bytes(made, scene, tmp_path):
             shards.append(runs.run(folder, job, InProcess(folder), part, lambda done, known: None).made)
     assert min(shards) >= 1
     before = len(list(folder.glob("shards/*.h5")))
-    make_pairs(scene, 40, 7, out, progress=lambda done, known: before <= known)
+    make_pairs(scene, COUNT, 7, out, progress=lambda done, known: before <= known)
     assert out.read_bytes() == made.read_bytes() and not folder.exists()
 
 
@@ -178,12 +192,9 @@ def test_an_existing_file_is_kept(made, scene):
     assert made.read_bytes() == before
 
 
-def test_parts_of_another_seed_are_refused(scene, tmp_path):
-    out = tmp_path / "pairs.h5"
-
-    interrupt(scene, out)
+def test_parts_of_another_seed_are_refused(scene, begun):
     with pytest.raises(TactileError, match="another scene, seed"):
-        make_pairs(scene, 40, 8, out)
+        make_pairs(scene, COUNT, 8, begun)
 
 
 def test_scene_without_pairs_and_bad_count(request, tmp_path):
@@ -204,14 +215,12 @@ def test_an_impossible_indenter_is_refused_before_anything_is_written_also_by_wo
     assert list(tmp_path.iterdir()) == [bad]
 
 
-def test_a_block_cut_short_is_made_again(scene, made, tmp_path):
-    out = tmp_path / "pairs.h5"
-
-    interrupt(scene, out)
-    block = next(out.with_name("pairs.h5.parts").glob("shards/*.h5"))
+def test_a_block_cut_short_is_made_again(scene, made, interrupted, monkeypatch):
+    monkeypatch.setattr(pairs, "GROWTH", 1)  # a block without contacts asks for one more, not for eight
+    block = next(parts_of(interrupted).glob("shards/*.h5"))
     block.write_bytes(block.read_bytes()[:1000])
-    make_pairs(scene, 40, 7, out)
-    assert out.read_bytes() == made.read_bytes()
+    make_pairs(scene, COUNT, 7, interrupted)
+    assert interrupted.read_bytes() == made.read_bytes()
 
 
 def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):

@@ -16,7 +16,7 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs.dataset import collected, guess
+from tactile_core.jobs.dataset import collected, guess, survival
 from tactile_core.jobs.dataset import recipe as recipes
 from tactile_core.jobs.dataset.summary import ARRAYS, PICTURE, RAW, Summary
 from tactile_core.jobs.dataset.survival import ALWAYS, rows
@@ -31,6 +31,15 @@ else:
     LAYOUTS = "imagefolder,lerobot"
 OBJECTS, SESSIONS = ("ball", "rolled"), 6
 FRAMES = 30  # of a recording: every second of 60
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_fits():
+    """Two folds and two random maps: what tells the labels apart is told by any number of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(survival, "FOLDS", 2)
+        patch.setattr(survival, "MAPS", 2)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -274,7 +283,7 @@ def test_a_name_that_no_table_can_hold_is_left_out(folder, recipe, tmp_path, cap
 
 def test_another_gel_is_a_target(folder, recipe, tmp_path):
     pytest.importorskip("scipy", reason="scipy is not installed")
-    own = small(folder, recipe, tmp_path)
+    own = small(folder, recipe, tmp_path, ("every = 20", "every = 55"))
     assert run(*own, "--target", "gelsight_mini", "--to", "imagefolder,npz") == 0
     with np.load(own[2] / "npz" / "00000_ball_0.npz") as arrays:
         assert "expected_error_gelsight_mini" in arrays and "latent_gelsight_mini" not in arrays
