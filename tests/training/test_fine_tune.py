@@ -12,6 +12,7 @@ h5py = pytest.importorskip("h5py")
 from tactile_core.cli.main import main  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.simulation.pairs_file import read_pairs  # noqa: E402
+from tactile_core.training import fine_tune as fine_tuning  # noqa: E402
 from tactile_core.training.fine_tune import fine_tune, read_labelled  # noqa: E402
 from tactile_core.translation import networks  # noqa: E402
 from tactile_core.translation.gel_place import on_gel  # noqa: E402
@@ -40,7 +41,8 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys):
             np.testing.assert_array_equal(tensor, after.tensors[net][name])
 
 
-def test_same_bytes_again(arrays, tmp_path):
+def test_same_bytes_again(arrays, tmp_path, monkeypatch):
+    monkeypatch.setattr(fine_tuning, "EPOCHS", 4)
     path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     for name in ("a", "b"):
         fine_tune(path, tmp_path / name)
