@@ -22,6 +22,7 @@ from tactile_core.sensors.calibration import Calibration, Response
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
 # Presses that were kept from the fit of the calibration that ships.
+SHAPE = 120, 160  # px: of a DIGIT's pictures half the size, at which fits look; a quarter of the time
 KEPT_APART = ["0003.png", "0018.png", "0033.png", "0036.png", "0039.png"]
 
 
@@ -47,7 +48,8 @@ def other_unit() -> Calibration:
     right = ((-6e3, 0.0, 0.0), (0.0, 8e3, 0.0), (0.0, 1e3, -3e3))
     down = ((2e3, 0.0, 0.0), (0.0, -4e3, 0.0), (0.0, 0.0, 5e3))
     camera = dataclasses.replace(plain.camera, px_per_mm_x=19.4, px_per_mm_y=19.2)
-    return dataclasses.replace(plain, camera=camera, leds=leds).with_gain(Response(centre, right, down))
+    unit = dataclasses.replace(plain, camera=camera, leds=leds).with_gain(Response(centre, right, down))
+    return unit.at_size(*SHAPE)
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +72,8 @@ def test_known_numbers_are_found_again(found: Calibrated) -> None:
         assert np.degrees(np.arccos(cosine)) < 1
         np.testing.assert_allclose(led.position, true.position, atol=0.6e-3)
         assert led.radius == pytest.approx(true.radius, abs=0.35e-3)
-    assert unit.camera.px_per_mm_x == pytest.approx(19.4, rel=0.01)
-    assert unit.camera.px_per_mm_y == pytest.approx(19.2, rel=0.01)
+    assert unit.camera.px_per_mm_x == pytest.approx(19.4 / 2, rel=0.01)
+    assert unit.camera.px_per_mm_y == pytest.approx(19.2 / 2, rel=0.01)
     np.testing.assert_allclose(unit.gain.centre, truth.gain.centre, atol=6)  # levels a unit of radiance
 
 
@@ -109,8 +111,8 @@ def test_one_press_tells_less_than_five(folder: Path, found: Calibrated) -> None
 def test_photograph_of_something_else_is_left_out(folder: Path, tmp_path: Path) -> None:
     for file in folder.iterdir():
         (tmp_path / file.name).write_bytes(file.read_bytes())
-    strange = np.full((320, 240, 3), 128, np.uint8)
-    strange[60:260, 100:110] = (20, 220, 20)
+    strange = np.full((160, 120, 3), 128, np.uint8)
+    strange[30:130, 50:55] = (20, 220, 20)
     Image.fromarray(strange).save(tmp_path / "strange.png")
     photographs = chosen(read_photographs(tmp_path, folder.parent / "untouched.png"), ["press_0.png", "strange.png"])
     done = calibrate(photographs, 2 * BALL, plain_unit(), unit="other", quick=True)
@@ -145,7 +147,7 @@ def test_ball_that_does_not_fit_is_refused(folder: Path) -> None:
 
 @pytest.mark.usefixtures("coarse_fits")
 def test_press_cut_by_the_edge_is_flagged(tmp_path: Path) -> None:
-    folder = write_photographs(tmp_path / "presses", plain_unit(), ((5.6, 0.0, 1.0), (0.0, 0.0, 0.8)))
+    folder = write_photographs(tmp_path / "presses", plain_unit().at_size(*SHAPE), ((5.6, 0.0, 1.0), (0.0, 0.0, 0.8)))
     photographs = read_photographs(folder, tmp_path / "untouched.png")
     cut, whole = evaluate_unit(plain_unit(), photographs, BALL, search_radius=False)
     assert any("cut by the picture's edge" in flag for flag in cut.flags)
@@ -155,12 +157,10 @@ def test_press_cut_by_the_edge_is_flagged(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("coarse_fits")
 def test_larger_photographs_are_the_same_view(tmp_path: Path) -> None:
-    large = plain_unit().at_size(480, 640)
-    folder = write_photographs(tmp_path / "presses", large, ((1.5, -2.0, 0.9),))
-    (tried,) = evaluate_unit(
-        plain_unit(), read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False
-    )
-    assert tried.picture.shape == (640, 480, 3)
+    folder = write_photographs(tmp_path / "presses", plain_unit(), ((1.5, -2.0, 0.9),))
+    photographs = read_photographs(folder, tmp_path / "untouched.png")
+    (tried,) = evaluate_unit(plain_unit().at_size(*SHAPE), photographs, BALL, search_radius=False)
+    assert tried.picture.shape == (320, 240, 3)
     assert tried.ball.right == pytest.approx(1.5e-3, abs=0.03e-3)
     assert tried.ball.depth == pytest.approx(0.9e-3, abs=0.03e-3)
     assert tried.metrics["roi_l1"] < 2 < tried.baseline["roi_l1"]  # levels, of which the noise makes 0.9
@@ -186,7 +186,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     assert "roi_psnr" in said.out and str(out) in said.out and "tell too little of" in said.err
     assert all(f"press_{number}.png: used; " in said.err for number in (0, 3))
     assert f"next: look at {tmp_path / 'unit.png'}" in said.err and "the background alone" in said.err
-    assert Image.open(tmp_path / "unit.png").size[0] > 3 * 240
+    assert Image.open(tmp_path / "unit.png").size[0] > 3 * SHAPE[0]
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"
     words = ["calibrate", "--test", str(out), *common, "--json", str(rows), "--sheet", str(sheet)]

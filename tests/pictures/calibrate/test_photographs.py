@@ -150,11 +150,12 @@ def test_a_quadratic_is_found_beside_a_press():
 
 
 def test_presses_are_found_under_a_drifted_light(tmp_path):
-    folder = write_photographs(tmp_path / "presses", plain_unit(), PLACES[:3])
+    unit = plain_unit().at_size(120, 160)
+    folder = write_photographs(tmp_path / "presses", unit, PLACES[:3])
     for file in sorted(folder.iterdir()):
-        picture = np.asarray(Image.open(file)).astype(float) + DRIFT
+        picture = np.asarray(Image.open(file)).astype(float) + DRIFT[::2, ::2]
         Image.fromarray(np.rint(picture).clip(0, 255).astype(np.uint8)).save(file)
-    tried = evaluate_unit(plain_unit(), read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False)
+    tried = evaluate_unit(unit, read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False)
     for each, (right, down, depth) in zip(tried, PLACES, strict=False):
         assert each.ball.right == pytest.approx(1e-3 * right, abs=0.15e-3)
         assert each.ball.down == pytest.approx(1e-3 * down, abs=0.15e-3)
