@@ -5,7 +5,7 @@
 
 Fits begin at round numbers (`start.toml`) or at the unit that ships, end on the fast picture, and are tried on
 photographs that they have not seen. `levels` compares how dark, bright and colourful photographs are with pictures of
-real recordings.
+real recordings; `told_apart`, how well a classifier tells the two.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from tactile_core.pictures.background import read_photograph
 from tactile_core.pictures.calibrate.evaluate import Evaluation, evaluate_unit, mean_metrics
 from tactile_core.pictures.calibrate.fit import calibrate
 from tactile_core.pictures.calibrate.photographs import CHANGE, Photographs, chosen, press_of, read_photographs
-from tactile_core.pictures.renderer import Renderer
+from tactile_core.pictures.renderer import Renderer, camera_noise
 from tactile_core.recordings import PrepareOptions, read
 from tactile_core.recordings.assemble import assemble
 from tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
@@ -35,6 +35,7 @@ from tactile_core.translation.translate import translate
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, START = ROOT / "docs/calibration.csv", ROOT / "scenes/calibrations/start.toml"
 DIAMETER = 6e-3  # m, of the balls
+PATCH = 32  # px, of pictures that a classifier sees
 FRAMES = 100, 25  # between those drawn of the long recording, and of the short one
 
 
@@ -157,8 +158,51 @@ def level_rows(pictures: np.ndarray, rest: np.ndarray, of: str) -> Iterator[Row]
         yield row(f"level_{percent}", float(np.percentile(seen, percent)), "levels", of=of)
 
 
+def told_apart(data: Path) -> Iterator[Row]:
+    """Yield rows of a classifier that tells photographs from their pictures: its share right on pieces of photographs
+    that it was not trained on; 0.5 if they cannot be told. A picture is drawn on the photographs' background."""
+    unit, known = load_calibration(), own_unit(data)
+    tried = evaluate_unit(unit, known, DIAMETER / 2, search_radius=False)
+    drawn = [np.random.default_rng(number) for number in range(len(tried))]
+    grain = [camera_noise(unit, random) for random in drawn]
+    white = [random.standard_normal(noise.shape) * unit.noise for random, noise in zip(drawn, grain, strict=True)]
+    for of, noises in (("without noise", [0.0] * len(tried)), ("with --noise", grain), ("with white noise", white)):
+        pictures = [np.rint(each.picture + noise) for each, noise in zip(tried, noises, strict=True)]
+        photographs = [each.press.picture for each in tried]
+        yield row("told_apart", share_told(photographs, pictures), "1", 0.5, of=f"{len(tried)} pictures {of}")
+
+
+def share_told(photographs: list[np.ndarray], pictures: list[np.ndarray]) -> float:
+    """Return the share of pieces that a support vector machine tells, each pair of pictures held out in turn."""
+    from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+    from sklearn.svm import SVC
+
+    pairs = [(patch_statistics(one), patch_statistics(other)) for one, other in zip(photographs, pictures, strict=True)]
+    statistics = np.concatenate([np.concatenate(pair) for pair in pairs])
+    real = np.concatenate([[True] * len(one) + [False] * len(other) for one, other in pairs])
+    group = np.repeat(np.arange(len(pairs)), [len(one) + len(other) for one, other in pairs])
+    machine = make_pipeline(StandardScaler(), SVC())
+    return float(cross_val_score(machine, statistics, real, groups=group, cv=LeaveOneGroupOut()).mean())
+
+
+def patch_statistics(picture: np.ndarray) -> np.ndarray:
+    """Return, for squares of PATCH px of a picture (H, W, 3), the size of grey levels, of their slopes and second
+    differences, how like neighbouring slopes are, and how like the slopes of two colours."""
+    levels, found = picture.astype(float), []
+    for down, right in np.ndindex(levels.shape[0] // PATCH, levels.shape[1] // PATCH):
+        patch = np.moveaxis(levels[down * PATCH :, right * PATCH :][:PATCH, :PATCH], -1, 0)
+        right, down = np.diff(patch, axis=2), np.diff(patch, axis=1)
+        sizes = [each.std((1, 2)) for each in (patch, right, down, np.diff(right, axis=2), np.diff(down, axis=1))]
+        along = [(right[:, :, 1:] * right[:, :, :-1]).mean((1, 2)), (down[:, 1:] * down[:, :-1]).mean((1, 2))]
+        between = [(right[a] * right[b]).mean() for a, b in ((0, 1), (1, 2), (0, 2))]
+        found.append(np.concatenate([*(np.log(0.3 + size) for size in sizes), *along, between]))
+    return np.array(found)
+
+
 PARTS: dict[str, Callable[[Path], Iterator[Row]]] = {
-    each.__name__: each for each in (levels, five, thirds, fifths)
+    each.__name__: each for each in (levels, told_apart, five, thirds, fifths)
 }  # fmt: skip
 
 if __name__ == "__main__":
