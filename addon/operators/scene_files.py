@@ -121,7 +121,7 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
 
 
 class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
-    """Write what the gel's picture is made of as a scene that any Mitsuba 3 renders: .xml, .ply and .camera.exr"""
+    """Write the gel as a scene for any Mitsuba 3: .xml, .ply, and .camera.exr, which turns radiance into levels"""
 
     bl_idname = "tactile.export_mitsuba"
     bl_label = "Export Mitsuba Scene"

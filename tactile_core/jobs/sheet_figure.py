@@ -250,8 +250,8 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write each column's force (k, 3) N and `trust`, the arguments of `trust_words.in_words`, and a key to the
-        maps."""
+        """Write each column's force (k, 3) N and `trust`, the first four arguments (k,) of `trust_words.in_words`, and
+        a key."""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]

@@ -37,7 +37,7 @@ def penetration_between(
 ) -> float:
     """Return the penetration, m, of a surface (rows, columns, 3) m into a near body, halfway between nodes.
 
-    Raises PenetrationError for a body ``depth`` m in, where that is too much: also more than a share of the depth.
+    Raises PenetrationError where it is over 0.1 mm and over ``share`` of ``depth``, m, of the body.
     """
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))

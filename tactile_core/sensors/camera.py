@@ -105,12 +105,12 @@ class Camera:
 
     @property
     def right(self) -> np.ndarray:
-        """Image coordinate (width,) m of the pixel centres of a row at height zero, to the right from the middle."""
+        """Places (width,) m of a row's pixel centres at height zero, to the right from the picture's middle."""
         return (np.arange(self.width) + 0.5 - self.width / 2) * self.pixel_size[0]
 
     @property
     def down(self) -> np.ndarray:
-        """Image coordinate (height,) m of the pixel centres of a column at height zero, down from the middle."""
+        """Places (height,) m of a column's pixel centres at height zero, down from the picture's middle."""
         return (np.arange(self.height) + 0.5 - self.height / 2) * self.pixel_size[1]
 
     @property

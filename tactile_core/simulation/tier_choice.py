@@ -37,7 +37,7 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return each tier's error, um, at a depth over the thickness, the full tier's own included, and ms a contact."""
+    """Return each tier's largest error, um, up to a share of the thickness (fast adds full's), and ms a contact."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
         raise TactileError("--error", f"no errors are measured on the {title(sensor)}", expected, advice)

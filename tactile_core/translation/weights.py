@@ -187,7 +187,7 @@ def card_bytes(card: dict) -> bytes:
 
 def read_card(folder: str | os.PathLike) -> tuple[dict, str]:
     """Read a weights folder's model card and the SHA-256 of its bytes, which identifies the weights: the card holds the
-    hash of every file. Raises TactileError if it is missing, not JSON, or of another format."""
+    hash of every file. Raises TactileError if it is missing, not JSON, or of another format or polarity."""
     path = Path(folder) / CARD_NAME
     data = read_bytes(path)
     try:

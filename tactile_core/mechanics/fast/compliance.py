@@ -193,7 +193,7 @@ def build(solid: Solid) -> dict[str, np.ndarray]:
 
 
 def condensed(solid: Solid) -> tuple[Half, Half]:
-    """Condense the even and the odd half of a solid to its surface; loads: ``kept_loads``, then the fluid's swell.
+    """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, in a skin, the fluid's swell.
 
     Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where the memory does not
     suffice.

@@ -130,7 +130,7 @@ class EdgeContactProblem(ContactProblem):
 
 
 class InterpolatedPoints(NamedTuple):
-    """Points of the surface's cubic interpolation; nodes, weights : (v, 16), of the sums of nodes that they are."""
+    """Points between nodes, as sums of 16; nodes : (v, 16), numbers among touchable ones; weights : (v, 16)"""
 
     nodes: np.ndarray
     weights: np.ndarray
