@@ -3,7 +3,6 @@
     python scripts/benchmark.py                      everything; writes docs/benchmark.*
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
-    python scripts/benchmark.py PRESSES              pictures beside photographs too: a folder of a 6 mm ball's presses
 
 Stages: contact mechanics by tier and sensor; translation; pictures by preset; the whole chain from signals to pictures;
 pictures by others' programs, where they are installed.
@@ -31,15 +30,16 @@ from benchmarks.table.method import ROOT, Method
 from tactile_core.errors import TactileError
 from tactile_core.files import threads
 
-STAGES = ("mechanics", "translation", "pictures", "chain", "peers", "photographs")
-WITH_FILE = ("pictures", "chain", "photographs")  # which take a file or a folder
-LEAVE_TRUTH = ("pictures", "chain")  # whose first method leaves the truth that the others are measured against
+STAGES = ("mechanics", "translation", "pictures", "chain", "peers")
+LEAVE_TRUTH = (
+    "pictures",
+    "chain",
+)  # whose first method leaves the truth that the others are measured against, in a file
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure, print and write the results; returns the exit status."""
     parser = parser_of(__doc__)
-    parser.add_argument("presses", nargs="?", metavar="PRESSES", help="folder of photographs")
     parser.add_argument("--quick", action="store_true", help="fewer contacts, coarser reference pictures")
     parser.add_argument("--only", nargs="+", default=(), metavar="STAGE", help="measure these alone; writes no report")
     options = parser.parse_args(arguments)
@@ -74,7 +74,7 @@ def stage_measured(
 ) -> Iterator[Method]:
     """Measure every method of a stage; those that cannot run here are noted in ``missing``.
 
-    file : where the first method of pictures and chain leaves the others' truth; the photographs
+    file : where the first method of pictures and chain leaves the others' truth
     only : words that name a stage, or a stage and a method; none for all
     """
     names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
@@ -97,7 +97,7 @@ def stage_measured(
 def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
     """Measure one method, in a process of its own, so that its memory and its first call are its own."""
     measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
-    return measure(name, quick, file) if stage in WITH_FILE else measure(name, quick)
+    return measure(name, quick, file) if stage in LEAVE_TRUTH else measure(name, quick)
 
 
 def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
@@ -105,11 +105,8 @@ def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[M
     methods = []
     with tempfile.TemporaryDirectory() as scratch:
         for stage in STAGES:
-            file = options.presses if stage == "photographs" else str(Path(scratch) / f"{stage}.npz")
-            if file is None:
-                missing[stage] = "no PRESSES given"
-            else:
-                methods += stage_measured(stage, options.quick, file, missing, options.only)
+            file = str(Path(scratch) / f"{stage}.npz")
+            methods += stage_measured(stage, options.quick, file, missing, options.only)
     return methods
 
 

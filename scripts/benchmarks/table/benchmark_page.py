@@ -13,7 +13,7 @@ from .method import Method
 
 TITLES = {
     "mechanics": "Contact mechanics", "translation": "Translation, signals to the DIGIT's gel",
-    "pictures": "Pictures of known deformations", "photographs": "Pictures beside photographs",
+    "pictures": "Pictures of known deformations",
     "chain": "Whole chain, signals to pictures", "peers": "Others' programs, each with its own calibration",
 }  # fmt: skip
 TABLE = "| method | ms a frame | MB | error | baseline | measured on |", "|---|---|---|---|---|---|"
