@@ -311,9 +311,9 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball, skin = bpy.context.object, scene.objects["BioTac skin"]
-    scene.frame_start, scene.frame_end, ball.tactile.press_by = 1, 11, "FORCE"
+    scene.frame_start, scene.frame_end, ball.tactile.press_by = 1, 5, "FORCE"
     _key(ball, 1, force=0.0)
-    _key(ball, 11, force=0.3)
+    _key(ball, 5, force=0.3)
     bpy.ops.tactile.simulate()
     assert Path(skin.tactile.recording).is_file()
     bpy.ops.tactile.translate()
