@@ -120,7 +120,7 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
         square = 0.0
         for i in range(3):
             lean[a, i] = force[a, i] - pressing * normal[a, i]
-            square += lean[a, i] ** 2
+            square += lean[a, i] * lean[a, i]
         long = np.sqrt(square)
         if long == 0.0:
             slips[a] = False
@@ -280,7 +280,8 @@ def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
         for i in range(3):
             onto += off[a, i] * normal[a, i]
         for i in range(3):
-            far += (off[a, i] - onto * normal[a, i]) ** 2
+            aside = off[a, i] - onto * normal[a, i]
+            far += aside * aside
         far = np.sqrt(far)
         if far > 0:
             after.slips[a] = True

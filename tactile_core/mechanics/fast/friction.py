@@ -45,7 +45,7 @@ class Friction:
 
         Raises UnsolvedError.
         """
-        k, matrix = self.block.k, self.block.matrix
+        k = self.block.k
         force, core, shift = np.ascontiguousarray(begin.force), begin.core_force, begin.shift
         active, slips = begin.active.copy(), begin.slipping.copy()
         place, pace, calm = begin.displacement, Pace(), False
@@ -55,7 +55,7 @@ class Friction:
         for iteration in range(1, MAX_ITERATIONS + 1):
             force, core = force.copy(), core.copy()  # the iterate before keeps its own
             lean = coulomb.reduce_to_law(force, core, active, slips, normal, self.friction)
-            moved, core_moved = newton_step.respond(matrix, force, core)
+            moved, core_moved = self.block.respond(force, core)
             motion = coulomb.motion_from(place, moved, off, gap, normal)
             before = coulomb.Points(force, core, active, slips, normal, lean, gap, self.core_gap + core_moved, off)
             curves = self._bend(before, place, there) if calm else FLAT
@@ -63,7 +63,7 @@ class Friction:
             if axial_force is not None:
                 shift += step
                 there = self.pose.moved(shift)
-            displacement, core_moved = newton_step.respond(matrix, force, core)
+            displacement, core_moved = self.block.respond(force, core)
             gap, turned, off = self._look(displacement, there)
             state = Try(displacement, force.copy(), core, shift, active, iterations=iteration, slipping=slips)
             after = coulomb.Points(force, core, active, slips, normal, lean, gap, self.core_gap + core_moved, off)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...files.compiled import Loop, add_scaled
+from ...files.compiled import Loop
 from .active_set import UnsolvedError
 from .coulomb import LARGEST_TILT, LARGEST_TURN, Motion, Points, Slipping, known_motion
 
@@ -63,36 +63,10 @@ def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     return lapack.sgetrs(factor, pivots, right, trans=1)[0].astype(float)
 
 
-@Loop
-def respond(matrix, force, core):  # noqa: ANN001, ANN201
-    """Compute the displacement (k, 3) m of nodes and motion (c,) m of the core's points under forces (k, 3), (c,) N."""
-    k, c = force.shape[0], core.shape[0]
-    size = 3 * k + c
-    moved, displacement, core_moved = np.zeros(size), np.empty((k, 3)), np.empty(c)
-    for row in range(size):
-        load = force[row // 3, row % 3] if row < 3 * k else core[row - 3 * k]
-        if load != 0.0:
-            add_scaled(moved, load, matrix[row])
-    for a in range(k):
-        for i in range(3):
-            displacement[a, i] = moved[3 * a + i]
-    for p in range(c):
-        core_moved[p] = moved[3 * k + p]
-    return displacement, core_moved
-
-
-@Loop
-def moving_forces(inverse, rows, motion):  # noqa: ANN001, ANN201
+def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """Forces (m, r) N that move the points of ``rows`` (j,) by their ``motion`` (m, r) m; inverse : (j, j) float32."""
-    forces, sums = np.zeros(motion.shape), np.empty(len(rows), np.float32)
-    for column in range(motion.shape[1]):
-        sums[:] = 0
-        for i in range(len(rows)):
-            way = np.float32(motion[rows[i], column])
-            if way != 0:
-                add_scaled(sums, way, inverse[i])
-        for j in range(len(rows)):
-            forces[rows[j], column] = sums[j]
+    forces = np.zeros(motion.shape)
+    forces[rows] = (motion[rows].T.astype(np.float32) @ inverse).T
     return forces
 
 

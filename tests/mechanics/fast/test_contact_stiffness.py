@@ -28,9 +28,12 @@ def block(nodes, core=CORE, seed=3) -> ComplianceBlock:
 
 def amiss(stiffness: ContactStiffness, of: ComplianceBlock, active: np.ndarray) -> float:
     """Largest entry of stiffness times compliance, less one on the diagonal."""
-    inverse, rows = stiffness.among(of, active)
+    whole, rows = stiffness.among(of, active)
     wanted = np.r_[np.repeat(active[: of.k], 3), active[of.k :]]
+    touch = wanted[rows]
+    inverse, rows = whole[np.ix_(touch, touch)], rows[touch]
     np.testing.assert_array_equal(np.sort(rows), np.flatnonzero(wanted))
+    assert np.count_nonzero(whole) == np.count_nonzero(inverse)
     compliance = of.matrix[np.ix_(rows, rows)].astype(float) * (1 + RIDGE * np.eye(len(rows)))
     return float(np.abs(inverse @ compliance - np.eye(len(rows))).max())
 
