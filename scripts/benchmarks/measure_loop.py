@@ -29,6 +29,7 @@ from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
 from tactile_core.files.threads import one_thread  # noqa: E402
 
 one_thread()  # before numpy is imported: the times are those of one core
+os.environ.setdefault("TACTILE_COMPILED", "1")  # loops at their first call: what is timed is warm
 
 import numpy as np  # noqa: E402
 

@@ -2,7 +2,8 @@
 
 A loop is written once, as plain Python over arrays. numba is imported at its first call; compiled code is kept on disk,
 beside the source or in the user's cache, for the next process. Without numba the same lines run uncompiled and give the
-same numbers: contacts then take five to twenty-five times as long."""
+same numbers: contacts then take five to twenty-five times as long. Short calls of a loop that was never compiled on a
+machine run so, too, for a while: compiling takes as long as hundreds of them."""
 
 from __future__ import annotations
 
@@ -10,10 +11,16 @@ import functools
 import gc
 import importlib.util
 import os
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-SWITCH = "TACTILE_COMPILED"  # 0 in the environment compiles nothing
+SWITCH = "TACTILE_COMPILED"  # in the environment: 0 compiles nothing, 1 each loop at its first call
+
+# A loop that is not on disk yet is compiled once it has run so long, s of CPU, or at an array of so many values.
+_PATIENCE, _LARGE = 0.1, 20_000
+_ROUNDED_OTHERWISE = {"cos", "sin", "exp", "arcsinh"}  # in their last bits, by numpy and by compiled code
 
 
 @functools.cache
@@ -42,17 +49,18 @@ def _teach_numba() -> None:
 
 
 class Loop:
-    """A function that is compiled at its first call; other threads may run during the compilation."""
+    """A function that is compiled when that pays; other threads may run during the compilation."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
-        self._function, self._run = function, self._compile_and_run
+        self._function, self._run = function, self._first_call
+        self._spent = 0.0  # s, uncompiled
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it, uncompiled where numba is missing or switched off."""
         return self._run(*arguments) if available() else self._function(*arguments)
 
-    def _compile_and_run(self, *arguments: Any) -> Any:
+    def _first_call(self, *arguments: Any) -> Any:
         import numba
 
         _teach_numba()
@@ -60,13 +68,37 @@ class Loop:
         self._function.__qualname__ = f"{__package__}.{self._function.__qualname__}"
         # numpy's rules for a division by zero; no fast-math: the same numbers on every machine of a kind.
         # Without the wrapper for callers in C compiling takes a tenth less.
-        run = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
+        self._compiled = numba.njit(cache=True, nogil=True, error_model="numpy", no_cfunc_wrapper=True)(self._function)
+        self._run = self._compile_and_run if self._never_waits() else self._run_or_compile
+        return self._run(*arguments)
+
+    def _never_waits(self) -> bool:
+        """Return true if it is on disk, is to be compiled at once, or would give other bits uncompiled."""
+        import numpy as np
+
+        exact = np.lib.NumpyVersion(np.__version__) >= "2.0.0"  # before, a float32 times a number was a float64
+        if SWITCH in os.environ or not exact or _ROUNDED_OTHERWISE.intersection(self._function.__code__.co_names):
+            return True
+        return any(Path(self._compiled.stats.cache_path).glob(f"*{self._function.__qualname__}-*.nbi"))
+
+    def _run_or_compile(self, *arguments: Any) -> Any:
+        if self._spent > _PATIENCE or max(getattr(each, "size", 0) for each in arguments) > _LARGE:
+            return self._compile_and_run(*arguments)
+        import numpy as np
+
+        start = time.thread_time()
+        with np.errstate(all="ignore"):  # compiled loops warn of nothing
+            found = self._function(*arguments)
+        self._spent += time.thread_time() - start
+        return found
+
+    def _compile_and_run(self, *arguments: Any) -> Any:
         collects = gc.isenabled()
         gc.disable()  # of the many objects that compiling makes and keeps: another tenth
         try:
-            found = run(*arguments)
+            found = self._compiled(*arguments)
         finally:
             if collects:
                 gc.enable()
-        self._run = run
+        self._run = self._compiled
         return found

@@ -44,9 +44,35 @@ def test_what_blender_compiles_under_its_own_name_does_not_break_other_processes
     """There the package is bl_ext.user_default.tactile.tactile_core, and its worker calls it tactile_core."""
     pytest.importorskip("numba")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv(compiled.SWITCH, "1")
     for package in ("bl_ext.tactile_core", "tactile_core", "bl_ext.tactile_core"):
         assert interpolated(package) == "[[1.5, 2.25, 0.0]]\n"
     assert list(tmp_path.rglob("*.nbi"))
+
+
+FEW_AND_MANY = """
+import os, pathlib
+import numpy as np
+from tactile_core.geometry.indenters import Sphere
+on_disk = lambda: len(list(pathlib.Path(os.environ["NUMBA_CACHE_DIR"]).rglob("*.nbi")))
+points, before = np.random.default_rng(0).normal(size=(10_000, 3)), on_disk()
+few = Sphere(0.5).distance(points[:50])
+between, many = on_disk(), Sphere(0.5).distance(points)
+print(before, between, on_disk(), all(np.array_equal(a, b[:50]) for a, b in zip(few, many)))
+"""
+
+
+def test_few_points_are_not_compiled_for_and_get_the_same_bits(tmp_path, monkeypatch):
+    pytest.importorskip("numba")
+    if np.lib.NumpyVersion(np.__version__) < "2.0.0":
+        pytest.skip("numpy 1 rounds otherwise: there every loop is compiled at its first call")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.delenv(compiled.SWITCH, raising=False)
+    for counts in ("0 0 1", "1 1 1"):  # first process, and the next, which finds it on disk
+        done = subprocess.run(
+            [sys.executable, "-c", FEW_AND_MANY], cwd=ROOT, capture_output=True, text=True, timeout=300
+        )
+        assert done.stdout == f"{counts} True\n", done.stderr
 
 
 SHAPES = {
