@@ -34,7 +34,7 @@ MEASURES = "evaluate_translation.py"  # exits with 1 where a target is missed, a
 
 # The same command on less: what a page says, what is run here.
 LESS = [
-    ("scenes/training --count 50000", "scenes/press_sphere --count 200"),  # without friction: a tenth of the time
+    ("--count 50000", "--count 200"),
     ("--count 20000", "--count 5"),
     ("presses/ --ball-diameter 6", "presses/ --ball-diameter 6 --quick --only press_0.png,press_1.png"),
     ("other_presses/ --json", "other_presses/ --only press_2.png --json"),
