@@ -112,6 +112,7 @@ def row(
 ) -> Row:
     """Make a report row of one value, rounded to four digits; ``of`` names the data it was measured on.
 
+    value : None or NaN where nothing could be measured, which misses any target
     baseline : the value of doing nothing, or of the strongest simple answer
     ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
     """
@@ -119,7 +120,7 @@ def row(
     if target is not None:
         ok = value is not None and bool(value >= target if at_least else abs(value) <= target)
     value, target, baseline = (
-        None if number is None else float(f"{number:.4g}") for number in (value, target, baseline)
+        None if number is None or np.isnan(number) else float(f"{number:.4g}") for number in (value, target, baseline)
     )
     return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "baseline": baseline, "set": of}
 

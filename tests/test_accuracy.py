@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tactile_core import accuracy
 from tactile_core.accuracy import Candidate, cheapest
 from tactile_core.errors import TactileError
+from tactile_core.files import atomic
 
 REST = np.array([[x * 1e-3, -8e-3, z * 1e-3] for x in range(5) for z in range(4)])
 WAYS = [Candidate("rough", 20.0, 1.0), Candidate("fine", 5.0, 100.0), Candidate("odd", 4.0, 90.0)]
@@ -72,3 +76,10 @@ def test_the_cheapest_that_meets_a_bound_is_picked(bound, name):
 def test_a_bound_that_none_meets_names_the_best():
     with pytest.raises(TactileError, match=r"3 um of shape; expected 4 or more, which odd has"):
         cheapest(WAYS, 3, "um", "shape")
+
+
+def test_a_row_of_what_was_not_measured_is_json_and_misses_its_target(tmp_path: Path) -> None:
+    made = accuracy.row("place", float("nan"), "mm", 1.0, baseline=float("nan"))
+    atomic.write_json(tmp_path / "rows.json", [made])
+    assert json.loads((tmp_path / "rows.json").read_text()) == [made]
+    assert made["value"] is None and made["baseline"] is None and made["ok"] is False
