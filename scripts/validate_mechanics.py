@@ -79,7 +79,7 @@ def write(report: Path, parts: dict[str, list[Row]]) -> None:
 
 def _check(heading: str, rows: list[Row]) -> str:
     """Return a check's line: its rows, how many have a target, and which errors miss it."""
-    missed = ", ".join(f"`{row['name']}` {row['value']:g} {row['unit']}" for row in failed(rows))
+    missed = ", ".join(f"`{row['name']}` {row['value']} {row['unit']}" for row in failed(rows))
     return f"| {heading} | {len(rows)} | {sum(row['ok'] is not None for row in rows)} | {missed} |"
 
 

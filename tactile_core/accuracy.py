@@ -120,7 +120,8 @@ def row(
     if target is not None:
         ok = value is not None and bool(value >= target if at_least else abs(value) <= target)
     value, target, baseline = (
-        None if number is None or np.isnan(number) else float(f"{number:.4g}") for number in (value, target, baseline)
+        float(f"{number:.4g}") if number is not None and np.isfinite(number) else None
+        for number in (value, target, baseline)
     )
     return {"name": name, "value": value, "unit": unit, "target": target, "ok": ok, "baseline": baseline, "set": of}
 

@@ -5,7 +5,7 @@
 
 Fits begin at round numbers (`start.toml`) or at the unit that ships, end on the fast picture, and are tried on
 photographs that they have not seen. `levels` compares how dark, bright and colourful photographs are with pictures of
-real recordings; `told_apart`, how well a classifier tells the two.
+real recordings; `told_apart`, how well a classifier tells the two (scikit-learn).
 """
 
 from __future__ import annotations
@@ -167,7 +167,9 @@ def told_apart(data: Path) -> Iterator[Row]:
     grain = [camera_noise(unit, random) for random in drawn]
     white = [random.standard_normal(noise.shape) * unit.noise for random, noise in zip(drawn, grain, strict=True)]
     for of, noises in (("without noise", [0.0] * len(tried)), ("with --noise", grain), ("with white noise", white)):
-        pictures = [np.rint(each.picture + noise) for each, noise in zip(tried, noises, strict=True)]
+        pictures = [
+            np.rint(each.picture + noise).clip(0, LARGEST_LEVEL) for each, noise in zip(tried, noises, strict=True)
+        ]
         photographs = [each.press.picture for each in tried]
         yield row("told_apart", share_told(photographs, pictures), "1", 0.5, of=f"{len(tried)} pictures {of}")
 
@@ -202,7 +204,7 @@ def patch_statistics(picture: np.ndarray) -> np.ndarray:
 
 
 PARTS: dict[str, Callable[[Path], Iterator[Row]]] = {
-    each.__name__: each for each in (levels, told_apart, five, thirds, fifths)
+    each.__name__: each for each in (levels, five, thirds, fifths, told_apart)
 }  # fmt: skip
 
 if __name__ == "__main__":

@@ -49,10 +49,15 @@ def _teach_numba() -> None:
 
 
 class Loop:
-    """A function that is compiled when that pays; other threads may run during the compilation."""
+    """A function that is compiled when that pays; other threads may run during the compilation.
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    waits : false if a call takes long whatever the size of its arrays: compiled at the first
+    What it computes must not hold ``**``, which compiled code rounds otherwise.
+    """
+
+    def __init__(self, function: Callable[..., Any], *, waits: bool = True) -> None:
         functools.update_wrapper(self, function)
+        self._waits = waits
         self._function, self._run = function, self._first_call
         self._spent = 0.0  # s, uncompiled
 
@@ -77,7 +82,8 @@ class Loop:
         import numpy as np
 
         exact = np.lib.NumpyVersion(np.__version__) >= "2.0.0"  # before, a float32 times a number was a float64
-        if SWITCH in os.environ or not exact or _ROUNDED_OTHERWISE.intersection(self._function.__code__.co_names):
+        rounded_otherwise = not exact or _ROUNDED_OTHERWISE.intersection(self._function.__code__.co_names)
+        if rounded_otherwise or not self._waits or SWITCH in os.environ:
             return True
         return any(Path(self._compiled.stats.cache_path).glob(f"*{self._function.__qualname__}-*.nbi"))
 

@@ -195,7 +195,7 @@ class Renderer:
 
 
 def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
-    """Draw noise (H, W, 3) float32 levels as measured on the unit: white, in means over squares of GRAIN px."""
+    """Draw noise (H, W, 3) float32 levels of the unit's size: white, means of four squares in GRAIN px."""
     height, width = unit.camera.shape
     side = max(GRAIN * width // 240, 2) // 2
     white = random.standard_normal((height // side + 2, width // side + 2, len(COLOURS)), np.float32)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FORMAT = "tactile-pairs-2"
 ADVICE = "Make the file again with `tactile pairs`"
+SHEET = "sheet"  # the law of electrodes; older files may have another
 ATTRIBUTES = ("electrodes", "indenters", "polarity", "scene", "seed", "version")  # and two of ``NODES``
 MIN_PRESSES = 5  # at least three to train on, one to validate, one to test
 # dataset of the pair that ships -> trailing shape and kind of numbers (i whole, f real, b yes or no); None: as many
@@ -118,6 +119,9 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
             if attributes["polarity"] != FALLS:
                 expected = f"{FALLS!r}, as raw counts do where a film thins"
                 raise TactileError(f"{os.fspath(path)}, polarity", repr(attributes["polarity"]), expected, ADVICE)
+            if attributes["electrodes"] != SHEET:
+                where, found = f"{os.fspath(path)}, electrodes", repr(attributes["electrodes"])
+                raise TactileError(where, found, f"{SHEET!r}, the law of electrodes", ADVICE)
             names = _named(pair)
             shapes = DATASETS | {"signal": ((sensors.electrode_count(pair[0]),), "f")}
             arrays = {name: _dataset(file, shapes[name], names, names[name], path) for name in DATASETS}

@@ -20,7 +20,7 @@ from ..files.version import __version__
 from ..sensors import PAIR, SOURCE, TARGET
 from ..sensors.descriptor import NODES
 from ..sensors.fluid_sensor import FALLS
-from .pairs_file import FORMAT, KEEPABLE, SCALE
+from .pairs_file import FORMAT, KEEPABLE, SCALE, SHEET
 
 if TYPE_CHECKING:
     import h5py
@@ -110,7 +110,7 @@ def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) 
                 "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
                 "indenters": json.dumps(made.indenters),
                 **{f"{sensor}{NODES}": sensors.sensor_surface(sensor).sha256 for sensor in made.pair},
-                "polarity": FALLS, "electrodes": "sheet",
+                "polarity": FALLS, "electrodes": SHEET,
             })  # fmt: skip
             done, unit_of = 0, units(*made.pair, made.keep)
             for path in files:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
 from pathlib import Path
@@ -139,3 +140,10 @@ def test_a_gel_that_folds_over_itself_is_counted_as_numpy_counts_it(compiled_loo
             found[on] = gel_mapper()(folding), folds
     assert found[True][1] == found[False][1] and found[True][1][0] > 100
     assert np.isfinite(found[True][0]).all()
+
+
+def test_no_loop_takes_powers_which_compiled_code_rounds_otherwise():
+    for file in sorted((ROOT / "tactile_core").rglob("*.py")):
+        for function in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef) and any("Loop" in ast.unparse(d) for d in function.decorator_list):
+                assert not any(isinstance(node, ast.Pow) for node in ast.walk(function)), (file.name, function.name)

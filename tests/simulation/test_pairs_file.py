@@ -59,6 +59,7 @@ def poison(file):
             "format 'tactile-pairs-9'; expected format 'tactile-pairs-2'",
         ),
         (lambda file: file.attrs.pop("format"), "format ''"),
+        (lambda file: file.attrs.update(electrodes="gap"), "electrodes: 'gap'; expected 'sheet'"),
         (lambda file: file.attrs.pop("digit_nodes_sha256"), "no attribute digit_nodes_sha256"),
         (lambda file: file.pop("signal"), "signal: no such dataset"),
         (replace("signal", np.zeros((15, 24), np.float32)), r"signal: shape \(15, 24\); expected \(C, 19\)"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from ...files.compiled import Loop, available
@@ -100,7 +102,7 @@ def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarr
     return np.concatenate(pieces), np.concatenate(owners)
 
 
-@Loop
+@functools.partial(Loop, waits=False)  # many cells and triangles for each of few points
 def _least_squares(places, cells, triangles, starts, members, boxes, shape, steps, bound):  # noqa: ANN001, ANN202
     """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on; lengths in cells.
 
@@ -129,7 +131,8 @@ def _least_squares(places, cells, triangles, starts, members, boxes, shape, step
             cell = around[q]
             away = 0.0
             for a in range(3):
-                away += max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0) ** 2
+                outside = max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0)
+                away += outside * outside
             if away >= best:
                 continue
             for m in range(starts[cell], starts[cell + 1]):
@@ -152,7 +155,8 @@ def _least_squares(places, cells, triangles, starts, members, boxes, shape, step
                     square, side = 0.0, 0.0
                     for a in range(3):
                         b, c = (a + 1) % 3, (a + 2) % 3
-                        square += (arm[a] - share * edge[a]) ** 2
+                        apart = arm[a] - share * edge[a]
+                        square += apart * apart
                         side += (normal[b] * edge[c] - normal[c] * edge[b]) * arm[a]
                     foot_inside = foot_inside and side > 0
                     best = min(best, square)

@@ -96,7 +96,7 @@ def _spline(points, origin, spacing, coefficients, bends):  # noqa: ANN001, ANN2
                 continue
             for j in range(3):
                 if beyond[i] == 0 and beyond[j] == 0:
-                    hessian[p, i, j] = sums[4 + i if i == j else 6 + i + j] / spacing**2
+                    hessian[p, i, j] = sums[4 + i if i == j else 6 + i + j] / (spacing * spacing)
                 elif beyond[i] != 0 and beyond[j] != 0:
                     hessian[p, i, j] = ((i == j) - beyond[i] * beyond[j] / square) / away
     return value, gradient, hessian

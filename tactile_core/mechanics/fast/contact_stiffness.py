@@ -23,6 +23,9 @@ class ContactStiffness:
     """Keeps the inverse of the compliance among the points that touched last, and zeros for some that have left."""
 
     def __init__(self) -> None:
+        self._forget()
+
+    def _forget(self) -> None:
         self._inverse = np.empty((0, 0), np.float32)
         self._keys = np.empty(0, np.int64)  # of its rows, see ``ComplianceBlock.keys``
         self._rows = np.empty(0, np.int64)  # of the block that was asked about last
@@ -46,10 +49,11 @@ class ContactStiffness:
         new[at[stays]] = False
         gone = np.flatnonzero(self._touching & ~stays)
         if block is not self._block or new.any() or len(gone):
-            self._touching, self._updates = np.zeros(len(at), bool), self._updates + 1  # should it not be definite
+            self._updates += 1
             if not (self._is_quick(len(gone), new, wanted) and self._change(block, gone, new, at, there)):
-                self._rows, self._updates = np.flatnonzero(wanted), 0
-                self._inverse = _inverted(_among(block.matrix, self._rows))
+                self._forget()  # should it not be definite
+                rows = np.flatnonzero(wanted)
+                self._inverse, self._rows = _inverted(_among(block.matrix, rows)), rows
             self._block, self._keys, self._touching = block, block.keys[self._rows], wanted[self._rows]
         return self._inverse, self._rows
 

@@ -224,11 +224,13 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
         for i in range(3):
             slip = off[a, i] - onto * normal[a, i]
             slip_lean += slip * lean[a, i]
-            slip_square += slip**2
-            sideways += (force[a, i] - pressing * normal[a, i]) ** 2
-            length += force[a, i] ** 2
+            slip_square += slip * slip
+            aside = force[a, i] - pressing * normal[a, i]
+            sideways += aside * aside
+            length += force[a, i] * force[a, i]
         for i in range(3):
-            tilted += (turned[a, i] - normal[a, i]) ** 2 * length
+            turn = turned[a, i] - normal[a, i]
+            tilted += turn * turn * length
         sideways = np.sqrt(sideways)
         touches = pressing >= -FORCE_NOISE if active[a] else gap[a] < -GAP_NOISE
         new_active[a] = touches
@@ -251,13 +253,15 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
                 share = 0.0
                 for i in range(3):
                     share += (off[a, i] - onto * normal[a, i]) * (force[a, i] - pressing * normal[a, i])
-                free -= (share / max(sideways, 1e-30)) ** 2
+                share /= max(sideways, 1e-30)
+                free -= share * share
             slid = max(slid, free)
     for p in range(c):
         touches = core[p] >= -FORCE_NOISE if active[k + p] else core_gap[p] < -GAP_NOISE
         new_active[k + p] = touches
         changed |= (active[k + p] and not touches) or (not active[k + p] and core_gap[p] < -law.gap_tolerance)
-    size, slid = np.sqrt(whole[0] ** 2 + whole[1] ** 2 + whole[2] ** 2), np.sqrt(max(slid, 0.0))
+    size = np.sqrt(whole[0] * whole[0] + whole[1] * whole[1] + whole[2] * whole[2])
+    slid = np.sqrt(max(slid, 0.0))
     return Sorted(new_active, new_slips, changed, touched, deepest, widest, slid, np.sqrt(tilted), size)
 
 

@@ -174,11 +174,11 @@ def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
                 for j in range(3):
                     way = moved[place, j, 0] + (step * moved[place, j, 1] if last else 0.0)
                     tilt[i] += slipping.bend[place, i, j] * way
-                size += tilt[i] ** 2
+                size += tilt[i] * tilt[i]
             share, size = min(1.0, LARGEST_TILT / max(np.sqrt(size), 1e-12)), 0.0
             for i in range(3):
                 u[i] += share * tilt[i]
-                size += u[i] ** 2
+                size += u[i] * u[i]
             for i in range(3):
                 u[i] /= np.sqrt(size)
             place += 1
@@ -186,7 +186,7 @@ def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
         size = 0.0
         for i in range(3):
             v[i] -= onto * u[i]
-            size += v[i] ** 2
+            size += v[i] * v[i]
         for i in range(3):
             new[node, i] = total * (u[i] + slipping.friction * v[i] / np.sqrt(size))
     return new, new_core

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import threading
 from contextlib import nullcontext
+from types import SimpleNamespace
 
 import fake_tools
 import numpy as np
@@ -106,6 +107,12 @@ def test_a_queue_without_workers_is_told(new_job, monkeypatch):
         with runs.opened(folder, None):
             assert runs.run(folder, job, place, None, lambda done, total: None).made == 5
         assert said == [f"{cluster.scheduler_address}: no worker has come yet; 2 tasks wait for one"]
+
+
+def test_a_task_that_kills_its_workers_is_set_aside(tmp_path):
+    killed = distributed.KilledWorker("task", SimpleNamespace(address="tcp://one:1"), 3)
+    reply = Cluster(tmp_path, "tls://all:2")._reply(SimpleNamespace(status="error", exception=lambda: killed))
+    assert "killed its worker" in reply.failure.found and "tcp://one:1" in reply.failure.found
 
 
 def test_a_scheduler_that_dies_is_told_in_a_sentence(new_job, capfd):

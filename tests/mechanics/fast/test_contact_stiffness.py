@@ -55,13 +55,16 @@ def test_nothing_touches_and_then_something():
     assert amiss(stiffness, of, np.ones(10, bool)) < 1e-5
 
 
-def test_what_is_not_definite_is_refused_and_forgotten():
-    stiffness, of, bad = ContactStiffness(), block(range(12)), block(range(12))
+@pytest.mark.parametrize("size", [8, 12, 16])
+def test_what_is_not_definite_is_refused_and_forgotten(size):
+    stiffness, of, bad = ContactStiffness(), block(range(12)), block(range(size))
     assert amiss(stiffness, of, np.ones(14, bool)) < 1e-5
     bad.matrix = -bad.matrix
     bad.keys = bad.keys + 3000
     with pytest.raises(UnsolvedError, match="positive definite"):
-        stiffness.among(bad, np.ones(14, bool))
+        stiffness.among(bad, np.ones(bad.k + bad.c, bool))
+    with pytest.raises(UnsolvedError, match="positive definite"):
+        stiffness.among(bad, np.ones(bad.k + bad.c, bool))  # as the same block
     assert amiss(stiffness, of, np.ones(14, bool)) < 1e-5
 
 
