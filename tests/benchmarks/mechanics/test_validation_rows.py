@@ -39,6 +39,7 @@ def test_order_is_the_slope():
 def test_report_holds_every_row(tmp_path):
     forces = [row(f"golden_force_{depth * 1e3:.1f}mm_error", 0.1, "percent", 0.5) for depth in GOLDEN_FORCE]
     speed = [row("digit_fast_0.2mm_shape_rms", 3.0, "um", 2.0), row("digit_fast_0.2mm_time", 2.0, "ms")]
+    speed.append(row("digit_full_0.2mm_shape_rms", float("nan"), "um", 2.0))
     page = Path(__file__).parents[3] / "docs" / "mechanics.md"
     shutil.copy(page, tmp_path)
     validate_mechanics.write(tmp_path / "mechanics.md", {"Golden": forces, "Speed": speed})
@@ -46,8 +47,12 @@ def test_report_holds_every_row(tmp_path):
     table = read_table(tmp_path / "mechanics.csv")
     assert [each["name"] for each in table] == [each["name"] for each in forces + speed]
     assert {each["part"] for each in table} == {"Golden", "Speed"}
-    assert [each["name"] for each in table if each["ok"] == "False"] == ["digit_fast_0.2mm_shape_rms"]
-    assert "| Speed | 2 | 1 | `digit_fast_0.2mm_shape_rms` 3 um |" in text and "scikit-fem" not in text
+    assert [each["name"] for each in table if each["ok"] == "False"] == [
+        "digit_fast_0.2mm_shape_rms",
+        "digit_full_0.2mm_shape_rms",
+    ]
+    words = "`digit_fast_0.2mm_shape_rms` 3 um, `digit_full_0.2mm_shape_rms` no um"
+    assert f"| Speed | 3 | 2 | {words} |" in text and "scikit-fem" not in text
     words = [line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("|")]
     assert [line for line in text.splitlines() if not line.startswith("|")] == words
 
