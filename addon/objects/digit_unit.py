@@ -30,7 +30,7 @@ class ShownUnit:
 
 
 def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
-    """Return the unit as the scene shows it; parts that the scene lacks are those of ``unit``. Raises TactileError."""
+    """Return the unit as the scene shows it: missing LEDs are dark, other parts ``unit``'s. Raises TactileError."""
     reflectance = gel.evaluated_get(depsgraph).tactile.object_reflectance or unit.object_reflectance
     unit = dataclasses.replace(unit, object_reflectance=reflectance)
     if not digit_body.has_body(gel):

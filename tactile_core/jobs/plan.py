@@ -100,7 +100,7 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Plan a conversion of so many frames. keep : words of ``results.KEEPABLE``; preset : of the pictures"""
+    """Estimate what a conversion of frames costs. keep : words of ``results.KEEPABLE``; preset : of the pictures"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]

@@ -39,7 +39,7 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Return the errors of a contact ``depth`` m deep, of touching nodes, by an indenter as sharp as ``radius`` m."""
+    """Enlarge a depth's errors for a sharp indenter of ``radius`` m; without nodes the shape's is ``depth`` m."""
     if not nodes:
         return _of_nothing(depth)
     sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))

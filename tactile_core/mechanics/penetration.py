@@ -66,10 +66,10 @@ def check_follows(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
     closed: bool, behind: float = BEHIND,
 ) -> None:  # fmt: skip
-    """Raise PenetrationError where a body pressed ``depth`` m in penetrates between a surface's nodes.
+    """Raise PenetrationError where a body, ``depth`` m deep, has sunk in between a surface's nodes.
 
     normals : (k, 3) of the body, at the nodes that carry force
-    behind : least cosine of theirs and the motion
+    behind : least allowed cosine of theirs and the motion
     """
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"

@@ -80,7 +80,7 @@ class _Course(NamedTuple):
 
 
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
-    """Estimate the contact's state (T, STATE) float32 at times (T,) s from all frames' posteriors: the place smoothed
+    """Estimate a `Posterior`'s states (T, STATE) float32 at times (T,) s from all frames' posteriors: place smoothed
     forward and back, force by its smoothed ratio to the signals' size, depth as each frame has it."""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)

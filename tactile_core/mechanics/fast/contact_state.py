@@ -72,7 +72,7 @@ class Contact:
 
     @property
     def electrode_gaps(self) -> np.ndarray:
-        """Film (19,) m over each electrode; none on the DIGIT."""
+        """Film (e,) m over each electrode; (0,) on the DIGIT."""
         return self._gaps(self.compliance.feet)
 
     def _gaps(self, count: int) -> np.ndarray:

@@ -144,7 +144,7 @@ class MitsubaPictures:
         return _OfUnit(calibration, self)
 
     def radiance(self, unit: Calibration, heights: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3), levels, of a unit's gel at heights (H, W) m."""
+        """Return the radiance (H, W, LED), levels, of a unit's gel at heights (H, W) m."""
         if self._light is None:
             self._light = GelLight(unit, self.preset, heights, 0)
         elif self._light.unit is not unit:

@@ -112,7 +112,7 @@ class GelLight:
         return mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward))
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        """Return the radiance (H, W, LED) float32, levels, of heights (H, W) m."""
         *_, found = self.refined(height_map)
         return found
 

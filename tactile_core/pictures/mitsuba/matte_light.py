@@ -198,7 +198,7 @@ def irradiance(
     (1 / pi) times the integral of L (n . w) dw over directions w that meet gel: for each azimuth, L times the rise of
     `_weight` from each horizon to the next.
     height : (h, w) m; radiance : (h, w, 3); spacing : (right, down) m
-    margin : places on each side that give light and receive none, as far as the search reaches"""
+    margin : places on each side that give light and receive none; the search goes 2 less far"""
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)
     inside = slice(margin, -margin), slice(margin, -margin)
     slopes = [slope[inside] for slope in np.gradient(height, spacing[1], spacing[0])]

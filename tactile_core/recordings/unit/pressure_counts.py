@@ -31,7 +31,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return counts a unit of PDC (T,), 0 if unknown, and the name of a pressure's unit; unit : as `in_counts`"""
+    """Return counts a unit of PDC (T,), 0 if unknown; and a pressure unit's name, else ""; unit : as `in_counts`"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):
