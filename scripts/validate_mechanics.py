@@ -79,8 +79,7 @@ def write(report: Path, parts: dict[str, list[Row]]) -> None:
 
 def _check(heading: str, rows: list[Row]) -> str:
     """Return a check's line: its rows, how many have a target, and which errors miss it."""
-    values = (("no" if row["value"] is None else f"{row['value']:g}", row) for row in failed(rows))
-    missed = ", ".join(f"`{row['name']}` {value} {row['unit']}" for value, row in values)
+    missed = ", ".join(f"`{row['name']}` {short(row['value'])} {row['unit']}" for row in failed(rows))
     return f"| {heading} | {len(rows)} | {sum(row['ok'] is not None for row in rows)} | {missed} |"
 
 

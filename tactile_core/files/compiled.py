@@ -51,8 +51,8 @@ def _teach_numba() -> None:
 class Loop:
     """A function that is compiled when that pays; other threads may run during the compilation.
 
-    waits : false if a call takes long whatever the size of its arrays: compiled at the first
-    What it computes must not hold ``**``, which compiled code rounds otherwise.
+    waits : false to compile it at its first call, as one whose time the size of its arrays does not bound
+    It must hold no ``**``: compiled code rounds powers otherwise.
     """
 
     def __init__(self, function: Callable[..., Any], *, waits: bool = True) -> None:

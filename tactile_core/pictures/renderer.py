@@ -28,7 +28,7 @@ from .presets import DEFAULT, FAST, preset_named
 
 # px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means of
 # four squares of 2 px, for which video keeps one colour, by 0.75, 0.5, 0.25, 0. CHANNELS : correlations of red, green
-# and blue: noise of colour more than of brightness (photographs of one DIGIT; of another -.22, -.22, .07).
+# and blue on photographs of one DIGIT (of another -.22, -.22, .07), taken for all units (assumed).
 GRAIN = 4
 CHANNELS = (1.0, -0.44, 0.07), (-0.44, 1.0, -0.37), (0.07, -0.37, 1.0)
 
@@ -195,7 +195,7 @@ class Renderer:
 
 
 def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
-    """Draw noise (H, W, 3) float32 levels of the unit's size: white, means of four squares in GRAIN px."""
+    """Draw noise (H, W, 3) float32, levels, as strong as the unit's: one colour for each square of half a GRAIN."""
     height, width = unit.camera.shape
     side = max(GRAIN * width // 240, 2) // 2
     white = random.standard_normal((height // side + 2, width // side + 2, len(COLOURS)), np.float32)

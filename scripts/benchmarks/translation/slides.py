@@ -70,7 +70,7 @@ def rows(
         values = np.array([each[metric] for each in judged])
         known = values[np.isfinite(values[:, 0])]
         if len(known):
-            value, baseline = np.percentile(known, percent, axis=0).tolist()
+            value, baseline = np.nanpercentile(known, percent, axis=0).tolist()
             of, more = f"{len(known)} recordings", {"baseline": baseline, "at_least": metric == "rank"}
             found.append(row(f"recordings_{name}", value, unit, target, of=of, **more))
     return found

@@ -15,7 +15,7 @@ import dataclasses
 import importlib
 from collections.abc import Callable
 from types import ModuleType
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 from msgspec import Meta
@@ -30,6 +30,7 @@ from ..results import TRANSLATED, GelKind
 
 SHARD_FRAMES = 1000  # frames a task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
+Law = Literal["sheet"]  # of electrodes; there was another, so files of jobs name it
 PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
 
 
@@ -84,6 +85,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
     source: str = SOURCE
     target: str = TARGET
     keep: list[str] = []
+    electrodes: Law = "sheet"
     version: str = __version__
 
 
@@ -96,6 +98,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
     values: list[dict[str, float | str]]
     files: list[str]
     keep: list[str]
+    electrodes: Law = "sheet"
     version: str = __version__
 
 

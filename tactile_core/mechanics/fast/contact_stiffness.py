@@ -41,6 +41,8 @@ class ContactStiffness:
         The next call changes it in place. Raises UnsolvedError where the compliance is not positive definite.
         """
         wanted = np.concatenate([np.repeat(active[: block.k], 3), active[block.k :]])
+        if not len(wanted):
+            self._forget()  # no row is one of the block's
         at, there = self._rows, np.ones(len(self._rows), bool)
         if block is not self._block:
             at = np.minimum(np.searchsorted(block.keys, self._keys), len(block.keys) - 1)

@@ -51,7 +51,7 @@ def test_report_holds_every_row(tmp_path):
         "digit_fast_0.2mm_shape_rms",
         "digit_full_0.2mm_shape_rms",
     ]
-    words = "`digit_fast_0.2mm_shape_rms` 3 um, `digit_full_0.2mm_shape_rms` no um"
+    words = "`digit_fast_0.2mm_shape_rms` 3 um, `digit_full_0.2mm_shape_rms` - um"
     assert f"| Speed | 3 | 2 | {words} |" in text and "scikit-fem" not in text
     words = [line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("|")]
     assert [line for line in text.splitlines() if not line.startswith("|")] == words

@@ -112,3 +112,11 @@ def test_the_step_fulfils_its_linear_equations(deepens):
         )  # fmt: skip
         law = np.einsum("ai,ai->a", lean[at] - friction * normal[at], bears)
         np.testing.assert_allclose(law, 0, atol=1e-4 * np.abs(bears).max())
+
+
+def test_a_block_without_points_has_no_stiffness():
+    stiffness, of, none = ContactStiffness(), block(range(12)), block(range(12))
+    assert amiss(stiffness, of, np.ones(14, bool)) < 1e-5
+    none.k, none.matrix, none.keys = 0, none.matrix[:0, :0], none.keys[:0]
+    assert [len(each) for each in stiffness.among(none, np.ones(0, bool))] == [0, 0]
+    assert amiss(stiffness, of, np.ones(14, bool)) < 1e-5
