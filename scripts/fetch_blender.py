@@ -98,7 +98,7 @@ def fetch(tree: Path, suite: str) -> None:
 
 
 def wrapper(tree: Path) -> Path:
-    """A program that runs a command inside the tree, on the paths of this machine; the tree's Blender without one.
+    """Write a program that runs a command inside the tree, on this machine's paths; without one, the tree's Blender.
 
     The checkout, /tmp, /dev and /proc are mounted in a namespace of that process alone: whoever deletes the tree while
     it runs, or after it was killed, deletes nothing else; and all that it started ends with it.

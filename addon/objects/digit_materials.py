@@ -22,7 +22,7 @@ def is_coating(material: bpy.types.Material) -> bool:
 
 
 def new_coating(coating: Coating) -> bpy.types.Material:
-    """The paint on the gel: albedo, roughness and gloss are nodes, which can be keyed and driven."""
+    """Make the paint on the gel: albedo, roughness and gloss are nodes, which can be keyed and driven."""
     material, shader = _new("DIGIT coating", (0.75, 0.75, 0.78, 1.0))
     nodes, links = material.node_tree.nodes, material.node_tree.links
     for name, kind, socket in ((ALBEDO, "ShaderNodeRGB", "Base Color"), (ROUGHNESS, "ShaderNodeValue", "Roughness"),
@@ -72,7 +72,7 @@ def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
 
 
 def acrylic() -> bpy.types.Material:
-    """Clear acrylic: all light goes through, as losses are part of the calibration too; reflections come on top."""
+    """Make clear acrylic: it lets all light through, as the calibration has its losses; reflections come on top."""
     found = bpy.data.materials.get("DIGIT acrylic")
     if found is not None:
         return found
@@ -93,7 +93,7 @@ def acrylic() -> bpy.types.Material:
 
 
 def of_body(name: str, colour: list[float], roughness: float, metallic: float = 0.0) -> bpy.types.Material:
-    """A material of the table ``materials`` of ``sensor_bodies.toml``."""
+    """Make a body's material, or find it; the arguments are a row of ``materials`` in ``sensor_bodies.toml``."""
     label = f"Tactile {name}"
     found = bpy.data.materials.get(label)
     if found is not None:
@@ -109,13 +109,13 @@ def of_body(name: str, colour: list[float], roughness: float, metallic: float = 
 
 
 def toward_camera(material: bpy.types.Material, value: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
-    """A value for rays that come from a camera, 0 for all others."""
+    """Return a node's output: ``value`` for rays that come from a camera, 0 for all others."""
     ray = material.node_tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
     return math(material, "MULTIPLY", ray, value)
 
 
 def math(material: bpy.types.Material, operation: str, *values: object, kind: str = "Math") -> bpy.types.NodeSocket:
-    """The output of a new math node; kind : ``VectorMath`` for one of vectors."""
+    """Add a math node and return its output; values : its inputs; kind : ``VectorMath`` for one of vectors"""
     node = material.node_tree.nodes.new(f"ShaderNode{kind}")
     node.operation = operation
     for socket, value in zip([socket for socket in node.inputs if socket.enabled], values, strict=False):

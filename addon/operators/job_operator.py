@@ -13,7 +13,7 @@ _STEP = 0.1  # s between two looks at the worker
 
 
 class JobOperator(TactileOperator):
-    """Subclasses' ``begin`` sets ``_job``, or leaves it None with nothing to wait for; ``finish`` takes the result."""
+    """Base of operators with a job: ``begin`` starts ``_job``, or leaves it None; ``finish`` takes the result."""
 
     stopped: ClassVar[str] = "Stopped; the scene is as it was"
     _job: Job | None = None

@@ -50,7 +50,7 @@ class Translated:
     gel: Motion
 
     def fits(self, motion: str) -> bool:
-        """Return true if its movements are in files, and these exist, or in memory, as ``in_files`` has it."""
+        """Return true if the movements are where ``in_files`` wants them: in files that exist, or in memory."""
         files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 
@@ -78,7 +78,7 @@ def _in_blender_axes(force: np.ndarray) -> np.ndarray:
 
 
 def in_files(motion: str, frames: int) -> bool:
-    """Return true if a movement of so many frames is held in files; motion : see ``load``."""
+    """Return true if a movement of this number of frames is held in files; motion : see ``load``."""
     return motion == MESH_CACHE or (not motion and frames > LONG)
 
 
@@ -110,7 +110,7 @@ def fingers(path: str) -> list[str]:
 
 
 def write_columns(path: str, asked: RecordingOptions) -> str:
-    """Guess the map of columns that was named where its file is missing; return what was written in words, or ""."""
+    """Write a guessed map of columns where the map's file is missing; return a sentence, "" if nothing was."""
     file = _absolute(asked.columns)
     if not file or os.path.lexists(file):
         return ""

@@ -20,7 +20,7 @@ _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
 def folder(name: str) -> Path:
-    """Return one of the folders, made or not: beside the .blend; of one that was never saved, Blender's own."""
+    """Return the folder ``name`` beside the .blend, or Blender's own where that was never saved; it may not exist."""
     if bpy.data.is_saved:
         return Path(bpy.path.abspath(f"//{name}"))
     for old in _own(name).glob("*.pc2"):

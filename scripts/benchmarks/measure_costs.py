@@ -69,12 +69,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
-    """A ball that presses at constant force and moves over the pad, one frame free of it."""
+    """Return a ball's way over the pad at constant force, rows (s, x mm, z mm, N); the first frame is free."""
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """A part from what few and many frames cost."""
+    """Return a part's cost a frame and at its start; costs, sizes (bytes), frames : of a run on few and one on many"""
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)

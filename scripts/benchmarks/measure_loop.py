@@ -206,7 +206,7 @@ def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
 
 
 def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:
-    """The contact, or None where none is found; the time of that counts too."""
+    """Return the contact at a depth, m; None where none is found, whose time counts too."""
     try:
         found = press.at_depth(depth)
     except (TactileError, UnsolvedError):
@@ -215,7 +215,7 @@ def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:
 
 
 def timed(work: Callable[[], Any]) -> tuple[tuple[float, float], Any]:
-    """CPU and wall ms of a call, and what it gives."""
+    """Do ``work`` and return (CPU ms, wall ms) of it, and its result."""
     wall, cpu = time.perf_counter(), time.process_time()
     found = work()
     return (1e3 * (time.process_time() - cpu), 1e3 * (time.perf_counter() - wall)), found

@@ -155,7 +155,7 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
 def converge(
     unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Change of the picture of each field, grey levels (H, W, 3): by direct light alone, and by the full model."""
+    """Yield each field's change from rest, grey levels (H, W, 3), by direct light alone and by the full model."""
     rest = of_unit(rest_height_map(unit.camera), unit)
     light = MatteLight(unit, truth, variant, rest, seed)
     resting, seen = light.direct(rest)
@@ -217,7 +217,7 @@ def one_thread(variant: str) -> None:
 
 
 def table(rows: list[Row], count: int) -> dict:
-    """The data file of the presets: what was measured on so many fields, by preset."""
+    """Return the content of the presets' data file from measured rows; count : fields that were measured"""
     value = {found["name"]: found["value"] for found in rows}
     presets = {}
     for name in NAMES:

@@ -70,7 +70,7 @@ class ConversionReport:
             self._shown[int(frames[row])] = kept
 
     def warnings(self) -> tuple[str, ...]:
-        """Return warnings for the user: of the recording, and of its translated frames."""
+        """Return warnings for the user: of the weights, the options, the recording, and its translated frames."""
         translator, drawer = self._tools.translator, self._tools.drawer
         found = [
             *filter(None, [doubt(translator.card)]),

@@ -192,7 +192,7 @@ def _put_together(folder: Path, job: Job[Simulate], out: Path) -> None:
 
 
 def prepare_input(folder: Path, job: Job[Simulate], index: int) -> tuple[int, bool]:
-    """Return one shard; nothing needs to be prepared."""
+    """Return (1, False): each recording is one shard, and nothing needs to be prepared."""
     return 1, False
 
 

@@ -89,7 +89,7 @@ def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict
 
 
 def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts | None:
-    """Return the shards, frames and warnings of a prepared recording."""
+    """Return the facts of a prepared recording: shards, frames, warnings, bytes; None where it is not prepared."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     frames = checksummed.stated_rows(file)
     if frames is None:  # none yet, or a damaged one, which the next run makes again

@@ -47,10 +47,10 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 
 
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
-    """Return the errors of a contact in the full or the reference tier.
+    """Enlarge a depth's errors, full or reference tier, where few nodes touch or the indenter cuts in between them.
 
-    across : nodes across the contact, by the full tier's spacing; hidden : m, how deep the surface lies in the indenter
-    between nodes
+    nodes : that touch; across : nodes across the contact, by the full tier's spacing
+    hidden : m, how deep the indenter lies under the surface between nodes
     """
     if not nodes:
         return _of_nothing(depth)

@@ -76,12 +76,12 @@ class Solution(Summary):
 
     @functools.cached_property
     def electrode_gaps(self) -> np.ndarray:
-        """Film (19,) m over each electrode of the BioTac; (0,) on the DIGIT. The fast tier's is not corrected."""
+        """Film (e,) m over each electrode; (0,) on a gel. The fast tier's is not corrected."""
         return self.on_demand.electrode_gaps()
 
     @functools.cached_property
     def films(self) -> np.ndarray:
-        """Film (k,) m at the nodes of the conducting sheet; (0,) on the DIGIT. The fast tier's is not corrected."""
+        """Film (k,) m at the nodes of the conducting sheet; (0,) on a gel. The fast tier's is not corrected."""
         return self.on_demand.films()
 
     @functools.cached_property

@@ -171,7 +171,7 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @Loop
 def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN201
-    """See ``ShadowCaster._march``; distance : (columns,) m, radii : (rows, columns), steps : (k,) columns."""
+    """Compute ``ShadowCaster._march`` by loops; distance : (columns,) m; radii : (rows, columns); steps : (k,)"""
     rows, columns = field.shape
     sight = np.empty((rows, columns), np.float32)
     horizon = np.empty(columns, np.float32)

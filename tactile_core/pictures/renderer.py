@@ -187,7 +187,7 @@ class Renderer:
         return heights
 
     def in_levels(self, radiance: np.ndarray) -> np.ndarray:
-        """Convert radiance (H, W, 3) to grey levels float32 by the response, as the camera's channels see it."""
+        """Convert each LED's radiance (H, W, LED) to grey levels (H, W, 3) float32, weighted sums of the LEDs."""
         levels = np.empty_like(radiance)
         for channel, row in enumerate(self._response):
             levels[..., channel] = sum(part * radiance[..., led] for led, part in enumerate(row))

@@ -71,7 +71,7 @@ def contacts_of(name: str) -> np.ndarray | None:
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the fluid's rise (P,) float64 Pa in these contacts, or None. Raises TactileError without electrodes."""
+    """Load the fluid's rise (P,) float64 Pa in ``contacts_of``'s contacts, or None. TactileError without electrodes."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 

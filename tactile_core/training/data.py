@@ -60,7 +60,7 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """Return the rows followed by the share of silent samples."""
+        """Append silent samples to rows (B,), the share ``options.silence`` of them, at least one."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:

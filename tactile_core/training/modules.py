@@ -159,7 +159,7 @@ class MeshVae(Vae):
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
     def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute the error of the decoded latent (B, L) against the contacts of these rows: see `Surface.loss`."""
+        """Compute `SurfaceCodec.loss` of the decoded latent (B, L) against the contacts of these rows."""
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
@@ -168,7 +168,7 @@ class MeshVae(Vae):
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the distance, in cells, of the places of latents (B, L) from the contacts': see `Surface.astray`."""
+        """Return the mean distance, in cells, from the places in latents (B, L) to the contacts' true ones."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:

@@ -124,8 +124,8 @@ def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Negative log likelihood of the contact, nats, and errors of the frozen codes and of the signal. (By likelihood a
-    contact is not estimated fainter than its signal makes it.) SVB is trained along, to keep what separates
+    """Sum of the true contact's negative log likelihood, nats, and the errors of the BioTac's code and of SVB. (By
+    likelihood a contact is not estimated fainter than its signal makes it.) SVB trains along, to keep what separates
     contacts."""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
@@ -171,7 +171,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the force from the BioTac's latent, of a mesh or estimated from signal and contact."""
+    """Mean relative error of the force from the BioTac's latent: once of the true mesh, once of signal and contact."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)

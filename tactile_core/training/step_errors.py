@@ -125,7 +125,7 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """Return RMS over moving nodes, largest node error, error of the core's height (all um), of the peak (%)."""
+    """Return errors of displacements (C, n, 3) m: moving nodes' rms, largest, core's height (um), and peak (%)."""
     metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     metrics["peak_depth_percent"] = np.where(deep, metrics["peak_depth_percent"], np.nan)
@@ -133,7 +133,7 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
-    """Return the intersection over union of the patches, and distance of their middles in mm."""
+    """Return the intersection over union of found gels' (C, M, 3) m and true patches (C, M), middles' distance, mm."""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)

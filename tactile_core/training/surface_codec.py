@@ -132,7 +132,8 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Compute `ContactFrame.cells`: whole cells (B, 2) and the remainder, through which the place has gradients."""
+        """Round places (B, 2) to cells (B, 2) and remainders (B, 2), which carry the gradients; see
+        `ContactFrame.cells`."""
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
@@ -143,13 +144,13 @@ class SurfaceCodec:
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, of places (B, 2) from the contacts'; silent samples count LEAST_AWAY."""
+        """Return the mean distance, in cells, from places (B, 2) to the true ones; silent samples count LEAST_AWAY."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean over contacts of the rms error over moving nodes, 1 for no displacement, of coefficients (B,
-        K + K') around cells (B, 2).
+        """Return the mean error of contacts, rms over moving nodes, 1 for no displacement, of coefficients (B, K + K')
+        around cells (B, 2).
 
         The root is taken contact by contact, as in the reported metric, so that deep contacts do not dominate shallow
         ones. The bases are orthonormal, so an error in coefficients is one of nodes; the part outside both bases is

@@ -70,12 +70,12 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the network's sizes: changes on two scales -> half the parts' difference, and the logit of two."""
+    """Return the sizes of the network from ``network_input`` to half the parts' difference and the logit of "two"."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 
 def network_input(change: Tensor) -> Tensor:
-    """Convert changes (B, e) counts to the network's input (B, 2e)."""
+    """Convert changes (B, e) counts to the network's input (B, 2e): their arcsinh on a coarse and on a fine scale."""
     return torch.cat([torch.asinh(change / COUNT_SCALE), torch.asinh(FINE * change / COUNT_SCALE)], -1)
 
 

@@ -113,7 +113,7 @@ class Networks:
         return latent
 
     def m2m_back(self, latent_target: np.ndarray) -> np.ndarray:
-        """Map latent_target (T, L') to latent_source (T, L)."""
+        """Map the DIGIT's latent (T, L') to the BioTac's (T, L)."""
         return self._map_placed("D2BPN", "MVD", latent_target)
 
     def m2s(self, latent_source: np.ndarray) -> np.ndarray:

@@ -60,7 +60,7 @@ class Posterior:
         return (self.weight[..., None] * self.mean).sum(1)
 
     def drawn(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Draw states (T, count, STATE) of frames (T,); the frame numbers are the seeds."""
+        """Draw ``count`` states of each row, (T, count, STATE). frames : (T,) int, the rows' frame numbers, as seeds"""
         found = np.empty((len(frames), count, self.mean.shape[-1]), np.float32)
         for row, frame in enumerate(frames):
             random = np.random.default_rng([SEED, int(frame)])

@@ -29,7 +29,7 @@ WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
 
 
 class Known(NamedTuple):
-    """Samples: features x (n, f), logarithms of force ratios (n,), fields (n, g, 3), folds (n,), rubbing (n,)."""
+    """Samples: features x (n, f), log force ratios (n,), fields (n, g, 3), folds (n,); rubbing (n,), with friction"""
 
     x: np.ndarray
     log_ratio: np.ndarray
@@ -49,17 +49,17 @@ def mirrored(field: np.ndarray) -> np.ndarray:
 
 
 class Choice(NamedTuple):
-    """Kernel regression's width in standard deviations of a feature, and ridge over the kernel's mean diagonal."""
+    """Kernel regression's settings. width : standard deviations; ridge : over the mean of the kernel's diagonal"""
 
     width: float
     ridge: float
 
     def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
-        """Kernel (n, m) between scaled features (n, j) and (m, j) of samples that ``rubs`` so."""
+        """Return the kernel (n, m) of scaled features (n, j), (m, j) with friction ``rubs`` (n,), (m,)."""
         return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
-        """Weights of supports (n, f), for goals (n, k)."""
+        """Fit weights (n, k) of scaled features (n, f), with friction ``rubbing`` (n,), to goals (n, k)."""
         near = self.near(scaled, scaled, rubbing, rubbing)
         return np.linalg.solve(near + self.ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
 
@@ -90,7 +90,7 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """Choose widths and ridges on held-out presses of one kind: for forces by all and few features, for fields."""
+    """Choose by held-out presses, with friction if ``kind``: for forces by all features, by few, and for fields."""
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]

@@ -52,7 +52,7 @@ Pair = tuple[np.ndarray, Solution, Solution]  # slide (2,) m, and both sensors' 
 
 
 def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
-    """Draw press ``number``, in ``REGION_X`` where odd. Raises TactileError without one box, one ring and others."""
+    """Draw press ``number``, in ``REGION_X`` if odd. Raises TactileError without a box, a ring and other bodies."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()

@@ -84,7 +84,7 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
 def paired(
     sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
 ) -> Iterator[Sample]:
-    """The press in the fast tier, beside the full tier's contacts; those that both tiers hold."""
+    """Solve a press in the fast tier at the full tier's depths; yield a sample of each contact that both tiers hold."""
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None
@@ -115,7 +115,7 @@ def _holds(problem: ContactProblem, contact: Contact) -> bool:
 
 
 def residual_on_grid(sensor: str, at: PatchFrame, residual: np.ndarray) -> np.ndarray:
-    """A field (n, 3) at a sensor's nodes, in the frames of its nodes, on the moving grid (g, 3); 0 beyond the nodes."""
+    """Interpolate a residual (n, 3) at a sensor's nodes to the moving grid (g, 3), in the nodes' frames; 0 beyond."""
     import scipy.interpolate
 
     local = np.einsum("kji,kj->ki", correction.node_frames(sensor), residual)
@@ -131,7 +131,7 @@ def _triangulation(sensor: str):  # noqa: ANN202
 
 
 def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Correction, list[Row]]:
-    """The correction of one sensor, and rows of its errors on held-out presses (five folds by press)."""
+    """Learn a sensor's correction; also return rows of its errors on held-out presses (five folds by press)."""
     samples = list(samples)
     known = Known(
         np.array([s.features for s in samples]), np.log([s.ratio for s in samples]),

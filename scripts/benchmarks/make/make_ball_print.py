@@ -44,7 +44,7 @@ def main() -> int:
 
 
 def prints(radius: float, depths: np.ndarray, nodes: int) -> np.ndarray:
-    """Rise over depth (depths, nodes) float32 of the flat layer under a ball of a radius, m, at depths (n,) m."""
+    """Return the flat layer's rise over depth (n, nodes) float32 under a ball of ``radius`` m at depths (n,) m."""
     mesh = disc_mesh(DIGIT.half_width, DIGIT.thickness, radius, SPACING[radius] * radius, FINE_DEPTH * radius, GROWTH)
     contact = pressed(mesh, DIGIT.descriptor.material, Sphere(radius), radius)
     place = STEP * np.arange(nodes)

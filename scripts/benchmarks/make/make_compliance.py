@@ -102,7 +102,7 @@ def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
 
 
 def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """Clusters of points at (n, 2), and the order (n,) in which the largest clusters' details come first."""
+    """Cluster points at (n, 2) m; also return the order (n,) in which the largest clusters' details come first."""
     clusters: list[tuple[np.ndarray, np.ndarray]] = []
     level = np.zeros(len(places), int)
     linear = np.column_stack([np.ones(len(places)), places])
@@ -129,7 +129,7 @@ def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.nd
 
 
 def rounded(half: Half, basis: Basis) -> np.ndarray:
-    """Whole steps (n, rows) uint32 of a half in a basis: 0, -1, 1, -2 ... as 0, 1, 2, 3; the upper triangle alone."""
+    """Round a half's upper triangle in a basis to steps (n, rows) uint32; 0, -1, 1, -2 ... are stored as 0, 1, 2, 3."""
     touched, rows, unknown = basis.touched, basis.rows, basis.unknown
     order = np.empty(touched, int)
     order[np.argsort(unknown[:touched])] = np.arange(touched)

@@ -49,7 +49,7 @@ def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
 
 
 def wanted_contacts(arguments: argparse.Namespace) -> list[tuple[int, float]]:
-    """Number and friction of each press to solve."""
+    """List the contacts to solve, (press, friction): all presses without friction, then the first ones with it."""
     rubbing = [(number, FRICTION) for number in range(min(arguments.rubbing, arguments.presses))]
     return [(number, 0.0) for number in range(arguments.presses)] + rubbing
 

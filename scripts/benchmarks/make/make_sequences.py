@@ -95,7 +95,7 @@ SENSORS = ("biotac", "digit")
 
 
 def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) -> list[Contact]:  # noqa: ANN001
-    """Contacts of an indenter that leans over, from half of LEAN behind to half ahead of where it was drawn."""
+    """Solve a roll on both sensors: the indenter leans from -LEAN / 2 to LEAN / 2 and moves by ROLLED ``ahead``."""
     contacts = []
     for force, share in zip(forces.tolist(), (moved - 0.5).tolist(), strict=True):
         x, z = np.array([place.x, place.z]) + share * ROLLED * ahead

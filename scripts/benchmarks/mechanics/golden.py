@@ -1,4 +1,4 @@
-"""The golden forces of docs/sources.md, Mechanics: a ball of 3.5 mm on a bonded layer of 3 mm, down to 60 % of it."""
+"""Hold the finite-strain solver against the golden forces of docs/sources.md: a ball pressed into a bonded layer."""
 
 from __future__ import annotations
 

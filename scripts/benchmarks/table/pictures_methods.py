@@ -51,7 +51,7 @@ def measure(name: str, quick: bool, truth: str) -> Method:
 
 
 def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
-    """Return what makes levels (H, W, 3) of a light's radiance (H, W, 3), spread by the coating as `Renderer` does."""
+    """Return a function from a light's radiance (H, W, 3) to grey levels (H, W, 3), spread by the coating."""
     in_levels, spread = Renderer(unit, FAST).in_levels, CoatingSpread(unit.camera, unit.coating.spread)
     return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
 

@@ -158,7 +158,7 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
-    """Errors of gels (B, M, 3) m and forces (B,) N against those of a part of the pairs, named after ``name``."""
+    """Return errors of gels (B, M, 3) m and forces (B,) N on a part of the pairs; ``name`` begins their names."""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {
@@ -178,9 +178,9 @@ def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def nearest_example(pairs: Pairs, change: np.ndarray, press: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Gel (C, M, 3) m and force (C,) N of the nearest example to each signal, scaled to its size.
+    """Return gel (C, M, 3) m and force (C,) N of the contact whose signal is most like each, scaled to its size.
 
-    press : (C,) of each signal, whose own contacts are no examples; none where the signals are of other presses
+    change : (C, e) counts; press : (C,), of each, whose own contacts are no examples; None where all are of others
     """
     length = np.sqrt(np.square(change).sum(-1))
     known = np.sqrt(np.square(pairs.signal).sum(-1))

@@ -81,7 +81,7 @@ def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def stepped(count: int, by: float) -> Fault:
-    """Move some electrodes by so many counts from some frame on."""
+    """Return a fault: some electrodes move by ``by`` counts from some frame on; count : how many electrodes"""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by
@@ -91,7 +91,7 @@ def stepped(count: int, by: float) -> Fault:
 
 
 def drifting(count: int, by: float) -> Fault:
-    """Let some electrodes drift by so many counts to the end."""
+    """Return a fault: ``count`` electrodes drift evenly by ``by`` counts to the end."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[:, _drawn(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
@@ -101,7 +101,7 @@ def drifting(count: int, by: float) -> Fault:
 
 
 def noisy(count: int, counts: float) -> Fault:
-    """Add so many counts of noise to some electrodes."""
+    """Return a fault: ``count`` electrodes have noise of ``counts`` counts."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[:, _drawn(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
@@ -145,7 +145,7 @@ def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def held(share: float) -> Fault:
-    """Repeat the last row in place of so many lost ones, in bursts of up to eight."""
+    """Return a fault: the last row is repeated in place of lost ones, a ``share`` of all, in bursts of up to eight."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         lost = np.zeros(len(electrodes), bool)
@@ -159,7 +159,7 @@ def held(share: float) -> Fault:
 
 
 def frozen(frames: int) -> Fault:
-    """Repeat the row of the largest change for so many frames."""
+    """Return a fault: the row of the largest change is repeated for ``frames`` frames."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         first = int(np.abs(electrodes - rest).sum(axis=1).argmax())

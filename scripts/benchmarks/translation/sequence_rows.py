@@ -110,6 +110,6 @@ def _row(
 
 
 def quantile(values: np.ndarray, level: int) -> float | None:
-    """The value that so many per cent stay below; None where that is a lost contact."""
+    """Return the value that ``level`` per cent of values stay below; None where that is a lost contact's, infinity."""
     found = float(np.nanpercentile(values, level, method="higher"))
     return found if np.isfinite(found) else None

@@ -46,7 +46,7 @@ class Indenter(Protocol):
         return np.array(lower), np.array(upper)
 
     def preview(self, hull: Hull) -> Surface:
-        """Return the nodes (n, 3) m and triangles (m, 3) that show the body; those of a convex one are its hull's."""
+        """Return nodes (n, 3) m and triangles (m, 3) that show the body; hull : makes them of a convex one's support"""
         return hull(self.support)
 
     @functools.cached_property

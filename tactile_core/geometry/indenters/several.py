@@ -69,7 +69,7 @@ class Several(Indenter):
 
 
 def joined(parts: Iterable[tuple[Indenter, Pose]], hull: Hull) -> Surface:
-    """Join the surfaces that show bodies, each in its pose, into one."""
+    """Join the surfaces that show bodies, each in its pose, into one; hull : see ``Indenter.preview``"""
     nodes, faces, count = [], [], 0
     for body, pose in parts:
         own, triangles = body.preview(hull)

@@ -63,7 +63,7 @@ class BiotacSheet:
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """Part of each electrode's resistance (e + 4,) ohm in films (k,) m that the grid does not resolve."""
+        """Resistance (e + 4,) ohm near each electrode in films (k,) m, which the grid is too coarse for."""
         return self.unresolved / (self.fluid.conductivity * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
@@ -141,7 +141,7 @@ def _connected(faces: np.ndarray) -> np.ndarray:
 
 
 def film_floor(sensor: str) -> float:
-    """Thickness, m, of the thinnest film of a sensor that the law knows."""
+    """Return the least film thickness, m, at which the sheet's law is still valid for a sensor."""
     return sensors.skin_of(sensor).descriptor.fluid.thinnest
 
 

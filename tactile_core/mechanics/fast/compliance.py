@@ -211,14 +211,14 @@ def condensed(solid: Solid) -> tuple[Half, Half]:
 
 
 def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Surface nodes (k,) with z >= 0, and the indices (r,) among them of those that are touched, or their images."""
+    """Return the surface nodes (k,) with z >= 0, and the indices (r,) among them of ``answered_nodes``."""
     rest = solid.lattice.rest
     half = np.flatnonzero(rest[:, 2] >= -ON_PLANE)
     return half, np.searchsorted(half, answered_nodes(solid.lattice, solid.touchable, mirror_nodes(rest)))
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sensing points (v,) with z >= 0, and which of them (w,) each sensing point is, mirrored for sign (w,) -1."""
+    """Return sensing points (v,) with z >= 0; which of these each one is or mirrors (w,); -1 where it mirrors (w,)."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)

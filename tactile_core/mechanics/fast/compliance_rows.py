@@ -123,7 +123,7 @@ class ComplianceBlock:
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Update ``normal`` to ``normals`` (k, 3), where those of the nodes ``at`` (j,) have turned."""
+        """Return ``normal``'s matrix for ``normals`` (k, 3) of which those of the nodes ``at`` (j,) are new."""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)
@@ -158,7 +158,7 @@ def surface_motion(
 def sensing_gaps(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Return the gaps (count,) m of the first sensing points under the same forces."""
+    """Return the first ``count`` sensing points' gaps (count,) m under the forces of ``surface_motion``."""
     gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps

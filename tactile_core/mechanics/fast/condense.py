@@ -166,14 +166,14 @@ def axes_of(nodes: np.ndarray) -> np.ndarray:
 
 
 class MirrorSymmetry:
-    """Puts the even and the odd half of a motion together. ``half`` (k,) surface nodes with z >= 0; ``image`` (n,)."""
+    """Joins the even and the odd half of a motion. half : (k,) surface nodes with z >= 0; image : (n,) of each node"""
 
     def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
         self.half, self.image = half, image
         self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return the motion (w, 3 n) float32 from the halves' (3 k, v): load i is ``column[i]``, mirrored for -1."""
+        """Return motions (w, 3 n) float32 from the halves' (3 k, v): of load ``column[i]``, mirrored if sign is -1."""
         answer = np.empty((len(column), 3 * len(self.image)), np.float32)
         here, there = axes_of(self.half), axes_of(self.image[self.half])
         for i, (load, mirrored) in enumerate(zip(column, sign, strict=True)):

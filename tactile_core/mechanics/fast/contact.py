@@ -112,7 +112,7 @@ class ContactProblem:
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of the followed points that are nodes: here all of ``near``."""
+        """Sorted touchable indices (n,) of followed nodes: all of ``near``, but where points between nodes are too."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:

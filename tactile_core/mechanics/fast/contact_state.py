@@ -67,7 +67,7 @@ class Contact:
 
     @property
     def sensing_gaps(self) -> np.ndarray:
-        """Gaps (w,) m of the sensing points: 19 electrodes, then inner skin over the core, then beside it."""
+        """Gaps (w,) m of the sensing points: the electrodes, then inner skin over the core, then beside it."""
         return self._gaps(len(self.compliance.watch_gap))
 
     @property
@@ -141,7 +141,7 @@ class Candidates:
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
-        """Take an iterate as the new first guess; ``active`` may go on with that of the inner points."""
+        """Take displacement (k, 3) m and active (k,) bool as the new first guess; ``active`` may be longer."""
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
@@ -205,9 +205,9 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
 
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return where (n, 3), in its frame, nodes that move from ``first`` to ``last`` (n, 3) m first meet an indenter.
+    """Return where (n, 3) m, in its frame, nodes moving straight from ``first`` to ``last`` first meet an indenter.
 
-    Points that it does not meet are given as they stand at the end.
+    Nodes that do not meet it are given at ``last``.
     """
     way = last - first
     share, on_way = np.zeros(len(first)), np.arange(len(first))

@@ -145,7 +145,7 @@ def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def plane(sensor: str) -> np.ndarray:
-    """Unrolled places (n, 2) = (x, z) m of a sensor's surface nodes; the BioTac's back goes on round its axis."""
+    """Return the unrolled places (n, 2) = (x, z) m of a sensor's surface nodes, those of a BioTac's back too."""
     if sensors.is_gel(sensor):
         return sensors.sensor_surface(sensor).rest[:, [0, 2]]
     ends = [[unrolling.rolled_x(sensor)[0], 0.0], [unrolling.rolled_x(sensor)[-1], 0.0]]
@@ -166,7 +166,7 @@ def node_frames(sensor: str) -> np.ndarray:
 
 
 def frame(compliance: Compliance, contact: Contact) -> PatchFrame:
-    """PatchFrame of a contact's fields: about the centre of its forces, scaled with its patch's radius."""
+    """Return the frame of a contact: about the centre of its forces, with the radius of its patch."""
     places = plane(compliance.name)[compliance.touchable[contact.nodes]]
     load = np.linalg.norm(contact.nodal_force, axis=1)
     share = load / load.sum()

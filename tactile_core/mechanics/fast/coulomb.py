@@ -86,10 +86,11 @@ class Slipping(NamedTuple):
 
 
 class Sorted(NamedTuple):
-    """Which points touch, (k + c,), and slip, (k,), after a step, whether that has changed, and how far all is off.
+    """Points sorted after a step, and how far from Coulomb's law it is.
 
-    touched : whether any node did; deepest, widest, slid : m, least gap of all nodes, largest gap and slip of those
-    that touched; tilted, size : N, by which forces turn with their normals, and the whole force
+    active : (k + c,) bool, which touch; slips : (k,) bool; changed : whether either has; touched : whether any node did
+    deepest : m, least gap of all nodes; widest, slid : m, largest gap and slip of those that touched
+    tilted : N, by which forces turn with their normals; size : N, of the whole force
     """
 
     active: np.ndarray
@@ -267,9 +268,9 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 
 @Loop
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
-    """Let nodes slip that ``left`` (k,) and touch again: sticking drew them off. Changes force, ``after``, ``left``.
+    """Let nodes slip that left the contact and touch again: sticking drew them off. Changes force, ``after``, ``left``.
 
-    Returns the largest gap, m, of what touches now.
+    left : (k,) bool, nodes that have left so far. Returns the largest gap, m, of what touches now.
     """
     force, _, active, _, normal, _, gap, _, off = points
     wrong = 0.0

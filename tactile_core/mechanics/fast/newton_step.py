@@ -32,7 +32,7 @@ def change_of(
     stiffness: tuple[np.ndarray, np.ndarray], points: Points, motion: Motion, slipping: Slipping,
     direction: np.ndarray, *, deepens: bool,
 ) -> Change:  # fmt: skip
-    """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey the law.
+    """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey friction.
 
     stiffness : see ``ContactStiffness.among``; direction : (3,), in which the indenter moves if it ``deepens``
     Raises UnsolvedError.

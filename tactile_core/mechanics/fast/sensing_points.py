@@ -29,14 +29,14 @@ class SensingPoints(NamedTuple):
     gap: np.ndarray
 
     def dense(self, size: int, points: np.ndarray) -> np.ndarray:
-        """The matrix (size, p) of sorted sensing points (p,): 500 MB for half of the skin's; only a build needs it."""
+        """Return columns ``points`` (p,), sorted, of the matrix as a dense one (size, p); size : 3 n_nodes"""
         matrix, chosen = np.zeros((size, len(points))), np.isin(self.columns, points)
         matrix[self.rows[chosen], np.searchsorted(points, self.columns[chosen])] = self.weights[chosen]
         return matrix
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
-    """The electrodes' feet, three nodes each, then the inner nodes over the core, then the free ones beside it."""
+    """List the points: film ends over electrodes, each amid three nodes; inner nodes over the core, then beside it."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)
@@ -51,14 +51,16 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
 
 
 def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Nodes (f,) of the inner skin that are sensing points after the electrodes' feet: all that can move."""
+    """Return the inner skin's free nodes (f,) in the order of their sensing points, which follow the electrodes'."""
     mesh = skin_mesh(sensor)
     return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
 
 
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
-    """Ends of the film over each electrode on the inner skin: face, weights, direction (e, 3), gap (e,) m."""
+    """Ends of the film over each of e electrodes, on the inner skin.
+
+    face : (e,) triangle; weights : (e, 3) of its nodes; outward : (e, 3) unit, from the electrode; gap : (e,) m"""
 
     face: np.ndarray
     weights: np.ndarray
@@ -68,7 +70,7 @@ class ElectrodeFeet:
 
 @functools.cache
 def electrode_feet(sensor: str = sensors.SOURCE) -> ElectrodeFeet:
-    """Nearest point of the resting inner skin to each electrode; gaps are 0.49 to 1.76 mm (published: 0.51 to 1.76)."""
+    """Find the resting inner skin's point nearest to each electrode; gaps .49 to 1.76 mm (published: .51 to 1.76)."""
     positions = sensors.electrodes(sensor)
     face, weights, place = unrolling.closest_on_triangles(sensors.skin_of(sensor).skin_surface("inner"), positions)
     gap = np.linalg.norm(place - positions, axis=1)
@@ -112,14 +114,14 @@ def _beside(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
-    """Inner nodes that may come to press on the core, each with its mirror image."""
+    """Return the inner nodes (f,) that may come to press on the core, each with its mirror image."""
     inner = _inner(sensor)
     faces = facing_core(sensor, inner) & ~mesh.clamped[mesh.inner]
     return np.flatnonzero(faces & faces[mirror_nodes(inner)])
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Index, for each of ``count`` sensing points, of its mirror image, else itself; and true for the images."""
+    """Return which sensing point with z >= 0 each of ``count`` is or mirrors, (count,), and whether it mirrors it."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():

@@ -47,10 +47,9 @@ class Body:
     def contact(
         self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
     ) -> FiniteStrainContact:
-        """Return the contact problem of this body and an indenter that will come ``depth`` m in at most.
+        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most.
 
-        every_edge : hold out edges between nodes, too, that come to lie too deep under the resting nodes to be seen
-            from them
+        every_edge : keep out also edges that come between nodes so deep that the nodes at rest do not show them
         """
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])

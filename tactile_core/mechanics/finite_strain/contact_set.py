@@ -205,7 +205,7 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return held degrees of freedom and their steps, both (k, 3) in ``begin``'s frames; fixed ones stay."""
+        """Return what is held, (k, 3) bool, and its steps (k, 3) m, in ``begin``'s frames; fixed (k, 3) bool stays."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True
@@ -220,7 +220,7 @@ class ContactSet:
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)
 
     def follow(self, reaction: np.ndarray) -> None:
-        """Let friction follow normal forces that have just been found; reaction (k, 3) N in frames."""
+        """Adapt friction, if any node slips, to the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
@@ -228,7 +228,7 @@ class ContactSet:
             self.imbalance = float(np.abs(self.rubbing - before).max() / max(self.pressing.max(initial=0), 1e-12))
 
     def press(self, reaction: np.ndarray) -> None:
-        """Keep the normal forces in reactions (k, 3) N in frames."""
+        """Store the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:

@@ -67,11 +67,10 @@ class LoadPath:
         self.last = self.problem.start()
 
     def to(self, step: Step, guess: float) -> Solution:
-        """See ``solve_path``. Where the full tier's mesh does not hold the indenter, on a finer one from the start.
+        """Solve the next step, see ``solve_path``; guess : m, about the depth of a force.
 
-        guess : m, about where a force is found
-        Without friction, where no mesh holds it, on the tier's own by a way with friction that fades, and at last by
-        short steps.
+        What the full tier's mesh does not hold is solved on a finer one, from the start; what no mesh holds, without
+        friction, by friction that fades, and at last by short steps.
         """
         before = self.last
         try:

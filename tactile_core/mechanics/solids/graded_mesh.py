@@ -54,16 +54,16 @@ class GradedMesh:
     to_columns: np.ndarray
 
     def grid(self, values: np.ndarray) -> np.ndarray:
-        """Values (n_surface, k) at the mesh's surface nodes as a grid (rows, columns, k); poles left out."""
+        """Return values (n_surface, k) at the mesh's surface nodes as a grid (rows, columns, k); poles left out."""
         columns = self.to_columns.shape[1]
         return values[: len(values) // columns * columns].reshape(-1, columns, values.shape[1])
 
     def on_lattice(self, values: np.ndarray) -> np.ndarray:
-        """Values (n_surface, k) at the mesh's surface nodes, at the lattice's nodes (n, k): twice differentiable."""
+        """Interpolate values (n_surface, k) at the mesh's surface nodes to the lattice's (n, k), by cubic splines."""
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Flags (n_surface,) at the mesh's surface nodes, at the lattice's nodes (n,): set where most around are."""
+        """Carry flags (n_surface,) at the mesh's surface nodes to the lattice's (n,): true where most around are."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 

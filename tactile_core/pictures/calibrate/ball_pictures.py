@@ -102,7 +102,7 @@ def working_factor(width: int, height: int) -> int:
 
 
 def whole_factor(width: int, height: int, side: int) -> int:
-    """Return the largest whole factor by which pictures can be reduced to a short side of at least ``side`` px."""
+    """Return the largest divisor of both sides that leaves at least ``side`` px of the shorter one, else 1."""
     wanted = max(min(width, height) // side, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 
@@ -115,7 +115,7 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return what makes a unit's ``BallPictures`` by a preset; raises TactileError for Mitsuba's without LLVM."""
+    """Return the function that makes a unit's ``BallPictures`` by a preset; TactileError for Mitsuba's without LLVM."""
     if preset == FAST:
         return FastPictures
     if trouble := missing_mitsuba():
