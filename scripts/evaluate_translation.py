@@ -37,7 +37,7 @@ from tactile_core.translation.translator import Translator
 
 QUICK = 6  # recordings
 QUICK_CONTACTS = 30  # of other bodies
-QUICK_PRESSES = 7  # of as many one is looked at, or a sequence; prime to how box, ring and others take turns
+QUICK_PRESSES = 7  # one press, or sequence, in so many is looked at; prime to how box, ring and others take turns
 TEST_SET = Path(__file__).resolve().parents[1] / "scenes" / "training" / "test_contacts.h5"
 
 

@@ -45,7 +45,7 @@ class Writer:
     """Takes a surface's displacements, some frames at a time, into a file that is open."""
 
     def __init__(self, file: BinaryIO, sensor: str, per_metre: float, frames: int) -> None:
-        """Begin with the header of so many frames, in Blender units of so many a metre."""
+        """Begin with the header; frames : in the file; per_metre : Blender units in a metre"""
         self._sensor, self._per_metre, self._file = sensor, per_metre, file
         self._rest = axes.to_blender(sensors.sensor_surface(sensor).rest, per_metre)
         # PC2: "POINTCACHE2", version 1, points, first frame, frames a sample, samples; then float32 x, y, z

@@ -136,8 +136,8 @@ def load(
 ) -> Translated:
     """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there.
 
-    motion : one of ``properties.MOTIONS``, which by mesh caches holds movements in files, in units of so many a metre;
-        empty: those for more than ``LONG`` frames
+    motion : one of ``properties.MOTIONS``: mesh caches hold movements in files; "" does so above ``LONG`` frames
+    per_metre : units of these files in a metre
     """
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32

@@ -99,7 +99,7 @@ class Job:
                     pipe.close()
 
     def _messages(self, wait: float) -> Iterator[dict]:
-        """Yield the messages since the last call; waits at most so many seconds for the first."""
+        """Yield the messages since the last call; waits at most ``wait`` s for the first."""
         try:
             yield _message(self._lines.get(timeout=wait) if wait else self._lines.get_nowait())
             while True:

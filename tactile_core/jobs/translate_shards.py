@@ -39,7 +39,7 @@ def translated(frames: int, job: Job[Translate]) -> int:
 
 
 def count(frames: int, job: Job[Translate]) -> int:
-    """Return the number of shards of a recording of so many frames."""
+    """Return the number of shards of a recording of ``frames`` frames."""
     return -(-translated(frames, job) // job.recipe.shard_frames)
 
 

@@ -167,7 +167,7 @@ def touching(change: Framewise) -> np.ndarray:
 
 
 def spread_out(count: int, most: int) -> np.ndarray:
-    """Return the indices of at most so many out of ``count``, evenly spread."""
+    """Return at most ``most`` indices out of ``count``, evenly spread."""
     return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 

@@ -115,7 +115,7 @@ def doubt_law(signals: Signals) -> Signals:
 
 
 def _changes(readings: np.ndarray, rest: Baseline, window: int) -> Changes:
-    """Return the changes of readings (T, 19) against rest, smoothed over so many frames."""
+    """Return the changes of readings (T, 19) against rest, smoothed over ``window`` frames."""
     change = Changes(len(readings), lambda frames: readings[frames] - rest.at(frames))
     return change if window == 1 else Changes(len(readings), smooth(change[EVERY], window).__getitem__)
 

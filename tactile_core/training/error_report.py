@@ -89,7 +89,7 @@ def signal_rows(measure: Measure) -> list[Row]:
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """Translate signals of noise alone, frame by frame: largest displacements (m) and the force (N)."""
+    """Translate T signals of noise alone, each by itself: largest displacements (T,) m, size of the force (T,) N."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)

@@ -262,7 +262,7 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
 
 
 def _uncertainty(gain: np.ndarray, contacts: int) -> float:
-    """Return the expected error of fitted gains (n,) from so many different contacts; NaN for none."""
+    """Return the expected error of gains (n,) fitted from a number of different contacts; NaN for none."""
     if not len(gain):
         return np.nan
     return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))

@@ -17,7 +17,7 @@ from .method import TEST_SET, TRAINING, Method, peak_mb
 NAMES = tuple(f"{sensor}_{tier}" for sensor in ("digit", "biotac") for tier in ("fast", "full", "reference"))
 TRUTH = TRAINING / "reference_contacts.npz"
 QUICK = 2  # contacts that the full tier solves in a quick run
-EVERY = 7  # of as many test presses one, in a quick run
+EVERY = 7  # one test press in so many, in a quick run
 IN_LOOP, IN_LOOP_QUICK = 500, 18  # contacts a sensor, alone and on paths
 REPEATS = {"fast": 3, "full": 1}
 

@@ -20,7 +20,7 @@ from .method import TEST_SET, Method, best_ms, peak_mb
 
 BATCHES = 1, 500  # frames a call
 NAMES = (*(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence") for batch in BATCHES), "numpy_solved_100")
-EVERY = 3  # of as many test presses one, in a quick run; prime to how box, ring and others take turns
+EVERY = 3  # one test press in so many, in a quick run; prime to how box, ring and others take turns
 Change = np.ndarray  # (B, 19) counts
 Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 

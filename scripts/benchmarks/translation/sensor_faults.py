@@ -41,7 +41,8 @@ Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19
 
 @dataclass(frozen=True)
 class Base:
-    """A recording to break, its rest (19,) counts, its unit's file or None, and every how many frames are judged."""
+    """A recording to break; rest : (19,) counts; sensor : its unit's file, or None; every : one frame in so many is
+    judged"""
 
     name: str
     recording: Recording

@@ -35,7 +35,7 @@ Errors = dict[str, np.ndarray]  # by UNITS, a number a judged frame
 
 
 def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
-    """Medians over frames from 0.1 N on, of all sequences and each motion; every : of as many one is judged"""
+    """Medians over frames from 0.1 N on, of all sequences and each motion; every : judge one sequence in ``every``"""
     truth = {name: values[::every] for name, values in read(file).items()}
     number = len(truth["motion"])
     followed, alone = both = measured(network, truth)

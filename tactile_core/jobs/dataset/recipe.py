@@ -73,7 +73,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     sensor : that made the recordings, biotac or biotac_sp
     tasks : labels to learn; values : columns of numbers of the recordings' files, which become labels too
     force : file of newtons beside a recording, used where it exists
-    every : translate one of so many frames; snapshots : true where frames do not follow each other in time
+    every : translate one frame in ``every``; snapshots : true where frames do not follow each other in time
     notes : first lines of the card"""
 
     format: str

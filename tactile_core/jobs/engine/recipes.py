@@ -57,7 +57,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
     answer : options of the estimated contact; gel : the networks' gel, or the contact solved on the target
-    source, target : the sensors; every : translate one of so many frames of the recording"""
+    source, target : the sensors; every : translate one frame in ``every``"""
 
     keep: list[str]
     weights: str
@@ -90,8 +90,8 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to one recording for each input, which has its own values; see ``jobs.simulate``.
-    seed : of the first; each next one has one more; values : name -> values, one an input
+    """A scene to one recording for each input, with values of its own; see ``jobs.simulate``.
+    seed : of the first input, each next one has one more; values : one dict an input, name -> value
     keep : words of ``scene_recording.outputs``"""
 
     seed: int

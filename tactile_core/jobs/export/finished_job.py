@@ -41,7 +41,7 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 class Recorded:
     """Recording of a finished job; name : in the job; frames : their number; shards : its files, in order
     labels : name -> (T,) object array of str; split : its part of the data set
-    every : one of so many frames was translated; pair : sensor and gel, which some arrays are named after"""
+    every : one frame in ``every`` was translated; pair : sensor and gel, which some arrays are named after"""
 
     name: str
     frames: int

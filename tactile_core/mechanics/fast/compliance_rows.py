@@ -123,7 +123,7 @@ class ComplianceBlock:
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Return ``normal``'s matrix for ``normals`` (k, 3) of which those of the nodes ``at`` (j,) are new."""
+        """Return ``normal``'s matrix after nodes ``at`` (j,) turned; matrix : before; normals : (k, 3), after"""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)

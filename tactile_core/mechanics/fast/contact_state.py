@@ -24,8 +24,9 @@ class Contact:
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
-    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3), with what is pushed between nodes as loads on
-        those whose cubic interpolation it is, some of them small and outward
+    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3), forces between nodes spread over the nodes
+    whose
+        cubic interpolation gives their places, some of which then have a small outward force
     slipping : (k,) bool, nodes whose friction is spent; without friction all
     converged : whether it may be used; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
@@ -157,11 +158,10 @@ class Candidates:
     def split(
         self, at: np.ndarray, left: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray
     ) -> None:
-        """Let nodes ``at`` (j,) touch two faces, where there are two: the one that they are at and the one they left.
+        """Double nodes ``at`` (j,) that lie in a crease: they touch the face that they are at and the one they left.
 
-        left, normals : (j, 3), points of the faces that they left, and the normals there
-        Where the planes of two faces meet, a little away from one of them the other is the nearer one: there its
-        distance is measured.
+        left, normals : (j, 3), a point of the face that each left, and the normal there; rest : (k, 3) m, of all nodes
+        At the crease itself both faces are equally near: each is probed a little beside it, where it is the nearer one.
         """
         self.looks[at] += 1
         points = rest[at] + self.displacement[at]

@@ -167,5 +167,5 @@ class _OfUnit(BallPictures):
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:
-    """Return a preset for pictures reduced by a factor: one bounce at as many places of the gel, or half as many."""
+    """Return a preset for pictures reduced by ``factor``, with a bounce at the same number of places or half of it."""
     return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

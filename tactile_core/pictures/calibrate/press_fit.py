@@ -164,9 +164,9 @@ def contact_radius(depth: float, radius: float) -> float:
 def missing_light(
     bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
 ) -> tuple[np.ndarray, float]:
-    """Fit how much more light comes through the coating of a photograph than of a ball's picture.
-    Returns the residual (n, 3), grey levels, of the picture with that light, and the light, by least squares, as a
-    share of that of a coating that faces the LEDs."""
+    """Fit the light of the object that comes through the coating and that the picture of a ball lacks.
+    Returns the residual (n, 3), grey levels, of the picture with that light, and the light over that of a coating that
+    faces the LEDs, by least squares."""
     missed, slope = sight.missed(bench.change(ball)[sight.counts])
     white = slope * bench.white(ball)[sight.counts]
     more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)

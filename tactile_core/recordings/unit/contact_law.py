@@ -142,7 +142,7 @@ def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURC
 
 
 def limit(contacts: int) -> float:
-    """Return the unexplained share beyond which a recording of so many different contacts is doubted."""
+    """Return the unexplained share above which a recording of this number of different contacts is doubted."""
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
