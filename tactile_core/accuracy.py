@@ -23,7 +23,7 @@ COSTS = ("s", "ms", "MB")  # units of time and memory: their rows may miss a tar
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Return the Euclidean length over the last axis, in float64."""
+    """Return the Euclidean lengths (...,) of vectors (..., k), in float64."""
     return np.sqrt(np.square(vectors, dtype=np.float64).sum(-1))
 
 
@@ -85,13 +85,13 @@ def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) ->
 
 
 def mean(values: np.ndarray) -> float | None:
-    """Return the mean over contacts without NaN; None where all are NaN (JSON has no NaN)."""
+    """Return the mean of values (C,) without NaN; None where all are NaN (JSON has no NaN)."""
     values = np.asarray(values)[np.isfinite(values)]
     return float(values.mean()) if len(values) else None
 
 
 def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
-    """Compute the four metrics of a mesh for each contact: micrometres, and per cent for the peak."""
+    """Compute four metrics (C,) of meshes (C, n, 3) m, by name: micrometres, and per cent for the peak."""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),
         "max_um": 1e6 * max_error(predicted, true),

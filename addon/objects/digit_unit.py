@@ -102,7 +102,7 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
 
 
 def left_out(scene: bpy.types.Scene) -> list[str]:
-    """Say what a scene asks for that its pictures leave out: lamps that are no points, blur by motion and by focus."""
+    """Say what pictures leave out or change of what a scene asks for: lamps that are no points, blur, views."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     camera = scene.camera

@@ -16,7 +16,7 @@ def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
 
 
 def from_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Convert places in the gel object's axes and units to the image frame, float64 m, the inverse of ``to_gel``."""
+    """Convert places (..., 3), gel object's axes and units, to the image frame, float64 m: inverse of ``to_gel``"""
     x, y, z = np.moveaxis(axes.to_sensor(places, per_metre), -1, 0)
     right, down = camera.right_z * (z - camera.centre_z), camera.down_x * (x - camera.centre_x)
     return np.stack([right, down, y - camera.height_zero_y], -1)

@@ -210,7 +210,7 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
 
 
 def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: np.ndarray) -> int:
-    """Mark where doubtful parts begin, instead of our earlier markers; returns how many parts, marked or not."""
+    """Mark parts of low confidence (T,) at frames (T,), in place of earlier markers; return the number of parts."""
     for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)
     edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))

@@ -174,7 +174,7 @@ def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> f
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
-    """Measure the difference of the two variants' pictures."""
+    """Measure how far the two variants' pictures of heights (H, W) m differ."""
     for name in ("standard", "quality"):
         one, other = (Renderer(unit, name, variant) for variant in (LLVM, SCALAR))
         difference = one.in_levels(one.radiance(height) - other.radiance(height))

@@ -36,7 +36,8 @@ class EvenSpline:
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first of the four coefficients that matter at each position, and the place 0..1 between nodes."""
+        """Return the first (n,) of the four coefficients at each position (n,), and its place (n,), 0..1, in the
+        cell."""
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell

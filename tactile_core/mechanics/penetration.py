@@ -68,8 +68,8 @@ def check_follows(
 ) -> None:  # fmt: skip
     """Raise PenetrationError where a body, ``depth`` m deep, has sunk in between a surface's nodes.
 
-    normals : (k, 3) of the body, at the nodes that carry force
-    behind : least allowed cosine of theirs and the motion
+    grid : (rows, columns, 3) m, the nodes; closed : whether its last column joins the first
+    normals : (k, 3) of the body, at the nodes that carry force; behind : least allowed cosine of theirs and the motion
     """
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"

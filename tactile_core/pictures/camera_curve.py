@@ -25,7 +25,7 @@ def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ends(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the changes (...) from a rest's levels at which toe and shoulder begin, each followed by its range."""
+    """Return where toe and shoulder begin, as changes (...) levels from ``rest`` (...), each followed by its range."""
     rest = np.clip(rest, 0, LARGEST_LEVEL)
     toe, fall = np.float32(TOE - 1) * rest, np.maximum(np.float32(TOE - FLOOR) * rest, np.float32(LEAST))
     shoulder = np.maximum(np.float32(SHOULDER) - rest, np.float32(0))

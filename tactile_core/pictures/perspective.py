@@ -160,7 +160,7 @@ def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[
 
 
 def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that samples maps of a shape at fractional places, bilinear; edge values continue outside."""
+    """Return a function that samples maps of ``shape`` at fractional rows and columns, bilinearly; edges continue."""
     row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
     return lambda values: bilinear(values, row, column)
 
@@ -178,7 +178,7 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
     """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
-    height : (H W,) m; steepness : (H W,), of ``_steepness``; start, start_near, start_nearest : (H, W), ``_begin_at``
+    height, steepness : (H W,) m and 1; start, start_near, start_nearest : (H, W), see ``Perspective._begin_at``
     rows, columns : (H,), (W,) px, from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)

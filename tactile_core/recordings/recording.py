@@ -54,13 +54,13 @@ class Truth(Summary):
 
     @property
     def displacements(self) -> dict[str, np.ndarray]:
-        """Displacements that the file was made with, by sensor."""
+        """Displacements (T, n, 3) m that the file was made with, by sensor."""
         held = {SOURCE: self.displacement_biotac, TARGET: self.displacement_digit, **self.displacement}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
     @property
     def tractions(self) -> dict[str, np.ndarray]:
-        """Tractions that the file was made with, by sensor."""
+        """Tractions (T, n, 3) Pa that the file was made with, by sensor."""
         held = {SOURCE: self.traction_biotac, TARGET: self.traction_digit, **self.traction}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
@@ -116,7 +116,7 @@ class Recording(Summary):
         return len(self.electrodes)
 
     def at(self, frames: np.ndarray) -> Recording:
-        """Return some frames alone; what was found in all of them, as warnings, stays."""
+        """Return the frames (n,) alone; what was found in all of them, such as warnings, stays."""
         held: dict[str, Any] = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         rows = {name: value[frames] for name, value in held.items()}
         labels = {name: column[frames] for name, column in self.labels.items()}

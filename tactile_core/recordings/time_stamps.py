@@ -22,14 +22,14 @@ MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
 def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
-    """Return start and times as `seconds_of`, the frames where stamps (T,) jump, and sentences that name `rows`."""
+    """Return times (T,) s and start, s, as `seconds_of`, frames where stamps (T,) jump, and sentences on them."""
     seconds, start, notes = seconds_of(stamps)
     jumps, found = time_jumps(seconds, rows, row_word)
     return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
 
 
 def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
-    """Return time from the first frame (s), unix start time (s, 0.0 if unknown) and warnings."""
+    """Return time (T,) s from the first frame, unix start time (s, 0.0 if unknown) and warnings, from stamps (T,)."""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
     warnings, missing = [], int(np.isnan(stamps).sum())
     if missing == len(stamps):
@@ -119,7 +119,7 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
 
 
 def time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Find frames before which the stamp went back, stood still or left a gap; also return sentences on them."""
+    """Return the frames (n,) before which the stamp went back, stood still or left a gap, and sentences on them."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE

@@ -39,7 +39,7 @@ class Wiring:
 
 
 def converted(counts: np.ndarray) -> np.ndarray:
-    """Round to whole counts and clip to the converter's 12 bits."""
+    """Round counts (...) to whole ones and clip them to the converter's 12 bits."""
     return np.clip(np.round(counts), 0, COUNT_MAX)
 
 

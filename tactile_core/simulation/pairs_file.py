@@ -85,7 +85,7 @@ class Pairs:
     pair: tuple[str, str] = PAIR
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
-        """Select the contacts of these rows alone."""
+        """Select the contacts of rows (n,) alone."""
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
 
     @property
@@ -220,7 +220,7 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts 80/10/10 by press, which keeps similar ones together. Raises TactileError below five presses."""
+    """Split contacts 80/10/10 by press (C,), which keeps similar ones together. TactileError for under five presses."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"
@@ -232,5 +232,5 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 
 def quantise(displacement: np.ndarray) -> np.ndarray:
-    """Convert displacement in m to int16 steps of ``SCALE`` m."""
+    """Convert displacement (...) m to int16 steps of ``SCALE`` m."""
     return np.round(displacement / SCALE).astype(np.int16)

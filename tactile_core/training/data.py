@@ -64,7 +64,7 @@ class Contacts:
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """Draw an epoch's contacts in order: contacts of the split or their mirror images, and silent samples."""
+        """Draw an epoch's rows (B,) in order: contacts of the split or their mirror images, and silent samples."""
         rows = rng.permutation(self.with_silence(self.split.train))
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)
@@ -77,7 +77,7 @@ class Contacts:
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts of these rows with these signals."""
+        """Return the contacts of rows (B,) with signals (B, 20) as SVB takes them."""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])

@@ -115,7 +115,7 @@ def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
 
 
 def quantiles(values: np.ndarray) -> list[float]:
-    """Compute the values at QUANTILES, six digits."""
+    """Compute the quantiles of values (n,) at QUANTILES, six digits."""
     return [float(f"{quantile:.6g}") for quantile in np.quantile(values, QUANTILES)]
 
 

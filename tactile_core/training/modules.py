@@ -120,7 +120,7 @@ class Vae(nn.Module):
         return mean, logvar.clamp(-12.0, 6.0)  # keeps exp() finite in the first steps; trained values lie well inside
 
     def mean(self, x: Tensor) -> Tensor:
-        """Map x to the mean of the posterior, which is used at inference."""
+        """Map x to the mean (B, L) of the posterior, which is used at inference."""
         return self.posterior(x)[0]
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
@@ -150,7 +150,7 @@ class MeshVae(Vae):
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Sample like `Vae.sample`, without noise on the place."""
+        """Sample like `Vae.sample`, a latent (B, L) and the KL divergence, without noise on the place."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 

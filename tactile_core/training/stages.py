@@ -61,11 +61,11 @@ class Model(nn.Module):
         return biotac, torch.where(rectified[:, 0], *surprises)
 
     def across(self, latent_source: Tensor) -> Tensor:
-        """Map latent_source to latent_target, by M2MPN alone."""
+        """Map latent_source (B, L) to latent_target (B, L'), by M2MPN alone."""
         return self.M2MPN(self.MVB.placed(latent_source))
 
     def to_target(self, state: Tensor, latent_source: Tensor) -> Tensor:
-        """Map a contact's state (B, STATE) and its latent_source to latent_target at the state's place."""
+        """Map a contact's state (B, STATE) and latent_source (B, L) to latent_target (B, L') at the state's place."""
         return torch.cat([state[:, :PLACE], self.across(latent_source)[:, PLACE:]], -1)
 
     def back(self, latent_target: Tensor) -> Tensor:
@@ -73,7 +73,7 @@ class Model(nn.Module):
         return self.D2BPN(self.MVD.placed(latent_target))
 
     def to_signal(self, latent_source: Tensor) -> Tensor:
-        """Map latent_source to compressed changes (B, 19)."""
+        """Map latent_source (B, L) to compressed changes (B, 19)."""
         return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_source)))
 
     def expected_error(self, signal: Tensor) -> Tensor:
@@ -141,7 +141,7 @@ def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Mean square errors of place and code, each over its mean square."""
+    """Mean square errors of place and code of latents (B, L), each over its mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
@@ -204,7 +204,7 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """Return the largest node error (B,) m of a decoded latent, at least ERROR_FLOOR."""
+    """Return the largest node error (B,) m of a decoded latent (B, L), at least ERROR_FLOOR."""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 

@@ -209,7 +209,7 @@ def metric_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and mask over ``rows`` of subsets with rows of their own: light, of each depth, deeper, sliding."""
+    """Yield name and mask over ``rows`` of each subset that has rows of its own: light, by depth, deeper, sliding."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

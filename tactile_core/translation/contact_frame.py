@@ -55,7 +55,7 @@ class ContactFrame:
         return local
 
     def to_shared(self, local: np.ndarray) -> np.ndarray:
-        """Rotate back in place: inverse of `to_local`."""
+        """Rotate (T, n, 3) m from each node's frame back to the shared one, in place: the inverse of `to_local`."""
         if self.turn.any():
             cosine, sine = self._cosine_sine
             inward, around = local[..., 1].copy(), local[..., 2]

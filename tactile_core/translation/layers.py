@@ -44,7 +44,7 @@ def compress(change: np.ndarray) -> np.ndarray:
 
 
 def expand(compressed: np.ndarray) -> np.ndarray:
-    """Convert back to counts: inverse of `compress`."""
+    """Convert compressed changes (...) back to counts: inverse of `compress`."""
     return np.sinh(np.clip(compressed, -COMPRESSED_LIMIT, COMPRESSED_LIMIT)) * np.float32(COUNT_SCALE)
 
 
@@ -71,14 +71,14 @@ def silu(x: np.ndarray) -> np.ndarray:
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
-    """Apply linear layers with ReLU between them."""
+    """Apply linear layers with ReLU between them: (T, inputs) to (T, outputs)."""
     for layer in range(layers):
         x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
     return x
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Apply a residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
+    """Apply a residual MLP with a linear skip, (T, inputs) to (T, outputs); see docs/sources.md, Networks."""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")

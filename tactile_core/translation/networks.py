@@ -103,7 +103,7 @@ class Networks:
     def likely_latents(
         self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute `latents` of the most plausible contact."""
+        """Compute latent_source (T, L) and latent_target (T, L') of the most plausible contact: see `latents`."""
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:

@@ -237,7 +237,7 @@ class Translator:
         return found
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
-        """Bound (T,) m on 95 of 100 largest errors, by `card.error_bound`."""
+        """Bound (T,) m on 95 of 100 largest errors, by `card.error_bound`; surface, kind : of the card's bounds"""
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:

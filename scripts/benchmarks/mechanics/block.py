@@ -13,7 +13,7 @@ _SETTLED = 1e-15  # of the block's size: rounding
 
 
 def block(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> HexMesh:
-    """Node planes x, z (m) and y (m, falling from the clamped back to the surface); odd counts."""
+    """Make a block of bricks with node planes x, z (m) and y (m, falling from clamped back to surface); odd counts."""
     grid = np.stack(np.meshgrid(x, z, y, indexing="ij"), -1)[..., [0, 2, 1]]
     ids = np.arange(grid[..., 0].size).reshape(grid.shape[:-1])
     clamped = np.zeros(ids.size, bool)

@@ -31,7 +31,9 @@ SEED_OF_CONTACTS = 5
 
 
 def measure(name: str, quick: bool, truth: str) -> Method | None:
-    """Draw pictures of test contacts by one preset; ``truth`` makes what the others are held against. Needs mitsuba."""
+    """Draw test contacts by one preset, against the pictures in the file ``truth``, which the method "truth" makes.
+
+    Needs mitsuba."""
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
     mapper = gel_mapper(unit.camera)
     if name == "truth":

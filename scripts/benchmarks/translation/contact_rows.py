@@ -149,7 +149,7 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
 
 
 def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Solve the contacts of gels (B, M, 3) m that networks translated, under forces (B, 3) N."""
+    """Return gels (B, M, 3) m of the contacts that translated ones, ``gel``, show, solved under forces (B, 3) N."""
     arrays = {
         "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
         "force": force, "flags": np.zeros(len(gel), np.uint16),

@@ -41,8 +41,7 @@ Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19
 
 @dataclass(frozen=True)
 class Base:
-    """A recording to break; rest : (19,) counts; sensor : its unit's file, or None; every : one frame in so many is
-    judged"""
+    """A recording to break; rest : (19,) counts; sensor : its unit's file, or None; every : step of judged frames"""
 
     name: str
     recording: Recording
@@ -68,14 +67,14 @@ def _drawn(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
 
 
 def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one electrode keep its reading from some frame on."""
+    """Let one of the electrodes (T, 19) keep its reading from some frame on."""
     (one,), rows = _drawn(electrodes, random, 1), _from(electrodes)
     electrodes[rows, one] = electrodes[rows, one][0]
     return electrodes
 
 
 def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one electrode read the same throughout, a count among those it has."""
+    """Let one of the electrodes (T, 19) read the same throughout, a count among those it has."""
     (one,) = _drawn(electrodes, random, 1)
     electrodes[:, one] = random.choice(electrodes[:, one])
     return electrodes
@@ -112,7 +111,7 @@ def noisy(count: int, counts: float) -> Fault:
 
 
 def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let an amplifier end within the range that the electrodes use, a third of it from below."""
+    """Clip the electrodes (T, 19), as an amplifier does that ends within their range, a third of it from below."""
     low, high = electrodes.min(axis=0), electrodes.max(axis=0)
     return np.maximum(electrodes, low + (high - low) / 3)
 
@@ -181,7 +180,7 @@ def bits(by: float) -> Fault:
 
 
 def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Begin and end within the largest contact, where there is one."""
+    """Put the largest contact, where there is one, in the first and last QUIET frames of electrodes (T, 19)."""
     change = np.abs(electrodes - rest)
     if change.max() < LEAST_LOAD:
         return electrodes

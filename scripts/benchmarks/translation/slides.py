@@ -159,7 +159,7 @@ def rank(strength: np.ndarray, slide: Slide) -> float:
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Spearman's; NaN where one of them does not change."""
+    """Spearman's rank correlation of a and b (T,); NaN where one of them does not change."""
     from scipy.stats import rankdata
 
     a, b = rankdata(a), rankdata(b)

@@ -38,7 +38,7 @@ GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac rea
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure all contacts: the metrics with their targets, the slices without, how good expected errors are."""
+    """Measure all contacts: metrics with their targets, subsets without targets, and how good expected errors are."""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
     columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
@@ -61,7 +61,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Networks that some indenters and a region of the pad were kept from, as their card says, on just those."""
+    """Measure the indenters and the region of the pad that the networks' training left out, by their card."""
     options, names = translator.card["options"], np.array(pairs.indenter_names)
     there = pairs.place[:, 0] < (-np.inf if options["without_below_x"] is None else options["without_below_x"])
     known = ~np.isin(names[pairs.indenter], options["without"])

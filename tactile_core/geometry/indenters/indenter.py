@@ -78,7 +78,7 @@ def check_length(kind: str, name: str, value: float) -> None:
 
 
 def sign_of(component: np.ndarray | float) -> np.ndarray:
-    """Return -1, 0 or 1; 0 for components of a direction that are zero up to rounding."""
+    """Return the signs -1, 0, 1 (...) of a direction's components (...), 0 for those that are zero up to rounding."""
     return np.where(np.abs(component) > SQUARE, np.sign(component), 0.0)
 
 

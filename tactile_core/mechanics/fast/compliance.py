@@ -271,7 +271,7 @@ def _add_outer(rows: np.ndarray, factor: np.ndarray, line: np.ndarray) -> None:
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Surface nodes (r,) with z >= 0 whose responses also serve their mirror images: one for every touchable node."""
+    """Return surface nodes (r,) with z >= 0 that stand for the touchable ones (m,): themselves, or their images."""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
 
 

@@ -146,7 +146,7 @@ class Candidates:
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let more nodes enter, all of them touching at first."""
+        """Let more nodes (j,) enter, displaced by (j, 3) m, all of them touching at first; probe : see ``split``"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")

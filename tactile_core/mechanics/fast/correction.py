@@ -65,13 +65,13 @@ class Learned:
     trust: np.ndarray
 
     def log_factor(self, features: np.ndarray) -> float:
-        """Return the logarithm of the factor by which the linear model's force is too small."""
+        """Return the log of the factor by which the linear model's force is too small; features : (f,), not scaled"""
         every = self._near(features, ALL, self._all, self.widths[0]) @ self.force_weights[0]
         few = self._near(features, ESSENTIAL, self._few, self.widths[1]) @ self.force_weights[1]
         return self._trusted(features, 1) * float(every + few) / 2
 
     def field(self, features: np.ndarray) -> np.ndarray:
-        """The correction on the grid (g, 3), per metre of depth."""
+        """Return the correction on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
         near = self._near(features, ALL, self._all, self.widths[2])
         return self._trusted(features, 2) * np.tensordot(near @ self.field_weights, self.fields, 1)
 
@@ -100,7 +100,7 @@ class Correction:
     rubbing: Learned
 
     def factor(self, features: np.ndarray) -> float:
-        """Return the factor by which the linear model's force is too small."""
+        """Return the factor by which the linear model's force is too small; features : (f,)"""
         return float(np.exp(self._blend(features, Learned.log_factor)))
 
     def field(self, features: np.ndarray) -> np.ndarray:
@@ -139,7 +139,7 @@ def rubs(features: np.ndarray) -> np.ndarray:
 
 
 def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Factor of the kernel between contacts of ``rubs`` a and b: largest where both have friction, or neither has."""
+    """Return the kernel's factor for contacts of friction a and b, ``rubs``: larger where both have some, or none."""
     return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
 
 

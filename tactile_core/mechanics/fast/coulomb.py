@@ -108,7 +108,7 @@ class Sorted(NamedTuple):
 def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001, ANN201
     """Reduce guessed forces to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
 
-    Returns the unit directions t (k, 3) of friction, ``lean`` elsewhere; a node without any sticks from now on.
+    Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; nodes without one stick from now on.
     """
     k = force.shape[0]
     lean = np.zeros((k, 3))
@@ -137,7 +137,7 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
 
 @Loop
 def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
-    """Compute the ``Motion`` of nodes from their place (k, 3) m to where they have moved; off, gap, normal : there."""
+    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m, where off, gap and normal are known, to ``moved``."""
     moves, slip, gap_then = np.empty(place.shape), np.empty(place.shape), np.empty(len(gap))
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0

@@ -72,9 +72,9 @@ def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> 
 
 @Loop
 def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
-    """Find what slipping nodes bear, (s, 3, r) N, besides what turns with their normals, and curved ones' motion.
+    """Find forces (s, 3, r) N of slipping nodes, but what turns with normals, and moves (q, 3, r) m of curved ones.
 
-    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the second (q, 3, r) m is relative to the indenter
+    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the moves returned are relative to the indenter
     """
     at, curved, columns = slipping.at, slipping.curved, forces.shape[1]
     bearing, moved = np.empty((len(at), 3, columns)), np.empty((len(curved), 3, columns))

@@ -232,7 +232,7 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release nodes in tension, add nodes that penetrate; returns true if there is none. tolerance : m, of gaps."""
+        """Release nodes in tension, add those that penetrate; true if there are none and gaps are in tolerance, m."""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])

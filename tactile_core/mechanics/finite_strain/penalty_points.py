@@ -72,7 +72,7 @@ class PenaltyPoints:
         self._nodes, self._weights = np.repeat(faces, len(_WEIGHTS), axis=0), np.tile(_WEIGHTS, (len(faces), 1))
 
     def deepest(self, obstacle: Obstacle, at: np.ndarray) -> float:
-        """Return the penetration, m, of the deepest point into an obstacle."""
+        """Return the penetration, m, of the deepest point into an obstacle; at : (n, 3) m, the mesh's nodes"""
         return max(-float(obstacle.distance(self._points(at))[0].min(initial=0.0)), 0.0)
 
     def _points(self, at: np.ndarray) -> np.ndarray:

@@ -35,11 +35,11 @@ class BlockPattern:
         return blocks
 
     def find(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Find the index into ``blocks`` of the blocks of pairs of nodes that share a cell."""
+        """Return the indices (p,) into ``blocks`` of pairs of nodes (p,), (p,) that share a cell."""
         return np.searchsorted(self._places, rows.astype(np.int64) * self.n_nodes + columns)
 
     def turn(self, blocks: np.ndarray, nodes: np.ndarray, frames: np.ndarray) -> None:
-        """Express ``nodes`` in their frames (k, 3, 3), axes as columns; in place."""
+        """Express ``nodes`` (k,) of blocks (n_blocks, 3, 3) in their frames (k, 3, 3), axes as columns; in place."""
         index = np.full(self.n_nodes, -1)
         index[nodes] = np.arange(len(nodes))
         for side, of in ((0, self.rows), (1, self.columns)):

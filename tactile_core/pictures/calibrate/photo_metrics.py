@@ -27,7 +27,7 @@ def metrics(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray,
 
 
 def psnr(error: np.ndarray) -> float:
-    """Compute 10 log10 (255^2 / mean square), dB; an exact picture counts as an error of a thousandth of a level."""
+    """Compute 10 log10 (255^2 / mean square), dB, of errors (...) levels; no error counts as .001 level."""
     return float(10 * np.log10(PEAK**2 / max(float(np.square(error).mean()), 1e-6)))
 
 

@@ -200,7 +200,7 @@ def _pictures(path: Path) -> dict[str, np.ndarray]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
-    """Return the press in a photograph, of a ball of a radius, m; None where there is none."""
+    """Return the press in a photograph (H, W, 3), of a ball of a radius, m; None where there is none."""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift

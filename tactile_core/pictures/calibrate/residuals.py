@@ -54,7 +54,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return a calibration with other numbers and the same gain; raises TactileError for meaningless ones."""
+    """Return a calibration with other ``numbers`` (22,) and the same gain; raises TactileError for meaningless ones."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
@@ -127,7 +127,7 @@ class UnitResiduals:
         return with_parameters(self._start.with_gain(gain), numbers)
 
     def balls(self, x: np.ndarray) -> np.ndarray:
-        """Return the right, down, depth, mm, of each press (n, 3)."""
+        """Return each press's ball (n, 3) of x: right, down, depth, mm."""
         return x[self._free.sum() :].reshape(-1, 3)
 
     def cost(self, x: np.ndarray) -> float:
@@ -148,7 +148,7 @@ class UnitResiduals:
         return float(cost / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return x with the light through the coating at least 0."""
+        """Return x with the light through the coating at least 0, the nearest that ``cost`` takes."""
         least = np.full(len(x), -np.inf)
         least[: self._free.sum()][np.flatnonzero(self._free) == OBJECT_LIGHT] = 0
         return np.maximum(x, least)

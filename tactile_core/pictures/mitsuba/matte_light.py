@@ -52,7 +52,7 @@ class MatteLight:
         return total / np.float32(self.preset.passes), first
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Surface) -> np.ndarray:
-        """Return the direct light with the preset's other effects: interreflection, and the window's refraction."""
+        """Return the radiance (H, W, 3) with the preset's other effects: interreflection, refraction at the window."""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)

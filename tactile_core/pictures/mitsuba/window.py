@@ -42,7 +42,7 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
 
 
 def tangent(sine: np.ndarray) -> np.ndarray:
-    """Convert the sines of angles to their tangents."""
+    """Convert sines (...) of angles to their tangents (...)."""
     return sine / np.sqrt(1 - sine**2)
 
 

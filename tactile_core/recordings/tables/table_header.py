@@ -30,8 +30,8 @@ class Header:
 
     @classmethod
     def parse(cls, path: str, lines: Sequence[str]) -> Header:
-        """Parse the header of a text that starts with these lines. Lines that begin with a comment's mark are passed
-        over, but the last, where it names as many columns as follow, as of ``np.savetxt`` and ``rostopic echo -p``.
+        """Parse the header of a text that starts with these lines. Comments before the rows are passed over, except the
+        last one where it names the columns, as in files of ``np.savetxt`` and ``rostopic echo -p``.
         Raises TactileError for a text without a line, and for two columns of one name."""
         first, comment = _first_row(lines)
         if first is None:

@@ -167,7 +167,9 @@ def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = 
 def flagged(
     typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
 ) -> tuple[np.ndarray, Doubt | None]:
-    """Return the flags (T,) of changes of a typical unit, with the doubt that its contacts raise together, or None."""
+    """Return flags (T,) with `LAW_DOUBTED` in the contacts where the recording is doubted, and the doubt, or None.
+
+    typical : (T, e) counts, a typical unit's changes; quiet : (T,) bool; flags : (T,) uint16; pdc : (T,) counts"""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
         return flags, None
     contact = touching(typical) & ~quiet
