@@ -63,7 +63,8 @@ class About(TypedDict):
 
 
 def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare recording `index` unless it is; returns its frames, and if made. Raises TactileError if it changed."""
+    """Prepare recording `index` unless it is prepared; return its number of frames, and true if it was made now. Raises
+    TactileError if the recording changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     frames = checksummed.stated_rows(file)

@@ -240,8 +240,8 @@ class Calibration:
         return self.coating.transmission * self.object_reflectance
 
     def with_through(self, through: float) -> Calibration:
-        """Return the unit with this light from the object; the coating's transmission grows where even a white object
-        has less."""
+        """Return the unit with this ``through``: by the object's reflectance and, where even a white object gives less,
+        by a larger transmission of the coating."""
         most = max(self.coating.transmission, through)
         coating = dataclasses.replace(self.coating, transmission=most)
         return dataclasses.replace(self, coating=coating, object_reflectance=through / most if most else 0.0)

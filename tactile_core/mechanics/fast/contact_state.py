@@ -24,9 +24,8 @@ class Contact:
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
-    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3), forces between nodes spread over the nodes
-    whose
-        cubic interpolation gives their places, some of which then have a small outward force
+    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3). Forces between nodes are spread over the
+        nodes whose cubic interpolation gives their places: some nodes then have a small outward force
     slipping : (k,) bool, nodes whose friction is spent; without friction all
     converged : whether it may be used; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
