@@ -5,9 +5,8 @@
     python3 scripts/build_extension.py --python 3.13 --debian        Debian's 4.3, whose Python is another
     python3 scripts/build_extension.py --no-wheels                   42 MB, any platform: numpy alone, see Preferences
 
-What git tracks goes in (no folder of git's own is read twice, nothing untracked slips in), and the wheels of what
-simulating and rendering need: 173 to 229 MB a platform and Python, so each has a zip of its own. The same commit,
-platform and wheels give the same bytes.
+A zip holds the files that git tracks, and the wheels of what simulating and rendering need: 173 to 229 MB a platform
+and Python, so each has a zip of its own. The same commit, platform and wheels give the same bytes.
 """
 
 from __future__ import annotations
@@ -66,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def tracked() -> list[str]:
-    """Files of the checkout that belong in the zip, sorted."""
+    """List the checkout's files that belong in the zip, sorted."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True).stdout.decode()
     packed = (name for name in listed.split("\0") if name.startswith(PACKED))
     return sorted(name for name in packed if name in KEPT or not name.startswith(LEFT_OUT))

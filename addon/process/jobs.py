@@ -23,7 +23,7 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 
 
 class Job:
-    """Worker and its folder.
+    """A worker process that does one job, and the folder of its files.
 
     ``done`` of ``total`` is its reported progress, in the ``stage`` of that name; ``finished`` : whether it ended well
     ``drawn`` : pictures that could be shown so far

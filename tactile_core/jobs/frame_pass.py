@@ -37,7 +37,8 @@ class Tools:
 
 
 class FramePass:
-    """All arrays of a recording's frames, part by part, and their file; folded : height maps of folded gels so far"""
+    """Makes all arrays of a recording's frames, part by part, and writes their file; folded : folded height maps so
+    far"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None

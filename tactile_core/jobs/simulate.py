@@ -216,5 +216,5 @@ def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Simulate], index: int) -> InputFacts | None:
-    """Return one shard: a recording is not split."""
+    """Return the facts of an input: one shard, as a recording is not split."""
     return InputFacts(1)

@@ -68,7 +68,7 @@ def share_of_fingers(keys: Collection[str], style: str) -> float:
 
 
 def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
-    """Return the numbers of the fingers of which a file has columns."""
+    """Return the numbers of the fingers of which a file has columns; style : see ``share_of_fingers``"""
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
