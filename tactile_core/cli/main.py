@@ -21,7 +21,7 @@ NAMES = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 
 
 class Stopped(KeyboardInterrupt):
-    """Exception raised by one of the signals. number : of the signal."""
+    """Exception raised by one of the stop signals. number : of the signal"""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)

@@ -37,8 +37,7 @@ class Tools:
 
 
 class FramePass:
-    """Makes all arrays of a recording's frames, part by part, and writes their file; folded : folded height maps so
-    far"""
+    """Makes all arrays of a recording's frames, part by part, and writes their file; folded : folded height maps"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None

@@ -35,7 +35,7 @@ class Part(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Parts of a command's work, in their order; matrices are built one after another."""
+    """Parts of a command's work, in their order. Of several matrices' memory one counts: they are built one by one."""
 
     parts: Sequence[Part]
 

@@ -84,7 +84,8 @@ class SkinLattice:
 
 @dataclasses.dataclass(frozen=True)
 class FluidFilm:
-    """The fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, still valid"""
+    """Fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, least that is
+    modelled"""
 
     conductivity: float = number("s_per_m", above=0)
     interface: float = number("ohm", above=-1)
@@ -119,7 +120,7 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, where x is shared"""
+    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, x that rolling keeps"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")

@@ -27,7 +27,8 @@ class Outline:
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A gel from surface to flat, bonded back, m. thickness : at the apex; edge_drop, edge_width : of rounded edges"""
+    """A gel between its surface and flat, bonded back; m. thickness : at the apex; edge_drop, edge_width : of its
+    edges"""
 
     back_y: float = number("mm")
     thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)

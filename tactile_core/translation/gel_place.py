@@ -104,7 +104,7 @@ def _fast_length(least: int) -> int:
 
 
 class Shift:
-    """Shift fields of the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
+    """Shifts fields on the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
         """Take the shift (2,) = (x, z) m of contacts."""

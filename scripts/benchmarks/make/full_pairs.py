@@ -36,7 +36,7 @@ _TRIES = 12  # steps down to a depth that both sensors bear: to a fourteenth
 
 @dataclasses.dataclass(frozen=True)
 class TestPress:
-    """Press ``number`` of the test set: an indenter of the scene, its place, depth (m) on the BioTac, last slide."""
+    """Press ``number`` of the test set: indenter ``which`` of the scene, place, depth m on the BioTac, slide (2,) m."""
 
     __test__ = False  # not a test, whatever pytest takes its name for
 
