@@ -35,8 +35,8 @@ class Evaluation:
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
-    through : light of this photograph's ball through the coating, as a share of the coating's own. Metrics named after
-        it use the light that the set's other photographs show; all others use the calibration's"""
+    through : light of the ball through the coating, by this photograph, as a share of the coating's own. ``through_*``
+        metrics draw with the median share of the set's other photographs, all others with the calibration's"""
 
     press: Press
     ball: Ball
