@@ -49,10 +49,10 @@ class Solution(Summary):
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
     centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
-    penetration : m, deepest place of a node in the indenter or the core; slipping : share of the touching nodes
-    core_nodes : inner-skin nodes that press on the core; load_steps : how many it took to get here from the last
+    penetration : m, deepest place of a node in the indenter or the core; slipping : share of touching nodes
+    core_nodes : number of inner-skin nodes that press on the core; load_steps : number since the solution before
     volume : the solid and its state, of the full and the reference tier
-    between : (m, 3) N, what the indenter's force on the surface between nodes is on the solid's nodes, if there is any
+    between : (m, 3) N, loads on the solid's nodes by which the indenter's force between nodes acts, if there is any
     """
 
     tier: Tier

@@ -73,7 +73,7 @@ UNIT = "--sensor", "--to", "--weights", "--calibration"
 
 
 def add(verb: argparse.ArgumentParser, *names: str, **words: str) -> None:
-    """Add some of the options that verbs share; words : the verb's own in their help."""
+    """Add some of the options that verbs share; words : name -> the verb's words for the {name} in an option's help"""
     for name in names:
         option = OPTIONS[name]
         verb.add_argument(name, **option | {"help": option["help"].format_map({"among": "", **words})})

@@ -49,7 +49,7 @@ class Learned:
 
     shift, scale : (f,) of the features; supports : (n, f) scaled features; support_rubs : (n,), see ``rubs``
     widths : (3,), of the kernels of force on all features, on the ``ESSENTIAL`` ones, and of fields
-    force_weights : (2, n), of the logarithm of the force's factor, whose mean it is; field_weights : (n, k)
+    force_weights : (2, n), of two estimates of the log of the force factor, then averaged; field_weights : (n, k)
     fields : (k, g, 3), per metre of depth, in the surface's own frames
     trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1
     """
