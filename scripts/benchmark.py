@@ -4,8 +4,8 @@
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
     python scripts/benchmark.py --only chain --json FILE    some stages, or methods such as "translation numpy_1"
 
-Stages: contact mechanics by tier and sensor; translation; pictures by preset; the whole chain from signals to pictures;
-pictures by others' programs, where they are installed.
+Stages: contact mechanics by tier and sensor; translation; conditions that are hard for it; pictures by preset; the
+whole chain from signals to pictures; pictures by others' programs, where they are installed.
 Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
 beside that of doing nothing. Then the errors that are promised are held against those that are found: exits with 1
 where a bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
@@ -31,7 +31,7 @@ from benchmarks.table.method import ROOT, Method
 from tactile_core.errors import TactileError
 from tactile_core.files import compiled, threads
 
-STAGES = ("mechanics", "translation", "pictures", "chain", "peers")
+STAGES = ("mechanics", "translation", "conditions", "pictures", "chain", "peers")
 LEAVE_TRUTH = (
     "pictures",
     "chain",

@@ -13,6 +13,7 @@ from .method import Method
 
 TITLES = {
     "mechanics": "Contact mechanics", "translation": "Translation, signals to the DIGIT's gel",
+    "conditions": "Translation by unit and contact",
     "pictures": "Pictures of known deformations",
     "chain": "Whole chain, signals to pictures", "peers": "Others' programs, each with its own calibration",
 }  # fmt: skip

@@ -40,14 +40,22 @@ indenters = [
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
     """Rows of each set, all contacts: medians of place, force, depth and overlap; the mean share left of the gel."""
     text = SCENE.read_text(encoding="utf-8")
-    presses = text[text.index("[pairs]") :]
     scenes = {
-        "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": FLAT + presses,
+        "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),
     }  # fmt: skip
-    return [one for name, scene in scenes.items() for one in _rows(name, network, _pairs(scene, count), known, bodies)]
+    return [
+        one for name, scene in scenes.items() for one in _rows(name, network, pairs_of(scene, count), known, bodies)
+    ]
 
 
-def _pairs(scene: str, count: int) -> Pairs:
+def flat_scene() -> str:
+    """Text of a scene that presses what a fingertip meets as flat, as the training presses its bodies."""
+    text = SCENE.read_text(encoding="utf-8")
+    return FLAT + text[text.index("[pairs]") :]
+
+
+def pairs_of(scene: str, count: int) -> Pairs:
+    """Draw contacts of a scene's text, by the fast tier on both sensors."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(scene, encoding="utf-8")

@@ -190,7 +190,7 @@ def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSE
     """Shares of contacts whose largest node error is below its bound, a row a bin of confidence, which it should be."""
     made = [played(OTHERS + each, unit_of(OTHERS + each), presses) for each in range(units)]
     gel, rows = np.concatenate([each.gel for each in made]), []
-    found = [_translated(network, made, taken) for taken in TAKEN]
+    found = [translated_contacts(network, made, taken) for taken in TAKEN]
     error = np.concatenate([accuracy.lengths(each.displacement_digit - gel).max(axis=1) for each in found])
     confidence, expected, bound = (
         np.concatenate([getattr(each, name) for each in found])
@@ -207,7 +207,7 @@ def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSE
     return rows
 
 
-def _translated(network: Translator, made: Sequence[Played], taken: str) -> Translation:
+def translated_contacts(network: Translator, made: Sequence[Played], taken: str) -> Translation:
     """Translate the contacts of recordings, one after the other."""
     answers = []
     for each in made:
@@ -220,7 +220,7 @@ def _translated(network: Translator, made: Sequence[Played], taken: str) -> Tran
 def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
     """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact."""
     began = time.process_time()
-    found = _translated(network, made, taken)
+    found = translated_contacts(network, made, taken)
     spent = time.process_time() - began
     force, place, gel = found.force, found.contact_center, found.displacement_digit
     true_force, true_gel = (np.concatenate([getattr(each, name) for each in made]) for name in ("force", "gel"))

@@ -6,6 +6,7 @@ both press. Translated are contacts of two balls that were solved at once (``ben
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -63,21 +64,39 @@ def _marked(change: np.ndarray) -> np.ndarray:
     return two_contacts(residual_shares(as_read(change, SEED), np.zeros(len(change), bool)))
 
 
+@dataclass(frozen=True)
+class DoubleContacts:
+    """Contacts of two balls at once; signal : (C, 19) counts; gel : (C, M, 3) m; force : (C,) N of both."""
+
+    signal: np.ndarray
+    gel: np.ndarray
+    force: np.ndarray
+
+
+def double_contacts(file: Path = DOUBLE) -> DoubleContacts:
+    """Read contacts that ``make_double_contacts.py`` solved."""
+    with np.load(file, allow_pickle=False) as found:
+        gel = _meters(found["displacement_digit"], found["scale"])
+        return DoubleContacts(found["signal"], gel, lengths(found["force"]))
+
+
+def _meters(displacement: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    return displacement.astype(np.float32) * np.float32(scale)
+
+
 def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> list[Row]:
     """Rows of double contacts and of single ones, two looked for; baseline: the same networks, one looked for.
 
     split: share that is taken for two; gel: rms error over that of no displacement; overlap of what is deeper than
     half; force: of both, median error
     """
-    with np.load(file, allow_pickle=False) as found:
-        double = {name: found[name] for name in found.files}
-    force = np.concatenate([lengths(double["force"]), lengths(pairs.force)])
-    gels = (double["displacement_digit"], double["scale"]), (pairs.displacement_digit, pairs.scale_digit)
-    gel = np.concatenate([each.astype(np.float32) * np.float32(unit) for each, unit in gels])
-    signals = plain_signals(as_read(np.concatenate([double["signal"], pairs.signal]), SEED))
+    double = double_contacts(file)
+    force = np.concatenate([double.force, lengths(pairs.force)])
+    gel = np.concatenate([double.gel, _meters(pairs.displacement_digit, pairs.scale_digit)])
+    signals = plain_signals(as_read(np.concatenate([double.signal, pairs.signal]), SEED))
     answers = (Translator(network.nets, Answer(contacts=count))(signals) for count in (2, 1))
     two, one = (_errors(answer, gel, force) for answer in answers)
-    doubles = len(double["force"])
+    doubles = len(double.force)
     found = []
     for of, part in (("two balls", slice(doubles)), ("single contacts", slice(doubles, None))):
         for name, middle, unit in METRICS:

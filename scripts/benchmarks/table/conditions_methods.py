@@ -1,0 +1,88 @@
+"""Translation where it is hard: units given, found or taken as typical, thin films, flat bodies, two contacts at once.
+
+Error: what is left of the gel's displacement where that is above a tenth of its peak, mean over contacts. The forces'
+median error stands in a row of its own.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from benchmarks.translation import body_rows, made_up_units, two_contact_rows
+from benchmarks.translation.contact_rows import left_of_nothing
+from benchmarks.translation.test_set import SEED, as_read
+from tactile_core.accuracy import lengths, row
+from tactile_core.training.step_errors import true_displacement
+from tactile_core.translation.answer import Answer
+from tactile_core.translation.translate import load_translator
+from tactile_core.translation.translator import Translation, Translator
+
+from .method import Method
+from .translation_methods import plain_signals
+
+THIN = 0.5  # film of three real units over the typical one (shared/design/finger.md)
+QUICK_PRESSES, QUICK_CONTACTS = 2, 30
+UNITS = {
+    "typical_unit": ("unknown", None),
+    "unit_given": ("given", made_up_units.unit_of),
+    "unit_found": ("found", made_up_units.unit_of),
+    "unit_unknown": ("unknown", made_up_units.unit_of),
+    "thin_film_given": ("given", lambda _: made_up_units.Unit(film=THIN)),
+    "thin_film_found": ("found", lambda _: made_up_units.Unit(film=THIN)),
+}  # how the unit is taken, and the unit of a number
+TWO_BALLS = {"two_balls_read_as_one": 1, "two_balls": 2}  # contacts that are looked for
+NAMES = (*UNITS, "flat_bodies", *TWO_BALLS)
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Contacts with their truth; gel : (C, M, 3) m; force : (C,) N, all contacts of a frame together."""
+
+    translated: Callable[[], Translation]
+    gel: np.ndarray
+    force: np.ndarray
+    of: str
+
+
+def measure(name: str, quick: bool) -> Method:
+    """Measure one condition: CPU time of a translated frame, preparing included, and errors."""
+    condition = _units(name, quick) if name in UNITS else _flat(quick) if name == "flat_bodies" else _two(name)
+    condition.translated()  # what the first call loads and compiles
+    began = time.process_time()
+    found = condition.translated()
+    ms = 1e3 * (time.process_time() - began) / len(condition.force)
+    force = lengths(found.force) + np.nan_to_num(lengths(found.second_force))
+    off = 100 * float(np.median(np.abs(force / condition.force - 1)))
+    more = row(f"conditions_{name}_force_error", off, "percent", baseline=100, of=condition.of)
+    left = float(left_of_nothing(found.displacement_digit, condition.gel).mean())
+    return Method("conditions", name, ms, None, left, "of no dent", 1.0, condition.of, (more,))
+
+
+def _units(name: str, quick: bool) -> Condition:
+    taken, unit_of = UNITS[name]
+    network, presses = load_translator(), QUICK_PRESSES if quick else made_up_units.PRESSES
+    units = [unit_of(each) if unit_of else made_up_units.Unit() for each in range(1 if quick else made_up_units.UNITS)]
+    made = [made_up_units.played(number, unit, presses) for number, unit in enumerate(units)]
+    gel, force = (np.concatenate([getattr(each, of) for each in made]) for of in ("gel", "force"))
+    of = f"{len(force)} contacts, {len({*units})} made-up units" if len({*units}) > 1 else f"{len(force)} contacts"
+    return Condition(partial(made_up_units.translated_contacts, network, made, taken), gel, force, of)
+
+
+def _flat(quick: bool) -> Condition:
+    pairs = body_rows.pairs_of(body_rows.flat_scene(), QUICK_CONTACTS if quick else body_rows.COUNT)
+    signals = plain_signals(as_read(pairs.signal, SEED))
+    gel = true_displacement(pairs, "digit", slice(None))
+    of = f"{len(gel)} contacts of a plate and wide cylinders"
+    return Condition(partial(load_translator(), signals), gel, lengths(pairs.force), of)
+
+
+def _two(name: str) -> Condition:
+    double = two_contact_rows.double_contacts()
+    network = Translator(load_translator().nets, Answer(contacts=TWO_BALLS[name]))
+    signals = plain_signals(as_read(double.signal, SEED))
+    return Condition(partial(network, signals), double.gel, double.force, f"{len(double.force)} contacts of two balls")
