@@ -36,7 +36,7 @@ def make_press(frames: int = 700, seed: int = 0, slope: float = 0.2, rise: float
     ramp = np.clip((time - up) / rise, 0, 1) * np.clip((down - time) / rise, 0, 1)
     strength = ramp**2 * (3 - 2 * ramp) * (1 + 0.15 * np.sin(2 * np.pi * 3 * time))
     gains = CONTACT
-    rest = np.linspace(3000, 3400, 19)
+    rest = np.linspace(3150, 3550, 19)
     drift = slope * np.linspace(0.5, 1, 19)
     change = strength[:, None] * gains
     electrodes = np.rint(rest + drift * time[:, None] + change + random.normal(0, 1.2, (frames, 19)))

@@ -43,9 +43,10 @@ def pressed(sign: float, *, pdc: bool, frames: int = 400, seed: int = 0, share: 
 @pytest.mark.parametrize(("sign", "name"), [(1.0, "falls"), (-1.0, "rises")])
 @pytest.mark.parametrize("seed", range(5))
 def test_it_is_found_and_the_change_is_that_of_a_raw_reading(pdc, sign, name, seed):
-    found = recordings.prepare(pressed(sign, pdc=pdc, seed=seed))
+    film = PrepareOptions(film=1.0)  # it is looked for in falling counts alone
+    found = recordings.prepare(pressed(sign, pdc=pdc, seed=seed), film)
     assert found.report["polarity"] == name and not found.flags.any() and not found.warnings
-    raw = recordings.prepare(pressed(1.0, pdc=pdc, seed=seed))
+    raw = recordings.prepare(pressed(1.0, pdc=pdc, seed=seed), film)
     np.testing.assert_allclose(found.change, raw.change, atol=10)  # noise of the counts, which does not turn round
 
 

@@ -184,7 +184,7 @@ def test_what_changes_evenly_stays_and_noise_falls_by_its_root():
 
 def test_rectified_recordings_are_smoothed_others_when_told(slide_csv):
     recording = read(slide_csv())
-    plain, said = prepare(recording), prepare(recording, PrepareOptions(smooth=5))
+    plain, said = (prepare(recording, PrepareOptions(smooth=width, film=1.0)) for width in (None, 5))
     assert plain.report["smoothed_frames"] == 1 and said.report["smoothed_frames"] == 5
     np.testing.assert_allclose(said.change, smooth(plain.change, 5))
     np.testing.assert_array_equal(said.electrodes, plain.electrodes)

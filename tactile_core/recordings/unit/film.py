@@ -23,7 +23,9 @@ FRAMES = 600  # looked at, evenly spread
 WINDOW, MOST_WINDOWS = 5.0, 300  # s that say of the conductivity what one contact does, longer where they would be more
 LEAST, MOST = 0.2, 3.0  # thickness that a unit may have over a typical one's (assumed)
 THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # over a typical unit's, that are tried: .33 to 1.52
-TYPICAL, CLEARLY, DRIFTS = 8, 2.0, 3.0  # which is 1; nats by which another, and a drift, must be likelier (assumed)
+# TYPICAL : number of the thickness 1. CLEARLY : nats by which another must be likelier. Without it made-up typical
+# units move; at 1 nat forces of made-up films of .5 are 87 % off, at .25 32 %. DRIFTS : the same of a drift (assumed).
+TYPICAL, CLEARLY, DRIFTS = 8, 0.25, 3.0
 CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 4 counts apart at rest
 # Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of five units, whose
 # films are .4 (two) and 1 (three), and conductivities .5 to 1.1 of a typical one's.
@@ -133,6 +135,14 @@ class _Seen:
         nearest = apart.argmin(axis=1)
         return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
 
+    def left(self, typical: np.ndarray) -> np.ndarray:
+        """Share (n,) of squared length that no simulated contact explains, as firm as simulated or lighter."""
+        seen = np.arcsinh(typical / SCALE)
+        along = seen @ self._known.T
+        firmness = np.clip(along / self._squares, 0, 1)
+        explained = (2 * along - firmness * self._squares) * firmness
+        return np.maximum(1 - explained.max(axis=1) / np.maximum(np.square(seen).sum(axis=1), 1e-9), 1e-9)
+
 
 def find(
     change: Framewise, rest: Framewise, time: np.ndarray, pressure: np.ndarray | None, sensor: str, *,
@@ -226,8 +236,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
     by_pressure = np.full(len(THICKNESSES), np.inf)  # nats, where enough is pressed hard enough to judge
     for row, thickness in enumerate(THICKNESSES):
         typical = seen.typical(thickness, conductivity)[touching]
-        apart, _, length = seen.apart(typical)
-        left = (np.bincount(which, apart / length) / np.bincount(which)).mean()
+        left = (np.bincount(which, seen.left(typical)) / np.bincount(which)).mean()
         doubt[row] += contacts * INDEPENDENT / 2 * np.log(left)
         if pressure is not None:
             ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)

@@ -8,6 +8,7 @@ from benchmarks.translation.made_up_units import Unit
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
 from tactile_core.mechanics.placement import Placement
+from tactile_core.recordings.preparer import Preparer
 from tactile_core.sensors import REST_COUNTS
 from tactile_core.translation.translate import load_translator
 
@@ -24,6 +25,14 @@ def test_a_typical_unit_reads_as_the_law_has_it():
 def test_a_thin_film_and_a_weak_fluid_raise_the_impedance_at_rest_alike(film, conductivity):
     np.testing.assert_allclose(Unit(film, conductivity).rest(), Unit(0.5).rest())
     assert (Unit(0.5).rest() < REST_COUNTS).all()
+
+
+def test_light_touches_do_not_hide_a_thin_film():
+    """All are lighter than the lightest simulated contacts over some of the films that are tried."""
+    for film, least, most in ((0.5, 0.4, 0.8), (1.0, 1.0, 1.0)):
+        recording = made_up_units.played(0, Unit(film=film), presses=5).recording
+        found = Preparer()(recording).report["film"]
+        assert least <= found["thickness"] <= most and "different contacts" in found["evidence"]
 
 
 def test_rows_of_units_given_found_and_unknown():
