@@ -33,7 +33,7 @@ def write_report(
 
 
 def as_line(method: Method) -> str:
-    """A method as a line of the table; the fastest with the least error of its stage stand in the plot."""
+    """Return a method as a line of a Markdown table: name, ms, MB, error, baseline, and what they were measured on."""
     cells = [f"`{method.name}`", *map(short, (method.ms, method.mb))]
     cells += ["" if each is None else f"{short(each)} {method.unit}" for each in (method.error, method.baseline)]
     return "| " + " | ".join([*cells, method.of]) + " |"

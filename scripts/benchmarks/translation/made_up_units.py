@@ -54,7 +54,7 @@ OTHERS, CHECKED, EDGES, FEWEST = 64, 24, (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """A finger whose film, fluid and skin are so thick, conducting and stiff over a typical one's."""
+    """A finger: its film's thickness, fluid's conductivity and skin's stiffness, each over a typical unit's."""
 
     film: float = 1.0
     conductivity: float = 1.0
@@ -62,7 +62,7 @@ class Unit:
 
     @property
     def skin(self) -> Compliance:
-        """The skin, over a core as near as the film is thin."""
+        """The compliance of the skin, over a core whose distance is the film's thickness."""
         return _skin(self.film)
 
     @property
@@ -71,7 +71,7 @@ class Unit:
         return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
 
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
-        """An indenter in front of the finger; its forces are a typical skin's."""
+        """Return the press of an indenter on this finger; its forces leave the unit's stiffness out."""
         pose = pose_at(SOURCE, indenter, place)
         limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
         return CorrectedPress(self.skin, indenter, pose, limit, friction)
@@ -94,7 +94,7 @@ class Unit:
         return COUNT_MAX / (1 + series + film * resistance / self.conductivity)
 
     def file(self) -> ElectrodeGains:
-        """Return it in the form of `tactile adapt`, with the gains left open."""
+        """Return the unit as `tactile adapt` writes one, with gains of 1."""
         ones, rest = [1.0] * len(REST_COUNTS), self.rest().tolist()
         return ElectrodeGains("given", ones, [0.0] * len(ones), rest, film=self.film, stiffness=self.stiffness)
 
@@ -165,7 +165,7 @@ TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | 
 
 
 def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
-    """Medians over contacts of units given, found and taken as typical, beside those of as many typical units.
+    """Medians over contacts of units given, found and taken as typical, beside those of equally many typical units.
 
     found : by the recording itself, its rest and contacts, as `tactile convert` does; stiffness cannot be
     """
