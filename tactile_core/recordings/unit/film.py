@@ -135,7 +135,7 @@ class _Seen:
         nearest = apart.argmin(axis=1)
         return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
 
-    def left(self, typical: np.ndarray) -> np.ndarray:
+    def unexplained(self, typical: np.ndarray) -> np.ndarray:
         """Share (n,) of squared length that no simulated contact explains, as firm as simulated or lighter."""
         seen = np.arcsinh(typical / SCALE)
         along = seen @ self._known.T
@@ -236,7 +236,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
     by_pressure = np.full(len(THICKNESSES), np.inf)  # nats, where enough is pressed hard enough to judge
     for row, thickness in enumerate(THICKNESSES):
         typical = seen.typical(thickness, conductivity)[touching]
-        left = (np.bincount(which, seen.left(typical)) / np.bincount(which)).mean()
+        left = (np.bincount(which, seen.unexplained(typical)) / np.bincount(which)).mean()
         doubt[row] += contacts * INDEPENDENT / 2 * np.log(left)
         if pressure is not None:
             ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)
