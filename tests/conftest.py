@@ -52,7 +52,7 @@ def write_slide() -> Callable[[str, int, Path], Path]:
     def write(name: str, frames: int, folder: Path) -> Path:
         random = np.random.default_rng(7)
         press = np.clip(np.arange(frames) - 60, 0, 60)[:, None] * np.linspace(1, 3, 19)
-        electrodes = np.rint(3300 + press + random.normal(0, 1, (frames, 19)))
+        electrodes = np.rint(3400 + press + random.normal(0, 1, (frames, 19)))
         rows = np.zeros((frames, len(SLIDE_HEADER)))
         rows[:, 0] = 1.6e9 + np.arange(frames) / 100
         rows[:, 1:4], rows[:, 4:26], rows[:, 26:] = 2000, 2000, electrodes

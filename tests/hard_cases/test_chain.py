@@ -104,7 +104,7 @@ def test_drift() -> Found:
     strength = np.clip(np.sin((time % 60 - 20) / 8 * np.pi), 0, None) * ((time % 60 > 20) & (time % 60 < 28))
     press = strength[:, None] * np.linspace(-40, 120, 19)
     slope = np.linspace(-88, 88, 19) / 3600
-    counts = np.rint(3300 + press + time[:, None] * slope + random.normal(0, 1, press.shape))
+    counts = np.rint(3400 + press + time[:, None] * slope + random.normal(0, 1, press.shape))
     recording = dataclasses.replace(
         prepared()[0], time=time, electrodes=counts, rows=np.arange(len(time)), truth=None, pdc=None, tac=None,
         tdc=None, pac=None, position=None, force=None, flags=np.zeros(len(time), np.uint16),

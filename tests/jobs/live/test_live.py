@@ -289,7 +289,7 @@ def test_the_polarity_is_found_by_pressure_and_assumed_until_then(sign):
     contact = polarity.contact_signals()[7]
     strength = np.r_[np.zeros(60), np.clip(np.sin(np.linspace(0, 9, 200)), 0, 1)]
     noise = np.random.default_rng(0).normal(0, 1, (260, 19))
-    electrodes, pdc = 3300 + sign * strength[:, None] * contact + noise, 1000 + 100 * strength
+    electrodes, pdc = 3400 + sign * strength[:, None] * contact + noise, 1000 + 100 * strength
     signals = live.LiveSignals()
     for start in range(0, 260, 10):
         signals.learn(rows_of(electrodes[start : start + 10], pdc[start : start + 10]))
