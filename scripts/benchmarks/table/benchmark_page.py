@@ -40,8 +40,11 @@ def as_line(method: Method) -> str:
 
 
 def short(value: float | None) -> str:
-    """Format with three digits."""
-    return "" if value is None else f"{value:,.0f}" if value >= 100 else f"{value:.3g}"
+    """Format with three digits, of the four that a row keeps."""
+    if value is None:
+        return ""
+    kept = float(f"{value:.4g}")
+    return f"{kept:,.0f}" if kept >= 100 else f"{kept:.3g}"
 
 
 def plot(methods: Sequence[Method]) -> bytes:
