@@ -75,7 +75,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     if fluid is not None:
         elsewhere = unit_rest is not None and any(unit_rest.spread)  # that of the part before has none
         change = fluid.changes(change, rest, ~(pressure > film.PRESSED) if elsewhere else None)
-        warnings += [film.TOO_SMALL] if fluid.idle else []
+        warnings += fluid.warnings
     if recording.pdc is not None and not np.isfinite(recording.pdc).all():
         unread = int(np.sum(~np.isfinite(recording.pdc)))
         warnings.append(f"PDC has no number in {unread} of {len(recording)} frames: no pressure is known there")

@@ -21,9 +21,11 @@ def script():
 
 def test_a_stage_runs_and_its_rows_can_be_read(script, tmp_path):
     file = tmp_path / "rows.json"
-    arguments = ["--quick", "--only", "translation numpy_1", "mechanics digit_fast", "--json", str(file)]
-    assert script.main(arguments) == 0
+    methods = ["translation numpy_1", "mechanics digit_fast", "conditions two_balls"]
+    assert script.main(["--quick", "--only", *methods, "--json", str(file)]) == 0
     rows = {row["name"]: row for row in json.loads(file.read_text())}
+    left, force = (rows[f"conditions_two_balls_{name}"]["value"] for name in ("error", "force_error"))
+    assert 0 < left < 1 and 0 < force < 20
     for method in ("translation_numpy_1", "mechanics_digit_fast"):
         error = rows[f"{method}_error"]
         assert rows[f"{method}_ms"]["value"] > 0 and rows[f"{method}_MB"]["value"] > 20

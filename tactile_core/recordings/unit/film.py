@@ -46,6 +46,10 @@ REST_OFF, PRESSED = 0.0131, 450.0
 # the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
 TOO_SMALL = "no change is larger than what the fluid's drift leaves: taken for no contact, light touches with it"
+UNSURE = (
+    "film taken as {:g} of a typical unit's by the counts at rest: another fluid over a typical film rests alike, and "
+    "force would be some {:.1f} times as large. `tactile adapt` on recordings with PDC or a force tells them apart"
+)
 SKIN = 0.75, 0.35  # measured over simulated pressure of real skins (descriptor of the BioTac), and its spread (assumed)
 NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another unit or sensor: four spreads
 
@@ -55,7 +59,8 @@ class Film:
     """Film of the unit that made a recording.
     thickness : over a typical unit's; evidence : for it, in words
     conductivity : (P,) log of the fluid's over that at rest, at rising frames (P,); linear between them
-    sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves"""
+    sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves
+    unsure : true if neither the user nor the fluid's pressure says that it is no typical film over another fluid"""
 
     thickness: float
     evidence: str
@@ -63,6 +68,7 @@ class Film:
     conductivity: np.ndarray
     sensor: str = SOURCE
     idle: bool = False
+    unsure: bool = False
 
     @classmethod
     def given(cls, thickness: float) -> Film:
@@ -98,6 +104,12 @@ class Film:
             return found * contact[:, None]
 
         return Changes(len(change), of_typical_film)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings, in words, of changes taken for none and of a film that may be another."""
+        found = [TOO_SMALL] if self.idle else []
+        return [*found, UNSURE.format(self.thickness, 1 / self.thickness)] if self.unsure else found
 
     def report(self) -> dict[str, object]:
         """Return the film as numbers and words fit for JSON."""
@@ -157,16 +169,18 @@ def find(
     seen = _Seen(change[frames], rest[frames], time[frames], sensor)
     believed = _believed(_doubt_at_rest(_impedance_at_rest(seen))) if thickness is None else thickness
     log = _tracked(seen, believed, AT_REST if own_rest else SINCE_REST) if drifts else np.zeros(len(seen.windows))
+    unsure = False
     if thickness is None:
         measured = None if pressure is None else pressure[frames]
-        thickness, evidence = _thickness(seen, np.exp(log)[seen.window_of, None], measured)
+        thickness, evidence, by_pressure = _thickness(seen, np.exp(log)[seen.window_of, None], measured)
+        unsure = thickness != 1 and not by_pressure
     else:
         evidence = "given"
     middle = np.bincount(seen.window_of, frames) / np.bincount(seen.window_of)
     found = divider.of_typical_film(seen.change, seen.rest, thickness, np.exp(log)[seen.window_of, None])
     beyond = np.linalg.norm(found, axis=1) / np.maximum(_drift_left(log, seen.rest, thickness), 1e-9)
     idle = bool(np.abs(log).max() > WARMED and np.percentile(beyond, 99) < IDLE)
-    return Film(thickness, evidence, middle, log, sensor, idle)
+    return Film(thickness, evidence, middle, log, sensor, idle, unsure)
 
 
 def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
@@ -222,8 +236,9 @@ def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
     return CONDUCTIVITIES[course[::-1]]
 
 
-def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str]:
-    """Return the most plausible thickness, by counts at rest and enough different contacts, and its evidence."""
+def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str, bool]:
+    """Return the most plausible thickness, its evidence, and whether the fluid's pressure is part of that, beside the
+    counts at rest and enough different contacts."""
     impedance = _impedance_at_rest(seen)
     doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
     at_first = seen.typical(_believed(doubt), conductivity)
@@ -231,7 +246,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
     _, which = np.unique(seen.apart(at_first[touching])[1], return_inverse=True)
     contacts = int(which.max(initial=-1)) + 1
     if contacts < FEWEST:
-        return _believed(doubt), evidence
+        return _believed(doubt), evidence, False
     pressure = None if pressure is None else pressure[touching]
     by_pressure = np.full(len(THICKNESSES), np.inf)  # nats, where enough is pressed hard enough to judge
     for row, thickness in enumerate(THICKNESSES):
@@ -242,6 +257,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
             ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)
             if pressed >= FEWEST_PRESSED:
                 by_pressure[row] = (np.log(ratio / SKIN[0]) / SKIN[1]) ** 2 / 2
-    if by_pressure.min() < NO_SKIN:
+    told = bool(by_pressure.min() < NO_SKIN)
+    if told:
         doubt += np.where(np.isfinite(by_pressure), by_pressure, by_pressure.min())
-    return _believed(doubt), f"{evidence}, {contacts} different contacts"
+    return _believed(doubt), f"{evidence}, {contacts} different contacts", told

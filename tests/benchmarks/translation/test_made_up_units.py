@@ -29,10 +29,13 @@ def test_a_thin_film_and_a_weak_fluid_raise_the_impedance_at_rest_alike(film, co
 
 def test_light_touches_do_not_hide_a_thin_film():
     """All are lighter than the lightest simulated contacts over some of the films that are tried."""
-    for film, least, most in ((0.5, 0.4, 0.8), (1.0, 1.0, 1.0)):
-        recording = made_up_units.played(0, Unit(film=film), presses=5).recording
-        found = Preparer()(recording).report["film"]
-        assert least <= found["thickness"] <= most and "different contacts" in found["evidence"]
+    thin, weak, typical = (
+        Preparer()(made_up_units.played(0, unit, presses=5).recording) for unit in (Unit(0.5), Unit(1.0, 0.5), Unit())
+    )
+    assert "different contacts" in thin.report["film"]["evidence"]
+    assert 0.4 < thin.film < 0.8 and typical.film == 1 and not typical.warnings
+    for each in (thin, weak):  # which rest alike
+        assert each.film < 0.8 and any("another fluid over a typical film rests alike" in one for one in each.warnings)
 
 
 def test_rows_of_units_given_found_and_unknown():
