@@ -10,6 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.jobs.results import parse_frames
 from ...tactile_core.recordings.opened_file import FOLDER_ENDINGS
 from ..settings import properties
 
@@ -68,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
         verb = verbs.add_parser(name, help=brief, description=brief)
         verb.add_argument("inputs", nargs="+", metavar="INPUT", help=what)
         verb.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder of the results")
-        verb.add_argument("--pictures", action="store_true", help="render every frame too")
+        verb.add_argument("--pictures", action="store_true", help="render every frame taken, too")
         verb.add_argument("--preset", default="fast", help="of the pictures (default: fast)")
         verb.add_argument("--error", default="", help="largest error to add: 50um (tier), 0.6levels (preset), or both")
         verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
@@ -191,6 +192,8 @@ def _pictures(folder: Path, options: argparse.Namespace) -> None:
     bpy.ops.tactile.set_up_render()
     scene.tactile_render.preset, scene.tactile_render.error = options.preset, options.error
     scene.render.filepath = str((folder / "images").resolve()) + "/"
+    if step := parse_frames(options.frames).step:  # between two frames that were taken Blender interpolates
+        scene.frame_step = step
     bpy.ops.render.render(animation=True)
 
 
