@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
+SHIPPED = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 PAC, ELECTRODES = [f"pac{i}" for i in range(1, 23)], [f"ele{i}" for i in range(1, 20)]
 SLIDE_HEADER = ["timestamp", "tdc", "tac", "pdc", *PAC, *ELECTRODES]
 
@@ -46,22 +47,49 @@ def outside_data() -> Callable[[str], Path]:
 
 
 @pytest.fixture(scope="session")
+def shipped():
+    """The recording that ships, with its truth; no test may change its arrays."""
+    from tactile_core import recordings
+
+    return recordings.read(SHIPPED)
+
+
+def write_counts(path: Path, electrodes: np.ndarray, pdc: np.ndarray | float = 2000) -> None:
+    """A slide file at 100 Hz that holds these electrodes' counts (frames, 19) and pdc, and 2000 elsewhere."""
+    rows = np.full((len(electrodes), len(SLIDE_HEADER)), 2000.0)
+    rows[:, 0] = 1.6e9 + np.arange(len(rows)) / 100
+    rows[:, 3], rows[:, 26:] = pdc, electrodes
+    np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+
+
+@pytest.fixture(scope="session")
 def write_slide() -> Callable[[str, int, Path], Path]:
     """``write_slide("touch", 150, folder)`` writes a raw recording: 0.6 s of quiet, then a press, at 100 Hz."""
 
     def write(name: str, frames: int, folder: Path) -> Path:
         random = np.random.default_rng(7)
         press = np.clip(np.arange(frames) - 60, 0, 60)[:, None] * np.linspace(1, 3, 19)
-        electrodes = np.rint(3400 + press + random.normal(0, 1, (frames, 19)))
-        rows = np.zeros((frames, len(SLIDE_HEADER)))
-        rows[:, 0] = 1.6e9 + np.arange(frames) / 100
-        rows[:, 1:4], rows[:, 4:26], rows[:, 26:] = 2000, 2000, electrodes
-        rows[:, 3] += press[:, 0]
         path = folder / f"{name}.csv"
-        np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+        write_counts(path, np.rint(3400 + press + random.normal(0, 1, (frames, 19))), pdc=2000 + press[:, 0])
         return path
 
     return write
+
+
+@pytest.fixture(scope="session")
+def _own_sensors(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    import coarse_sensors
+
+    folder = tmp_path_factory.mktemp("own")
+    coarse_sensors.copy_mini(folder)
+    return folder
+
+
+@pytest.fixture
+def coarse_mini(_own_sensors: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """The name of a GelSight Mini whose matrices are soon made, among the user's own sensors."""
+    monkeypatch.setenv("TACTILE_SENSORS", str(_own_sensors))
+    return "coarse_mini"
 
 
 @pytest.fixture

@@ -188,9 +188,8 @@ def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> N
         # Half of what a view shows, a unit of distance: Blender's lens is for a sensor of 72 mm along the longer side.
         half = 36 / area.spaces.active.lens / longest * np.array([free, region.height])
         seen.view_distance = float((sides[2] + _MARGIN * (np.abs(sides[:2]) / half[:, None]).max(axis=0)).max())
-        beyond = (
-            seen.view_distance * half[0] * (sidebar - tools) / free
-        )  # the view's middle is right of the free part's
+        # the view's middle is right of the free part's
+        beyond = seen.view_distance * half[0] * (sidebar - tools) / free
         seen.view_location = np.array([right, up, toward]).T @ (middle + np.array([beyond, 0.0, 0.0]))
 
 

@@ -100,9 +100,8 @@ def solve_path(
 
 
 def _first_touch(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
-    gel = (
-        sensor if sensors.is_gel(sensor) else sensors.TARGET
-    )  # the part of the pad that unrolls onto it can be touched
+    # the part of the pad that unrolls onto it can be touched
+    gel = sensor if sensors.is_gel(sensor) else sensors.TARGET
     if not on_gel(place.x, place.z, sensor=gel):
         found = f"({place.x * 1e3:g}, {place.z * 1e3:g}) mm"
         advice = f"tactile_core.sensors.shape_of({gel!r}).outline_distance says how far inside a place is"

@@ -221,9 +221,8 @@ def _rest(
 ) -> Baseline:
     """Return the rest to subtract."""
     if quiet.parts:
-        return baseline(
-            readings, quiet, options.drift and kind != "rectified"
-        )  # drift of a rectified signal has no sign
+        # drift of a rectified signal has no sign
+        return baseline(readings, quiet, options.drift and kind != "rectified")
     if options.tare == "none":
         warnings.append("no tare, as asked for: the file's own zero is taken for rest")
         return Baseline.constant(np.zeros(readings.shape[1]))

@@ -152,9 +152,8 @@ def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
     for changes in ("set_style", "force_arrow", "set_up_render", "reset_to_calibration"):
         with pytest.raises(RuntimeError, match="library"):
             getattr(bpy.ops.tactile, changes)()
-    assert bpy.ops.tactile.save_as_calibration(filepath=str(tmp_path / "unit.toml")) == {
-        "FINISHED"
-    }  # which reads alone
+    # which reads alone
+    assert bpy.ops.tactile.save_as_calibration(filepath=str(tmp_path / "unit.toml")) == {"FINISHED"}
 
 
 def test_a_file_of_the_former_version_gets_what_it_lacks(translated):

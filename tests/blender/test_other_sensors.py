@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from coarse_sensors import copy_mini
 
 ROOT = Path(__file__).resolve().parents[2]
 SENSORS = ROOT / "tactile_core" / "sensors"
@@ -21,15 +22,7 @@ WEIGHTS = ROOT / "tactile_core" / "data" / "weights"
 def own_sensors(tmp_path_factory):
     """A GelSight Mini of nodes 1 mm apart, whose compliance takes seconds, and the places of an SP's electrodes."""
     own = tmp_path_factory.mktemp("own")
-    shutil.copytree(SENSORS / "gelsight_mini", own / GEL)
-    text = (own / GEL / "sensor.toml").read_text()
-    assert "window_nodes = [45, 57]" in text
-    text = text.replace("window_nodes = [45, 57]", "window_nodes = [15, 19]").replace(
-        '"GelSight Mini"', '"Coarse Mini"'
-    )
-    (own / GEL / "sensor.toml").write_text(text)
-    unit = own / GEL / "default.toml"
-    unit.write_text(unit.read_text().replace('sensor = "gelsight_mini"', f'sensor = "{GEL}"'))
+    copy_mini(own)
     (own / SP).mkdir()
     rows = [f"E{k + 1},{x:.2f},0,-5,3000" for k, x in enumerate(np.linspace(-6, 6, 24))]  # on a line under the pad
     (own / SP / "locations.csv").write_text("\n".join(["name,x_mm,y_mm,z_mm,rest_counts", *rows, "X1,0,0,-4,"]) + "\n")

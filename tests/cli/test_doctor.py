@@ -54,13 +54,6 @@ def test_without_llvm_it_says_why_and_how_to_get_it(monkeypatch):
     assert "fast alone" in next(doctor._mitsuba(False))
 
 
-def test_a_path_to_nothing_is_trouble(monkeypatch):
-    variant.llvm_trouble.cache_clear()
-    assert (
-        "not there" in variant.llvm_trouble("/no/such/libLLVM.so") or variant.llvm_trouble("/no/such/libLLVM.so") == ""
-    )
-
-
 @pytest.mark.parametrize(
     ("said", "words"),
     [

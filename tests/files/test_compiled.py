@@ -88,9 +88,8 @@ ROUNDING = 1e-10 if np.lib.NumpyVersion(np.__version__) >= "2.0.0" else 1e-6
 PATH = [Step(depth=0.1e-3), Step(depth=0.1e-3, slide=(0.1e-3, 0.0)), Step(force=0.05)]
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.78])
-@pytest.mark.parametrize("sensor", ["digit", "biotac"])
 @pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize(("sensor", "friction"), [("digit", 0.0), ("biotac", 0.78)])
 def test_contacts_do_not_depend_on_what_is_installed(name, sensor, friction, compiled_loops):
     place, found = Placement(-6e-3, 1e-3, 0.1, 1.0), []
     for on in (True, False):
@@ -130,9 +129,8 @@ def test_heights_and_pictures_are_numpys(compiled_loops):
 
 def test_a_gel_that_folds_over_itself_is_counted_as_numpy_counts_it(compiled_loops):
     rest, folding = sensors.digit_surface().rest, np.zeros((1, *sensors.digit_surface().rest.shape))
-    folding[0, :, 0] = 1e-3 * np.sin(
-        rest[:, 0] / 0.4e-3
-    )  # m, pushed along the finger farther than its places lie apart
+    # m, pushed along the finger farther than its places lie apart
+    folding[0, :, 0] = 1e-3 * np.sin(rest[:, 0] / 0.4e-3)
     found = {}
     for on in (False, True):
         compiled_loops(on)

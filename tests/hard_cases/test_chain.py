@@ -55,14 +55,9 @@ def translated(name: str, share: float) -> Found:
         return Found(1.0, "said", 1.0, at_least=True, words="the fast tier says that it finds no contact of this force")
     change = signal_of(biotac)[None]
     signals = dataclasses.replace(
-        prepared()[1],
-        change=change,
-        rest=REST_COUNTS.copy(),
-        electrodes=REST_COUNTS + change,
-        quiet=np.zeros(1, bool),
-        flags=np.zeros(1, np.uint16),
-        pdc=np.zeros(1),
-    )
+        prepared()[1], change=change, rest=REST_COUNTS.copy(), electrodes=REST_COUNTS + change, quiet=np.zeros(1, bool),
+        flags=np.zeros(1, np.uint16), pdc=np.zeros(1),
+    )  # fmt: skip
     return over_bound(signals, {"biotac": biotac.displacement, "digit": digit.displacement})
 
 

@@ -38,19 +38,9 @@ def translate(signals: Signals) -> Translation:
     flags = np.where(depth > 100, Flag.OUT_OF_RANGE, 0).astype(np.uint16)
     errors = [share * depth * np.float32(1e-6) for share in (0.1, 0.1, 0.2, 0.2)]
     return Translation(
-        *codes,
-        skin,
-        gel,
-        force,
-        50 * depth,
-        center,
-        np.exp(-depth / 100),
-        *errors,
-        flags,
-        np.exp(-depth / 50),
-        np.full_like(center, np.nan),
-        np.zeros_like(force),
-    )
+        *codes, skin, gel, force, 50 * depth, center, np.exp(-depth / 100), *errors, flags, np.exp(-depth / 50),
+        np.full_like(center, np.nan), np.zeros_like(force),
+    )  # fmt: skip
 
 
 def hold() -> None:

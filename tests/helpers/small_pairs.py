@@ -70,17 +70,8 @@ def write_pairs(
         file["place"] = np.concatenate([center, np.zeros_like(center)], 1).astype(np.float32)
         file["slide"] = np.zeros_like(center, np.float32)
         file["press"], file["indenter"] = press.astype(np.int32), np.zeros(len(press), np.int16)
-        file.attrs.update(
-            {
-                "scene": "",
-                "seed": seed,
-                "version": "0",
-                "indenters": json.dumps(["sphere"]),
-                "format": "tactile-pairs-2",
-                "polarity": "falls",
-                "electrodes": "sheet",
-            }
-        )
+        file.attrs.update(scene="", seed=seed, version="0", indenters=json.dumps(["sphere"]))
+        file.attrs.update(format="tactile-pairs-2", polarity="falls", electrodes="sheet")
     return path
 
 

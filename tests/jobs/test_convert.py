@@ -32,6 +32,8 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration import Markers
 
 FRAMES = 150  # of slide_csv: more than two chunks
+ROOT = Path(__file__).parents[2]
+FAKE = ROOT / "tests" / "helpers" / "fake_tools.py"
 
 
 @pytest.fixture(scope="module")
@@ -247,16 +249,8 @@ def test_a_disk_that_fills_up_ends_in_one_message_and_no_folder(slide_csv, tmp_p
 
 def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
     """Start a conversion that stops at its second chunk, interrupt it when pictures are there, wait for its end."""
-    root = Path(__file__).parents[2]
-    environment = {**os.environ, "FAKE_HOLD": "1", "PYTHONPATH": str(root)}
-    command = [
-        sys.executable,
-        str(root / "tests" / "helpers" / "fake_tools.py"),
-        "convert",
-        str(path),
-        "--out",
-        str(out),
-    ]
+    environment = {**os.environ, "FAKE_HOLD": "1", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, str(FAKE), "convert", str(path), "--out", str(out)]
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
     partial = out / f".{path.stem}.tactile-partial" / "images"
     while process.poll() is None and not (partial.exists() and len(list(partial.iterdir())) > CHUNK // 2):
@@ -271,15 +265,13 @@ def interrupt(how: int, path: Path, out: Path) -> subprocess.Popen:
 @pytest.mark.parametrize("keep", ["displacement", "height"])  # plain and packed in frames.h5
 def test_a_full_disk_costs_one_recording_and_no_half_result_is_left(keep, slide_csv, tmp_path):
     paths, out = [slide_csv("long", frames=500), slide_csv("short", frames=5)], tmp_path / "out"
-    root = Path(__file__).parents[2]
     limited = (  # 500 kB: enough for 5 frames and a sheet. Python ignores SIGXFSZ: writing gives OSError
         "import resource, runpy, sys; sys.argv = sys.argv[1:]; sys.path.insert(0, sys.argv[0].rpartition('/')[0]);"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (500_000, 500_000)); runpy.run_path(sys.argv[0], None, '__main__')"
     )
     done = subprocess.run(
-        [sys.executable, "-c", limited, str(root / "tests" / "helpers" / "fake_tools.py"),
-         "convert", *map(str, paths), "--out", str(out), "--keep", keep],
-        env={**os.environ, "PYTHONPATH": str(root)}, capture_output=True, text=True, timeout=120,
+        [sys.executable, "-c", limited, str(FAKE), "convert", *map(str, paths), "--out", str(out), "--keep", keep],
+        env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
     assert done.returncode == 2, done.stderr
     errors = [line for line in done.stderr.splitlines() if line.startswith("tactile: error:")]

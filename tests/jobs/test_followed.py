@@ -3,31 +3,25 @@
 import h5py
 import numpy as np
 import pytest
+from conftest import SHIPPED
 
-from tactile_core import recordings
 from tactile_core.cli.main import main
 
-RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 ARRAYS = ("force", "contact_center", "displacement_digit", "latent_biotac", "confidence")
 
 
 @pytest.fixture(scope="module")
-def whole(root, tmp_path_factory):
-    return converted(root, tmp_path_factory.mktemp("whole"))
+def whole(tmp_path_factory):
+    return converted(tmp_path_factory.mktemp("whole"))
 
 
 @pytest.fixture(scope="module")
-def apart(root, tmp_path_factory):
-    return converted(root, tmp_path_factory.mktemp("apart"), "--frames-apart")
+def apart(tmp_path_factory):
+    return converted(tmp_path_factory.mktemp("apart"), "--frames-apart")
 
 
-@pytest.fixture(scope="module")
-def root(request):
-    return request.config.rootpath
-
-
-def converted(root, folder, *words):
-    assert main(["convert", str(root / RECORDING), "--out", str(folder), "--keep", "latent,displacement", *words]) == 0
+def converted(folder, *words):
+    assert main(["convert", str(SHIPPED), "--out", str(folder), "--keep", "latent,displacement", *words]) == 0
     return arrays(folder / "press_roll_slide" / "frames.h5")
 
 
@@ -45,15 +39,15 @@ def alike(found, whole):
 
 
 @pytest.mark.parametrize("frames", ["70:75", "::37", "300:"])
-def test_frames_are_the_same_whichever_are_asked_for(root, tmp_path, whole, frames):
-    some = converted(root, tmp_path, "--frames", frames)
+def test_frames_are_the_same_whichever_are_asked_for(tmp_path, whole, frames):
+    some = converted(tmp_path, "--frames", frames)
     for name in ARRAYS:
         assert alike(some[name], whole[name][some["frame"]]), name
 
 
-def test_shards_are_the_same_as_a_conversion(root, tmp_path, whole):
+def test_shards_are_the_same_as_a_conversion(tmp_path, whole):
     words = ["--keep", "latent,displacement", "--shard-frames", "100", "--workers", "1"]
-    assert main(["batch", str(root / RECORDING), "--out", str(tmp_path / "job"), *words]) == 0
+    assert main(["batch", str(SHIPPED), "--out", str(tmp_path / "job"), *words]) == 0
     files = sorted((tmp_path / "job").rglob("*.h5"))
     shards = sorted((arrays(file) for file in files if "prepared" not in file.parts), key=lambda one: one["frame"][0])
     assert len(shards) > 1
@@ -62,8 +56,8 @@ def test_shards_are_the_same_as_a_conversion(root, tmp_path, whole):
         assert alike(found, whole[name]), name
 
 
-def test_following_steadies_the_place_and_finds_the_touched_frames(root, whole, apart):
-    force = np.linalg.norm(recordings.read(root / RECORDING).truth.force, axis=1)
+def test_following_steadies_the_place_and_finds_the_touched_frames(shipped, whole, apart):
+    force = np.linalg.norm(shipped.truth.force, axis=1)
     said = [np.isfinite(each["contact_center"][:, 0]) for each in (whole, apart)]
     wrong = [np.mean(np.where(force > 0.1, ~each, each & (force == 0))) for each in said]
     assert wrong[0] <= wrong[1] and wrong[0] < 0.005

@@ -58,9 +58,9 @@ def test_a_press_is_what_the_solver_finds():
     assert found.flags == ("began inside",)
 
 
-@pytest.mark.parametrize("sensor", ["digit", "biotac", "gelsight_mini"])
+@pytest.mark.parametrize("sensor", ["digit", "biotac", "coarse_mini"])
 @pytest.mark.parametrize("indenter", [BALL, Box((5e-3, 4e-3, 3e-3), 0.5e-3)], ids=["ball", "box"])
-def test_tractions_add_up_to_the_force(sensor, indenter):
+def test_tractions_add_up_to_the_force(sensor, indenter, coarse_mini):
     gel = Gel(sensor, indenter)
     for contact in gel.follow(path(gel)[1:]):
         total = (contact.traction * gel.areas[:, None]).sum(axis=0)

@@ -108,18 +108,8 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
     assert built(plan.of_frames(150, ("latent",))) == ["networks"]
     assert built(plan.of_frames(150, ("latent", "height", "image"))) == ["networks", "height maps", "pictures, fast"]
     assert {"force field", "DIGIT matrices"} <= set(built(plan.of_frames(10, ("traction",))))
-    line = [
-        "convert",
-        str(slide_csv()),
-        "--out",
-        str(tmp_path / "out"),
-        "--keep",
-        "latent",
-        "--frames",
-        ":100",
-        "--plan",
-    ]
-    assert main(line) == 0 and not (tmp_path / "out").exists()
+    words = ["--out", str(tmp_path / "out"), "--keep", "latent", "--frames", ":100", "--plan"]
+    assert main(["convert", str(slide_csv()), *words]) == 0 and not (tmp_path / "out").exists()
     said = capsys.readouterr().out
     assert "100 frames" in said and f"in all about {1.0 + 0.01 * 100:g} s" in said
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from conftest import SLIDE_HEADER
+from conftest import write_counts
 
 from tactile_core import recordings
 from tactile_core.jobs import prepared_signals
@@ -26,13 +26,9 @@ def write(tmp_path):
         contact = polarity.contact_signals()[7]
         strength = np.clip((np.arange(2000) - 500) / 300, 0, 1)
         noise = np.random.default_rng(0).normal(0, 1, (2000, 19))
-        rows = np.full((2000, len(SLIDE_HEADER)), 2000.0)
-        rows[:, 0] = 1.6e9 + np.arange(2000) / 100
-        rows[:, 3] = 1000 + np.rint(100 * strength)
-        rows[:, 26:] = np.rint(3300 + sign * strength[:, None] * contact + noise)
+        electrodes = np.rint(3300 + sign * strength[:, None] * contact + noise)
         path = tmp_path / "long.csv"
-        formats = ["%.6f"] + ["%d"] * 44
-        np.savetxt(path, rows, fmt=formats, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+        write_counts(path, electrodes, pdc=1000 + np.rint(100 * strength))
         return path
 
     return make

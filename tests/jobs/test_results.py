@@ -77,12 +77,6 @@ def test_frames_file_holds_what_is_kept_with_units_and_nothing_else(tmp_path):
         assert file["time"].attrs["start_time"] == 1.5
 
 
-def test_frames_file_is_the_same_bytes_again(tmp_path):
-    write_frames(tmp_path / "a")
-    write_frames(tmp_path / "b")
-    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
-
-
 def test_results_of_another_verb_and_files_of_others_are_not_replaced(tmp_path):
     make_result(tmp_path / "touch")
     with pytest.raises(TactileError, match="is no result of this verb"):

@@ -4,24 +4,19 @@ from __future__ import annotations
 
 import h5py
 import numpy as np
-import pytest
+from conftest import SHIPPED
 
 from tactile_core import recordings
 from tactile_core.cli.main import main
 
 
-@pytest.fixture(scope="module")
-def shipped(request):
-    return request.config.rootpath / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
-
-
 def test_a_gel_gives_back_the_skin_the_force_and_the_counts(shipped, tmp_path):
     """The simulated truth is what pairs are made of; an untouched finger is the baseline."""
     out = tmp_path / "skin.h5"
-    words = ["convert", str(shipped), "--reverse", "--frames", "60:300:10", "--out", str(out)]
+    words = ["convert", str(SHIPPED), "--reverse", "--frames", "60:300:10", "--out", str(out)]
     assert main(words) == 0
-    recording, rows = recordings.read(shipped), np.arange(60, 300, 10)
-    signals, truth = recordings.prepare(recording), recording.truth
+    rows, truth = np.arange(60, 300, 10), shipped.truth
+    signals = recordings.prepare(shipped)
     with h5py.File(out) as file:
         assert file.attrs["sensor"] == "biotac" and np.array_equal(file["frame"][:], rows)
         skin, force, counts = (file[name][:] for name in ("displacement", "force", "electrodes"))

@@ -73,7 +73,12 @@ def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
     assert not (found["few"]["flags"] & Flag.GEL_NOT_SOLVED).any()
 
 
-MINI = "gelsight_mini"
+MINI = "coarse_mini"
+
+
+@pytest.fixture(autouse=True)
+def _mini(coarse_mini):
+    pass
 
 
 def test_a_contact_found_on_one_gel_is_solved_on_another(pressed):
@@ -109,9 +114,9 @@ def test_every_verb_that_translates_takes_any_gel(short, tmp_path, capsys):
     """Without networks that lead there, and it is said; all three agree."""
     assert main(["convert", short, "--to", MINI, "--keep", "displacement,traction", "--out", str(tmp_path / "a")]) == 0
     said = capsys.readouterr().err
-    assert "no networks lead to the GelSight Mini: its gel is solved under the contacts found on a DIGIT's" in said
+    assert "no networks lead to the Coarse Mini: its gel is solved under the contacts found on a DIGIT's" in said
     assert main(["batch", short, "--to", MINI, "--keep", "displacement,traction", "--out", str(tmp_path / "b")]) == 0
-    assert "no networks lead to the GelSight Mini" in capsys.readouterr().err
+    assert "no networks lead to the Coarse Mini" in capsys.readouterr().err
     file = next((tmp_path / "b" / "shards").glob("*.h5"))
     with h5py.File(tmp_path / "a" / "short" / "frames.h5") as whole, h5py.File(file) as shard:
         for name in (f"displacement_{MINI}", f"traction_{MINI}", "traction_force", "force"):
@@ -127,13 +132,13 @@ def test_every_verb_that_translates_takes_any_gel(short, tmp_path, capsys):
     camera = load_calibration(None, MINI).camera
     with Image.open(picture) as shown:
         assert shown.size == (camera.width, camera.height)
-    assert "no networks lead to the GelSight Mini" in capsys.readouterr().err
+    assert "no networks lead to the Coarse Mini" in capsys.readouterr().err
 
 
 def test_weights_that_lead_elsewhere_are_refused_unless_the_gel_is_solved(short, tmp_path, capsys):
     words = ["convert", short, "--to", MINI, "--weights", str(WEIGHTS_FOLDER), "--keep", "", "--frames", "30:31"]
     assert main([*words, "--out", str(tmp_path / "a")]) == 2
-    assert "networks that translate to gelsight_mini. Train some (docs/extend.md), or" in capsys.readouterr().err
+    assert "networks that translate to coarse_mini. Train some (docs/extend.md), or" in capsys.readouterr().err
     assert main([*words, "--gel", "solved", "--out", str(tmp_path / "b")]) == 0
 
 

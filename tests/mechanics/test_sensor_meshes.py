@@ -208,32 +208,3 @@ def test_bad_values_and_places_are_refused_and_nothing_is_left(tmp_path):
     with pytest.raises(TactileError, match="cannot be written"):
         write_stl(tmp_path / "file" / "a.stl", GEL.rest, GEL.faces)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
-
-
-def test_vtk_reads_the_volume(sheared, tmp_path):
-    vtk = pytest.importorskip("vtk", reason="vtk is not installed")
-    solid, state = sheared
-    write_vtu(tmp_path / "a.vtu", solid.mesh, solid, state)
-    reader = vtk.vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(tmp_path / "a.vtu"))
-    reader.Update()
-    grid = reader.GetOutput()
-    assert (grid.GetNumberOfPoints(), grid.GetNumberOfCells()) == (len(solid.mesh.nodes), len(solid.mesh.cells))
-    assert grid.GetPointData().GetArray("von_mises").GetNumberOfTuples() == len(solid.mesh.nodes)
-    for k in range(grid.GetNumberOfCells()):
-        cell = grid.GetCell(k)
-        own, weights, at, part = cell.GetParametricCoords(), [0.0] * 27, [0.0] * 3, vtk.reference(0)
-        for i in range(27):
-            cell.EvaluateLocation(part, own[3 * i : 3 * i + 3], at, weights)
-            np.testing.assert_allclose(at, cell.GetPoints().GetPoint(i), atol=1e-12)
-
-
-def test_meshio_reads_the_volume(sheared, tmp_path):
-    meshio = pytest.importorskip("meshio", reason="meshio is not installed")
-    solid, state = sheared
-    write_vtu(tmp_path / "a.vtu", solid.mesh, solid, state)
-    read = meshio.read(tmp_path / "a.vtu")
-    (block,) = read.cells
-    assert block.type == "hexahedron27"
-    np.testing.assert_array_equal(np.sort(block.data), np.sort(solid.mesh.cells))
-    np.testing.assert_array_equal(read.point_data["displacement"], state.displacement.astype(np.float32))

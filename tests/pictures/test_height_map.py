@@ -68,9 +68,8 @@ def test_dent_that_moves_sideways_is_seen_there() -> None:
     x, z = x - shift[0], z - shift[1]
     inside = (np.abs(x + 7.5e-3) < 7.5e-3) & (np.abs(z) < 5.4e-3)  # beyond the window nothing is known
     expected = parabola(x, z) + dent(x, z)[..., 1]
-    np.testing.assert_allclose(
-        moved[inside], expected[inside], atol=0.1e-6
-    )  # the interpolation's largest error, 0.06 um
+    # the interpolation's largest error, 0.06 um
+    np.testing.assert_allclose(moved[inside], expected[inside], atol=0.1e-6)
 
 
 def test_rest_is_the_gel_above_its_lowest_point() -> None:

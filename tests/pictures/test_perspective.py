@@ -68,6 +68,5 @@ def test_gel_that_reaches_the_camera_is_refused() -> None:
 def test_far_camera_sees_the_map_itself() -> None:
     far = dataclasses.replace(CAMERA, apparent_height=100.0)
     gel = ball(1e-3, 1e-3, 1e-3)
-    np.testing.assert_allclose(
-        Perspective(far, DOME)(gel), gel, atol=0.5e-6
-    )  # slopes of 0.8 times 8 mm / 100 m of height
+    # slopes of 0.8 times 8 mm / 100 m of height
+    np.testing.assert_allclose(Perspective(far, DOME)(gel), gel, atol=0.5e-6)

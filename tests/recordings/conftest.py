@@ -7,15 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import SLIDE_HEADER
 
-SLIDE_HEADER = [
-    "timestamp",
-    "tdc",
-    "tac",
-    "pdc",
-    *(f"pac{i}" for i in range(1, 23)),
-    *(f"ele{i}" for i in range(1, 20)),
-]
 VECTORS = [f"{word}_{axis}" for word in ("position", "force") for axis in "xyz"]
 # Counts of a simulated contact at full press: raw ones, which fall where the film thins.
 CONTACT = np.array([
@@ -35,23 +28,15 @@ def make_press(frames: int = 700, seed: int = 0, slope: float = 0.2, rise: float
     up, down = 0.25 * time[-1], 0.75 * time[-1]
     ramp = np.clip((time - up) / rise, 0, 1) * np.clip((down - time) / rise, 0, 1)
     strength = ramp**2 * (3 - 2 * ramp) * (1 + 0.15 * np.sin(2 * np.pi * 3 * time))
-    gains = CONTACT
     rest = np.linspace(3150, 3550, 19)
     drift = slope * np.linspace(0.5, 1, 19)
-    change = strength[:, None] * gains
+    change = strength[:, None] * CONTACT
     electrodes = np.rint(rest + drift * time[:, None] + change + random.normal(0, 1.2, (frames, 19)))
     pdc = np.rint(1500 + 200 * strength + random.normal(0, 0.7, frames))
     return SimpleNamespace(
-        time=time,
-        electrodes=electrodes,
-        change=change,
-        rest=rest,
-        drift=drift,
-        pdc=pdc,
-        contact=strength > 0,
-        tac=np.full(frames, 2000.0),
-        tdc=2100 + np.arange(frames) % 3,
-    )
+        time=time, electrodes=electrodes, change=change, rest=rest, drift=drift, pdc=pdc, contact=strength > 0,
+        tac=np.full(frames, 2000.0), tdc=2100 + np.arange(frames) % 3,
+    )  # fmt: skip
 
 
 def slide_rows(press: SimpleNamespace, start: float = 1.58e9) -> list[str]:
@@ -66,21 +51,8 @@ def slide_rows(press: SimpleNamespace, start: float = 1.58e9) -> list[str]:
 def rows_31(press: SimpleNamespace) -> list[str]:
     lines = [",".join(HEADER_31)]
     for i, stamp in enumerate(press.time):
-        cells = [
-            stamp,
-            1,
-            2,
-            3,
-            0.1,
-            0.2,
-            0.3,
-            2000,
-            2001,
-            press.pdc[i],
-            press.tac[i],
-            press.tdc[i],
-            *press.electrodes[i],
-        ]
+        slow = press.pdc[i], press.tac[i], press.tdc[i]
+        cells = [stamp, 1, 2, 3, 0.1, 0.2, 0.3, 2000, 2001, *slow, *press.electrodes[i]]
         lines.append(",".join(f"{cell:g}" for cell in cells))
     return lines
 
@@ -166,19 +138,9 @@ def simulated_arrays(press: SimpleNamespace) -> dict:
         np.tile([0.0, 1.0, 0.0], (count, 1)),
         center,
     )
-    return {
-        "time": press.time,
-        "electrodes": press.electrodes,
-        "pdc": press.pdc,
-        "tac": press.tac,
-        "tdc": press.tdc,
-        "truth": truth,
-        "scene": "title = 'a press'\n",
-        "seed": 7,
-        "made_by": "test",
-        "note": "a made-up press",
-        "start_time": 0.0,
-    }
+    held = {name: getattr(press, name) for name in ("time", "electrodes", "pdc", "tac", "tdc")}
+    about = {"scene": "title = 'a press'\n", "seed": 7, "made_by": "test", "note": "a made-up press", "start_time": 0.0}
+    return held | about | {"truth": truth}
 
 
 @pytest.fixture

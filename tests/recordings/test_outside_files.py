@@ -138,11 +138,12 @@ def write_arrays(path: Path, press) -> None:
         np.save(path, press.electrodes)
     elif path.name == "own_73.mat":
         with h5py.File(path, "w", userblock_size=512) as file:
-            file["hand/elec"], file["hand/time_s"], file["hand/pdc"] = (
-                press.electrodes.T,
-                press.time[None],
-                press.pdc[None],
-            )
+            for name, values in {
+                "elec": press.electrodes.T,
+                "time_s": press.time[None],
+                "pdc": press.pdc[None],
+            }.items():
+                file[f"hand/{name}"] = values
         with open(path, "r+b") as file:
             file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
     else:
@@ -238,16 +239,9 @@ def test_an_electrode_that_is_not_there_is_a_dead_channel(absent, press, slide_l
 
 @pytest.mark.parametrize(
     ("top", "words"),
-    [
-        (1.0, "shares"),
-        (3.3, "volts of 3.3 V"),
-        (5.0, "volts of 5 V"),
-        (100.0, "percent"),
-        (255.0, "8 bit"),
-        (1023.0, "10 bit"),
-        (65535.0, "16 bit"),
-    ],
-)
+    [(1.0, "shares"), (3.3, "volts of 3.3 V"), (5.0, "volts of 5 V"), (100.0, "percent"), (255.0, "8 bit"),
+     (1023.0, "10 bit"), (65535.0, "16 bit")],
+)  # fmt: skip
 def test_readings_in_other_units_are_counts(top, words, press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=press.electrodes * top / 4095, time=press.time, pdc=press.pdc)
     found = recordings.prepare(recordings.read(tmp_path / "a.npz"))
@@ -337,9 +331,8 @@ def test_a_live_view_knows_a_finger_that_does_not_answer(press):
     zeros = np.zeros((120, 19))
     assert not live.learn(rows(zeros)) and live.silent
     assert live.learn(rows(press.electrodes[:150])) and not live.silent
-    np.testing.assert_allclose(
-        live.known.rest, press.electrodes[:150].mean(axis=0), atol=2
-    )  # nothing was learnt from zeros
+    # nothing was learnt from zeros
+    np.testing.assert_allclose(live.known.rest, press.electrodes[:150].mean(axis=0), atol=2)
     signals = live.signals(np.stack([press.electrodes[350], zeros[0]]), np.full(2, np.nan))
     assert signals.change[0].any() and not signals.change[1].any()
     assert (signals.flags & Flag.DEAD_CHANNEL > 0).tolist() == [False, True]

@@ -50,9 +50,8 @@ def test_only_recordings_with_dropouts_are_repaired(slide):
         median = np.median(np.lib.stride_tricks.sliding_window_view(padded, 11, axis=0), axis=-1)
         far = bool((np.abs(recording.electrodes - median) > 30).any())
         assert bool(signals.report["samples_glitch"]) == far, recording.name
-        assert signals.electrodes.max() < 300, (
-            recording.name
-        )  # contacts of the set stay below 200, drop-outs read thousands
+        # contacts of the set stay below 200, drop-outs read thousands
+        assert signals.electrodes.max() < 300, recording.name
 
 
 def test_the_dropout_of_mat5_50_is_repaired(slide):

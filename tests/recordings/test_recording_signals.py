@@ -43,9 +43,8 @@ def test_true_changes_come_back_with_tare_and_drift(kind, pdc, press):
     assert signals.kind == kind and not signals.flags.any()
     assert error_of(signals, press) < NOISE
     assert not (signals.quiet & press.contact).sum() > 3  # frames of a window may see the first 0.03 s of the rise
-    np.testing.assert_allclose(
-        signals.drift, press.drift, atol=0.1
-    )  # counts/s: 0.3 counts of level over 5 s between the parts
+    # counts/s: 0.3 counts of level over 5 s between the parts
+    np.testing.assert_allclose(signals.drift, press.drift, atol=0.1)
     json.dumps(signals.report)
 
 

@@ -9,7 +9,6 @@ from PIL import Image
 from tactile_core import sensors
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
-from tactile_core.jobs import frames_file
 from tactile_core.jobs.gel import Gel
 from tactile_core.jobs.render import Options, render
 from tactile_core.pictures.background import read_photograph
@@ -62,12 +61,13 @@ def test_a_sensor_is_told_in_words():
         about("gelsight")
 
 
-def test_a_scene_is_simulated_and_drawn_on_it(request, tmp_path):
+def test_a_scene_is_simulated_and_drawn_on_it(request, tmp_path, coarse_mini):
     """`tactile render SCENE --gel gelsight_mini`: the scene's presses of its gel, seen by its camera."""
     scene = request.config.rootpath / "scenes/press"
     text = (scene / "scene.toml").read_text(encoding="utf-8")
     (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    options = Options(preset="fast", calibration=calibration_path(NAME), size=(80, 60), frames=slice(0, 101, 100))
+    unit = calibration_path(coarse_mini)
+    options = Options(preset="fast", calibration=unit, size=(80, 60), frames=slice(0, 101, 100))
     folder = render(
         tmp_path / "scene.toml", tmp_path / "out", options, lambda word: nullcontext(lambda done, total: None)
     )
@@ -76,12 +76,12 @@ def test_a_scene_is_simulated_and_drawn_on_it(request, tmp_path):
     assert np.abs(pressed - rest).max() > 30
 
 
-def test_a_gel_is_drawn_by_its_own_camera_alone():
-    gel = Gel(NAME, Sphere(3e-3))
+def test_a_gel_is_drawn_by_its_own_camera_alone(coarse_mini):
+    gel = Gel(coarse_mini, Sphere(3e-3))
     gel.press(gel.touching(-8e-3, 0.0, 0.3e-3))
-    assert gel.picture().shape == (*load_calibration(None, NAME).camera.shape, 3)
-    with pytest.raises(TactileError, match="calibration: of a DIGIT; expected one of a GelSight Mini"):
-        Gel(NAME, Sphere(3e-3), calibration=load_calibration())
+    assert gel.picture().shape == (*load_calibration(None, coarse_mini).camera.shape, 3)
+    with pytest.raises(TactileError, match="calibration: of a DIGIT; expected one of a Coarse Mini"):
+        Gel(coarse_mini, Sphere(3e-3), calibration=load_calibration())
 
 
 def test_a_calibration_of_another_gel_is_refused(tmp_path):
@@ -121,14 +121,6 @@ def test_places_of_a_latent_lie_on_its_own_gel():
     frame = frame_of(NAME, 4)
     point = np.array([[-8e-3, 0.0], [-4e-3, 8e-3]])
     np.testing.assert_allclose(gel_place.on_gel(frame, gel_place.place_on(frame, point)), point, atol=1e-6)
-
-
-def test_frames_are_named_after_the_gel():
-    pair = "biotac", NAME
-    assert frames_file.named("displacement_digit", pair) == "displacement_gelsight_mini"
-    assert frames_file.named("displacement_biotac", pair) == "displacement_biotac"
-    meaning = frames_file.described(frames_file.KEPT["displacement"]["displacement_digit"][1], pair)
-    assert meaning == "(T, M, 3) of the nodes of sensors.sensor_surface('gelsight_mini')"
 
 
 def test_tiers_of_a_gel_that_were_not_measured_are_not_chosen():

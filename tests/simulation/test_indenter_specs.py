@@ -1,5 +1,7 @@
 """Every kind of indenter that a scene can name, in metres; mesh files stay in the scene's folder."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -19,56 +21,7 @@ from tactile_core.geometry.indenters import (
 from tactile_core.simulation.scene import load_scene
 
 HEAD = 'format = "tactile-scene-1"\nname = "n"\ndescription = "d"\n'
-TRAINING_SET = """
-[[indenters]]
-kind = "sphere"
-name = "sphere_3-5mm"
-radius_mm = 1.75
-
-[[indenters]]
-kind = "sphere"
-name = "sphere_7mm"
-radius_mm = 3.5
-
-[[indenters]]
-kind = "sphere"
-name = "sphere_14mm"
-radius_mm = 7
-
-[[indenters]]
-kind = "cylinder"
-name = "cylinder_short_3-5mm"
-radius_mm = 1.75
-
-[[indenters]]
-kind = "cylinder"
-name = "cylinder_short_7mm"
-radius_mm = 3.5
-
-[[indenters]]
-kind = "lying_cylinder"
-name = "cylinder_long_7mm"
-radius_mm = 3.5
-
-[[indenters]]
-kind = "box"
-name = "cube_14mm"
-sizes_mm = [14, 14, 14]
-
-[[indenters]]
-kind = "ring"
-name = "ring_7mm"
-radius_mm = 2.75
-tube_mm = 0.75
-
-[[indenters]]
-kind = "bumpy_cube"
-name = "cube_bumps_14mm"
-size_mm = 14
-bump_radius_mm = 1.5
-bump_height_mm = 1.0
-spacing_mm = 3.5
-"""
+TRAINING = Path(__file__).parents[2] / "scenes" / "training" / "scene.toml"
 
 
 def write(folder, indenters):
@@ -81,18 +34,12 @@ def build(folder, indenters):
     return [spec.build() for spec in load_scene(write(folder, indenters))[0].indenters]
 
 
-def test_the_nine_of_the_training_set(tmp_path):
-    assert build(tmp_path, TRAINING_SET) == [
-        Sphere(1.75e-3),
-        Sphere(3.5e-3),
-        Sphere(7e-3),
-        Cylinder(1.75e-3, 0.5e-3),
-        Cylinder(3.5e-3, 0.5e-3),
-        LyingCylinder(3.5e-3, 0.5e-3),
-        Box((14e-3, 14e-3, 14e-3), 0.5e-3),
-        Ring(2.75e-3, 0.75e-3),
-        BumpyCube(14e-3, 0.5e-3, 1.5e-3, 1e-3, 3.5e-3),
-    ]
+def test_the_nine_of_the_training_set():
+    assert [spec.build() for spec in load_scene(TRAINING.parent)[0].indenters] == [
+        Sphere(1.75e-3), Sphere(3.5e-3), Sphere(7e-3), Cylinder(1.75e-3, 0.4e-3), Cylinder(3.5e-3, 0.5e-3),
+        LyingCylinder(3.5e-3, 0.5e-3, 20e-3), Box((14e-3, 14e-3, 14e-3), 0.5e-3), Ring(2.5e-3, 1e-3),
+        BumpyCube(14e-3, 0.5e-3, 1.5e-3, 1e-3, 4e-3),
+    ]  # fmt: skip
 
 
 def test_edge_and_every_optional_size(tmp_path):
@@ -212,17 +159,19 @@ def test_missing_mesh_is_refused(ball):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("sizes_mm = [14, 14, 14]", "sizes_mm = [14, 14]", "sizes_mm"),
-        ("sizes_mm = [14, 14, 14]", "sizes_mm = [14, 14, -14]", "sizes_mm"),
-        ("tube_mm = 0.75", "", "tube_mm"),
-        ("spacing_mm = 3.5", "spacing = 3.5", "spacing"),
-        ("radius_mm = 7\n", "radius_mm = nan\n", "radius_mm|nan or infinite"),
+        ("sizes_mm = [14.0, 14.0, 14.0]", "sizes_mm = [14.0, 14.0]", "sizes_mm"),
+        ("sizes_mm = [14.0, 14.0, 14.0]", "sizes_mm = [14.0, 14.0, -14.0]", "sizes_mm"),
+        ("tube_mm = 1.0", "", "tube_mm"),
+        ("spacing_mm = 4.0", "spacing = 4.0", "spacing"),
+        ("radius_mm = 7.0\n", "radius_mm = nan\n", "radius_mm|nan or infinite"),
     ],
 )
 def test_bad_sizes_are_refused(tmp_path, old, new, said):
-    assert old in TRAINING_SET
+    text = TRAINING.read_text(encoding="utf-8")
+    assert old in text
+    (tmp_path / "scene.toml").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(TactileError, match=said):
-        load_scene(write(tmp_path, TRAINING_SET.replace(old, new)))
+        load_scene(tmp_path)
 
 
 @pytest.mark.parametrize(

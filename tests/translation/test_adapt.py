@@ -7,7 +7,7 @@ import json
 import msgspec
 import numpy as np
 import pytest
-from conftest import SLIDE_HEADER
+from conftest import write_counts
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
@@ -170,12 +170,8 @@ def write_recording(path, change: np.ndarray, kind: str) -> None:
     change = np.concatenate([quiet, np.repeat(change, 4, axis=0), quiet])
     random = np.random.default_rng(0)
     change = change + random.normal(0, 1, change.shape)
-    rows = np.zeros((len(change), len(SLIDE_HEADER)))
-    rows[:, 0] = 1.6e9 + np.arange(len(change)) / 100
-    rows[:, 26:] = np.floor(np.abs(change)) if kind == "rectified" else np.rint(REST_COUNTS + change)
-    rows[50:-50, 3] = 50
-    header = ",".join(SLIDE_HEADER)
-    np.savetxt(path, rows, fmt=["%.6f"] + ["%d"] * 44, delimiter=",", header=header, comments="")
+    electrodes = np.floor(np.abs(change)) if kind == "rectified" else np.rint(REST_COUNTS + change)
+    write_counts(path, electrodes, pdc=np.pad(np.full(len(change) - 100, 50), 50))
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from conftest import SHIPPED
 
 from tactile_core import accuracy, recordings
 from tactile_core.cli.main import main
@@ -12,17 +13,14 @@ from tactile_core.translation.answer import Answer, parse_shift
 from tactile_core.translation.contact_frame import PLACE_UNIT
 from tactile_core.translation.translate import load_translator
 
-RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 CELL = 0.6e-3  # m, the largest of the gel's lattice
 
 
 @pytest.fixture(scope="module")
-def touched(request):
+def touched(shipped):
     """Signals of 20 frames in contact of the shipped recording, and which they are."""
-    recording = recordings.read(request.config.rootpath / RECORDING)
-    frames = np.flatnonzero(np.linalg.norm(recording.truth.force, axis=1) > 0.4)[::9][:20]
-    signals = recordings.prepare(recording)
-    return signals.at(frames), frames
+    frames = np.flatnonzero(np.linalg.norm(shipped.truth.force, axis=1) > 0.4)[::9][:20]
+    return recordings.prepare(shipped).at(frames), frames
 
 
 @pytest.fixture(scope="module")
@@ -77,8 +75,8 @@ def test_drawn_contacts_spread_as_the_posterior_says(touched):
     assert np.array_equal(said.drawn(frames, 7), said.drawn(frames, 7))
 
 
-def test_drawn_contacts_lie_round_the_answer(request, tmp_path):
-    path, out = str(request.config.rootpath / RECORDING), ["--out", str(tmp_path), "--keep", ""]
+def test_drawn_contacts_lie_round_the_answer(tmp_path):
+    path, out = str(SHIPPED), ["--out", str(tmp_path), "--keep", ""]
     assert main(["convert", path, *out, "--samples", "30", "--frames", "60:160:5"]) == 0
     with h5py.File(tmp_path / "press_roll_slide" / "frames.h5") as file:
         center, drawn, force = file["contact_center"][:], file["sample_center"][:], file["sample_force"][:]

@@ -14,11 +14,6 @@ from tactile_core.sensors import REST_COUNTS, divider
 from tactile_core.translation import translate
 
 
-@pytest.fixture(scope="module")
-def shipped(request):
-    return recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
-
-
 def explained(recording, **options):
     touch = translate.translate(recording, prepare=PrepareOptions(**options))
     assert np.array_equal(np.isnan(touch.explained), np.isnan(touch.contact_center[:, 0]))

@@ -8,16 +8,16 @@ import h5py
 import msgspec
 import numpy as np
 import pytest
+from conftest import SHIPPED
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import electrode_gains, prepare, read
+from tactile_core.recordings import electrode_gains, prepare
 from tactile_core.recordings.electrode_gains import ElectrodeGains
 from tactile_core.translation import force_scale
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.translate import load_translator
 
-SHIPPED = "scenes/press_roll_slide/press_roll_slide.h5"
 UNIT = ElectrodeGains("made up", [1.0] * 19, [0.0] * 19, stiffness=2.0, stiffness_error=0.1)
 TIME = np.arange(1500) / 100
 FORCE = 2 + np.sin(TIME) + 0.5 * np.sin(7 * TIME)
@@ -55,9 +55,9 @@ def test_what_no_unit_has_is_refused(translated, scale, said):
         fitted(translated, scale)
 
 
-def test_force_and_pressure_are_scaled_and_signals_stay(request):
+def test_force_and_pressure_are_scaled_and_signals_stay(shipped):
     translator = load_translator(answer=Answer(samples=3))
-    signals = prepare(read(request.config.rootpath / SHIPPED)).at(slice(60, 120))
+    signals = prepare(shipped).at(slice(60, 120))
     own = electrode_gains.apply(signals, UNIT)
     np.testing.assert_allclose(own.change, signals.change, atol=1e-9)
     plain, stiff = translator(signals), translator(own)
@@ -69,9 +69,9 @@ def test_force_and_pressure_are_scaled_and_signals_stay(request):
     np.testing.assert_allclose(stiff, 2 * plain)
 
 
-def test_the_verb_writes_it_and_convert_and_info_say_it(request, tmp_path, capsys):
+def test_the_verb_writes_it_and_convert_and_info_say_it(tmp_path, capsys):
     """The shipped recording beside its true force, half as much again: a file of a clock of its own, late by 30 ms."""
-    recording = str(request.config.rootpath / SHIPPED)
+    recording = str(SHIPPED)
     with h5py.File(recording) as file:
         time, force = file["time"][:], np.linalg.norm(file["truth/force"], axis=1)
     np.savetxt(tmp_path / "force.txt", np.column_stack([time - time[0], 1.5 * np.interp(time - 0.03, time, force)]))

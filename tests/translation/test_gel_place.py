@@ -28,17 +28,16 @@ def test_a_dent_is_a_contact_from_an_absolute_depth_on(gel, depth, touched):
     assert patch.any() == touched
 
 
-def test_what_the_networks_make_of_noise_alone_shows_no_contact(request, gel):
+def test_what_the_networks_make_of_noise_alone_shows_no_contact(shipped, gel):
     """Three seconds of an untouched sensor: the shipped recording with nothing but noise in it, followed as always."""
-    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
-    signals = recordings.prepare(recording)
+    signals = recordings.prepare(shipped)
     noise = np.random.default_rng(5).normal(scale=1.5, size=signals.change.shape)  # counts: docs/sources.md, read-out
     silent = dataclasses.replace(signals, change=noise.astype(signals.change.dtype))
     translator = translate.load_translator()
 
     def posteriors(start, stop):
-        return recording.time[start:stop], translator.encode(silent.at(np.arange(start, stop)))
+        return shipped.time[start:stop], translator.encode(silent.at(np.arange(start, stop)))
 
-    every = np.arange(len(recording))
-    moved = translator(silent, Tracker(posteriors, len(recording))(every)[1]).displacement_digit
+    every = np.arange(len(shipped))
+    moved = translator(silent, Tracker(posteriors, len(shipped))(every)[1]).displacement_digit
     assert not gel_place.contact_patch(moved, gel).any()

@@ -34,10 +34,8 @@ def weights(tmp_path, monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def signals(request):
-    path = request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5"
-    found = recordings.prepare(recordings.read(path))
-    return found.at(slice(100, 300, 20))
+def signals(shipped):
+    return recordings.prepare(shipped).at(slice(100, 300, 20))
 
 
 def test_the_same_shape_and_signals_give_the_same_by_another_name(weights, signals):

@@ -9,7 +9,6 @@ import h5py
 import numpy as np
 import pytest
 
-from tactile_core import recordings
 from tactile_core.jobs import convert
 from tactile_core.pictures import renderer
 from tactile_core.recordings import PrepareOptions
@@ -20,13 +19,7 @@ from tactile_core.translation.answer import Answer
 from tactile_core.translation.contact_track import BLOCK, MARGIN
 from tactile_core.translation.translate import PreparedRows
 
-RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 ARRAYS = "change", "rest", "drift", "electrodes", "quiet", "flags", "pdc"
-
-
-@pytest.fixture(scope="module")
-def shipped(request):
-    return recordings.read(request.config.rootpath / RECORDING)
 
 
 def repeated(shipped, times, single=False):

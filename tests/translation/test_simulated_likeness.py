@@ -72,18 +72,15 @@ def test_far_contacts_are_found_and_single_ones_seldom_mistaken(pairs):
     assert total["baseline"] < 0.06 < 0.2 < total["value"] < far["value"]
 
 
-def test_a_translation_flags_them_and_hardly_any_of_one_contact(request):
-    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
-    signals = recordings.prepare(recording)
-    flags = load_translator()(signals).flags
+def test_a_translation_flags_them_and_hardly_any_of_one_contact(shipped):
+    flags = load_translator()(recordings.prepare(shipped)).flags
     assert (flags & Flag.TWO_CONTACTS > 0).mean() < 0.02  # patterns go with the weights: none with those of now
 
 
-def test_what_changes_under_a_rest_taken_in_contact_is_unexplained(request):
-    recording = recordings.read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
+def test_what_changes_under_a_rest_taken_in_contact_is_unexplained(shipped):
     translator = load_translator()
-    assert not (translator(recordings.prepare(recording)).flags & Flag.UNEXPLAINED).any()
-    loaded = recordings.prepare(recording, recordings.PrepareOptions(tare=slice(78, 83)))  # the firmest of a press
+    assert not (translator(recordings.prepare(shipped)).flags & Flag.UNEXPLAINED).any()
+    loaded = recordings.prepare(shipped, recordings.PrepareOptions(tare=slice(78, 83)))  # the firmest of a press
     away = np.r_[0:50, 340:360]  # frames without contact, whose changes are that press's, inverted
     wrong = translator(loaded)
     assert (wrong.flags[away] & Flag.UNEXPLAINED > 0).mean() > 0.9

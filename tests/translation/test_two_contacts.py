@@ -6,11 +6,12 @@ import shutil
 import h5py
 import numpy as np
 import pytest
+from conftest import SHIPPED
 
 from tactile_core import accuracy
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import prepare, read
+from tactile_core.recordings import prepare
 from tactile_core.recordings.flags import Flag
 from tactile_core.translation import networks
 from tactile_core.translation.answer import Answer
@@ -20,7 +21,6 @@ from tactile_core.translation.translate import load_translator
 from tactile_core.translation.translator import Translator
 from tactile_core.translation.weights import card_bytes, read_card
 
-RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 DOUBLE = "scenes/training/double_contacts.npz"
 
 
@@ -31,9 +31,9 @@ def double(request):
 
 
 @pytest.fixture(scope="module")
-def answers(double, request):
+def answers(double, shipped):
     """Both answers on the double contacts, without noise: two looked for, and one."""
-    rest = prepare(read(request.config.rootpath / RECORDING)).at(np.zeros(len(double["signal"]), int))
+    rest = prepare(shipped).at(np.zeros(len(double["signal"]), int))
     asked = dataclasses.replace(rest, change=double["signal"])
     nets = load()
     return [Translator(nets, Answer(contacts=count))(asked) for count in (2, 1)]
@@ -62,11 +62,10 @@ def test_the_gel_is_nearer_to_the_truth_and_the_force_too(double, answers):
     assert left[0] < 0.85 * left[1] and off[0] < off[1]
 
 
-def test_convert_writes_a_second_contact_where_asked(tmp_path, request):
-    path = str(request.config.rootpath / RECORDING)
+def test_convert_writes_a_second_contact_where_asked(tmp_path):
     for count in ("1", "2"):
         out = ["--out", str(tmp_path / count), "--frames", "60:100:5"]
-        assert main(["convert", path, *out, "--contacts", count]) == 0
+        assert main(["convert", str(SHIPPED), *out, "--contacts", count]) == 0
     with (
         h5py.File(tmp_path / "1" / "press_roll_slide" / "frames.h5") as one,
         h5py.File(tmp_path / "2" / "press_roll_slide" / "frames.h5") as two,
@@ -77,13 +76,13 @@ def test_convert_writes_a_second_contact_where_asked(tmp_path, request):
         assert np.allclose(one["force"][:][single], two["force"][:][single], rtol=1e-4, atol=1e-5)
 
 
-def test_what_cannot_tell_two_contacts_says_so(tmp_path, capsys, request):
+def test_what_cannot_tell_two_contacts_says_so(tmp_path, capsys):
     nets = load()
     old = Networks({net: own for net, own in nets.tensors.items() if net != PARTS}, nets.card)
     with pytest.raises(TactileError, match="single contacts alone"):
         Translator(old, Answer(contacts=2))
     asked = ["--contacts", "2", "--gel", "solved", "--out", str(tmp_path / "out")]
-    assert main(["convert", str(request.config.rootpath / RECORDING), *asked]) == 2
+    assert main(["convert", str(SHIPPED), *asked]) == 2
     assert "--contacts 2" in capsys.readouterr().err
     with pytest.raises(ValueError, match="contacts 3"):
         Answer(contacts=3)

@@ -32,9 +32,8 @@ def test_bins_hold_what_lies_in_them():
 @pytest.mark.parametrize("sensor", SENSORS)
 def test_the_fast_tier_is_near_the_full_one_on_test_contacts(sensor):
     pairs, (scene, _) = read_pairs(TRAINING / "test_contacts.h5"), load_scene(TRAINING)
-    pairs = pairs.select_rows(
-        np.flatnonzero(np.isin(pairs.press, (1, 3, 4)))
-    )  # a ball, a cylinder, and one that slides
+    # a ball, a cylinder, and one that slides
+    pairs = pairs.select_rows(np.flatnonzero(np.isin(pairs.press, (1, 3, 4))))
     found = list(fast_misses(sensor, pairs, scene))
     assert len(found) == len(pairs.press)
     # A wrong pose, depth or order of the contacts would leave errors like those of no contact at all.

@@ -11,7 +11,7 @@ import evaluate_translation
 import numpy as np
 import pytest
 from benchmarks.translation import slides
-from conftest import SLIDE_HEADER
+from conftest import write_counts
 
 from tactile_core.errors import TactileError
 from tactile_core.recordings import Recording, Signals, read
@@ -32,11 +32,8 @@ def write_slide(folder: Path, name: str, seed: int = 0, electrodes: np.ndarray |
     pressure *= np.clip((4.0 - time) / 0.3, 0, 1)
     if electrodes is None:
         electrodes = pressure[:, None] * np.linspace(1.5, 0.1, 19) + random.normal(0, 1, (FRAMES, 19))
-    rows = np.zeros((FRAMES, len(SLIDE_HEADER)))
-    rows[:, 0], rows[:, 3], rows[:, 26:] = START + time, np.rint(pressure), np.rint(np.abs(electrodes))
     path = folder / f"{name}_bio.csv"
-    formats = ["%.6f"] + ["%d"] * 44
-    np.savetxt(path, rows, fmt=formats, delimiter=",", header=",".join(SLIDE_HEADER), comments="")
+    write_counts(path, np.rint(np.abs(electrodes)), pdc=np.rint(pressure))
     robot = np.arange(-0.05, time[-1] + 0.1, 1 / 150)
     wrench = np.column_stack([START + robot, np.zeros((len(robot), 6))])
     pose = np.column_stack([START + robot, 0.7 - 0.025 * robot, np.zeros((len(robot), 2))])

@@ -155,9 +155,8 @@ def test_the_patch_of_a_dent_is_where_it_bends_inward():
 def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(request, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(request.config.rootpath)
     shutil.copy("docs/translation.md", tmp_path / "card.md")
-    monkeypatch.setattr(
-        evaluate_translation, "QUICK_PRESSES", 29
-    )  # prime as well; targets are met on the whole set alone
+    # prime as well; targets are met on the whole set alone
+    monkeypatch.setattr(evaluate_translation, "QUICK_PRESSES", 29)
     status = evaluate_translation.main(
         ["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")]
     )

@@ -281,12 +281,12 @@ def test_a_name_that_no_table_can_hold_is_left_out(folder, recipe, tmp_path, cap
     assert len(metadata(own[2] / "imagefolder" / "train")) == 3
 
 
-def test_another_gel_is_a_target(folder, recipe, tmp_path):
+def test_another_gel_is_a_target(folder, recipe, tmp_path, coarse_mini):
     pytest.importorskip("scipy", reason="scipy is not installed")
     own = small(folder, recipe, tmp_path, ("every = 20", "every = 55"))
-    assert run(*own, "--target", "gelsight_mini", "--to", "imagefolder,npz") == 0
+    assert run(*own, "--target", coarse_mini, "--to", "imagefolder,npz") == 0
     with np.load(own[2] / "npz" / "00000_ball_0.npz") as arrays:
-        assert "expected_error_gelsight_mini" in arrays and "latent_gelsight_mini" not in arrays
+        assert f"expected_error_{coarse_mini}" in arrays and f"latent_{coarse_mini}" not in arrays
 
 
 def test_odd_units_stay_inside_the_result(folder, recipe, tmp_path):

@@ -49,9 +49,8 @@ def test_a_grid_of_recordings(scene, tmp_path):
     said = json.loads((tmp_path / "one" / "grid.json").read_text())["recordings"]
     assert [one["values"] for one in said] == [{"force_n": 0.2}, {"force_n": 0.4}]
     with h5py.File(tmp_path / "one" / said[1]["file"]) as file:
-        assert np.linalg.norm(file["truth/force"][-1]) == pytest.approx(
-            0.4, rel=0.05
-        )  # of the axial force, tilted skin
+        # of the axial force, tilted skin
+        assert np.linalg.norm(file["truth/force"][-1]) == pytest.approx(0.4, rel=0.05)
         assert file.attrs["seed"] == 6 and "0.4" in file.attrs["scene"]
     assert tree(by_parts(tmp_path, *words)) == tree(tmp_path / "one")
 

@@ -183,9 +183,8 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
     np.testing.assert_array_equal(held.known.rest, np.full(19, 3200.0))
     assert free.learn(rows_of(3210 + noise)) and free.found.startswith("frames")
     change = free.signals(3110 + noise, np.full(40, np.nan)).change
-    np.testing.assert_allclose(
-        change, np.tile(-100 / np.array(gain), (40, 1)), atol=3.0
-    )  # noise of half a count, twice
+    # noise of half a count, twice
+    np.testing.assert_allclose(change, np.tile(-100 / np.array(gain), (40, 1)), atol=3.0)
 
 
 def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch, capsys):

@@ -120,9 +120,8 @@ def test_all_friction_is_spent_in_a_long_slide(layer):
     *_, contact = slide(problem, contact, 20e-6, 10)
     pressing, tangential = forces(layer, punch, contact)
     assert contact.slipping.all()
-    np.testing.assert_allclose(
-        np.linalg.norm(tangential, axis=1).sum(), FRICTION * pressing.sum(), rtol=1e-3
-    )  # normals, as above
+    # normals, as above
+    np.testing.assert_allclose(np.linalg.norm(tangential, axis=1).sum(), FRICTION * pressing.sum(), rtol=1e-3)
     assert (tangential[:, 0] > 0).mean() > 0.95  # the indenter moves along +x and drags the surface with it
     # under the flat all forces are along the way; nodes at the rounded rim lean
     assert contact.force[0] == pytest.approx(FRICTION * contact.axial_force, rel=0.1)

@@ -25,11 +25,6 @@ def test_a_path_of_growing_force_ends_at_the_depth_limit(sensor, friction):
     assert depths[-1] <= limit and press.at_depth(limit).axial_force < force
 
 
-def test_a_force_beyond_the_range_gives_no_contact():
-    press = CorrectedPress(compliance_of("biotac"), BALL, pose_at("biotac", BALL, PLACE), 2.4e-3)
-    assert press.at_force(50.0) is None
-
-
 @pytest.mark.parametrize("sensor", ["biotac", "digit"])
 def test_a_slide_at_the_same_force_drags_the_skin_along(sensor):
     pose = pose_at(sensor, BALL, PLACE)

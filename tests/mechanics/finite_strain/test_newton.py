@@ -5,8 +5,9 @@ import pytest
 from slab import slab_mesh
 
 from tactile_core.errors import TactileError
-from tactile_core.geometry.indenters import Box, Cylinder, Pose, Sphere, pose_on
+from tactile_core.geometry.indenters import Box, Pose, Sphere, pose_on
 from tactile_core.mechanics.finite_strain import newton
+from tactile_core.mechanics.finite_strain.body import FRICTION_STEP, Body
 from tactile_core.mechanics.finite_strain.newton import MOST_FAILURES, FiniteStrainContact
 from tactile_core.mechanics.finite_strain.solved_contact import NoEquilibriumError
 from tactile_core.mechanics.placement import Placement
@@ -47,9 +48,8 @@ def test_sliding_friction_is_mu_times_the_normal_force_and_against_the_slip(soli
     slips = touch.outer.slipping[touch.outer.active]
     assert slips.mean() > 0.7  # nodes that the ball has just reached still stick
     rubbing = np.linalg.norm(touch.outer.rubbing, axis=1)
-    np.testing.assert_allclose(
-        rubbing[slips], 0.4 * touch.outer.pressing[slips], rtol=1e-4
-    )  # the iteration's tolerance
+    # the iteration's tolerance
+    np.testing.assert_allclose(rubbing[slips], 0.4 * touch.outer.pressing[slips], rtol=1e-4)
     assert (rubbing <= 0.4 * touch.outer.pressing + 1e-5 * touch.outer.pressing.max()).all()
     assert (touch.outer.rubbing[slips, 0] > 0.8 * rubbing[slips]).all()
     assert touch.force[0] > stuck + 0.5 * 0.4 * touch.force[1]
@@ -149,43 +149,55 @@ def test_friction_that_fades_leads_to_the_contact_without_friction(solid):
     np.testing.assert_allclose(faded.state.displacement, direct.state.displacement, atol=1e-9)
 
 
-def test_a_contact_that_no_mesh_holds_is_found_by_friction(monkeypatch):
-    place, ball = Placement(x=-6e-3, z=0.0), Sphere(3e-3)
-    expected = solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0)
+SHALLOW = {"depth": 0.1e-3, "tier": "full", "friction": 0}
+PRESS = "digit", Sphere(3e-3), Placement(x=-6e-3, z=0.0)
+
+
+def slid_off(*_) -> None:
+    raise NoEquilibriumError("finite-strain solver", "no equilibrium", "a smaller depth")
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """The force of a contact that is found at once."""
+    return solve(*PRESS, **SHALLOW).force
+
+
+def test_a_contact_that_no_mesh_holds_is_found_by_friction(expected, monkeypatch):
     tried, move = [], FiniteStrainContact.move
 
-    def slides_off(self, pose, start, step):
+    def by_friction_alone(self, pose, start, step):
         tried.append((self.friction, len(self.solid.mesh.nodes)))
-        if self.friction:
-            return move(self, pose, start, step)
-        raise NoEquilibriumError("finite-strain solver", "no equilibrium", "a smaller depth")
+        return move(self, pose, start, step) if self.friction else slid_off()
 
-    monkeypatch.setattr(FiniteStrainContact, "move", slides_off)
+    monkeypatch.setattr(FiniteStrainContact, "move", by_friction_alone)
     monkeypatch.setattr(newton, "_FADING", (0.3,))  # shorter, for time alone
-    found = solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0)
+    found = solve(*PRESS, **SHALLOW).force
     (without, nodes), (finer, more), (rubs, again) = tried
     assert without == finer == 0 < rubs and nodes == again < more  # the tier's mesh, a finer one, and that by friction
-    np.testing.assert_allclose(found.force, expected.force, atol=1e-5 * expected.force[1])  # balance of 1e-7, summed
+    np.testing.assert_allclose(found, expected, atol=1e-5 * expected[1])  # balance of 1e-7, summed
     with pytest.raises(NoEquilibriumError):  # with friction there is no other way
         monkeypatch.setattr(FiniteStrainContact, "_solve", lambda *_: (_ for _ in ()).throw(FloatingPointError))
         monkeypatch.setattr(FiniteStrainContact, "move", move)
-        solve("digit", ball, place, depth=0.1e-3, tier="full", friction=0.5)
+        solve(*PRESS, **SHALLOW | {"friction": 0.5})
 
 
-def test_a_contact_that_nothing_else_finds_is_found_by_short_steps(monkeypatch):
-    """2.587, 0.500 N : along y and z with half the spacing, in steps of 0.2 mm. Its rim hides under the resting nodes.
-
-    The ways before, which fail after three minutes, are refused at once.
-    """
-    move = FiniteStrainContact.move
+def test_a_contact_that_nothing_else_finds_is_found_by_short_steps(expected, monkeypatch):
+    """In steps of 0.2 mm, every edge held out: test_body has one that hides from the nodes at rest."""
+    move, contact, steps, edges = FiniteStrainContact.move, Body.contact, [], []
 
     def at_last(self, pose, start, step):
         if self.friction or self.most_failures < MOST_FAILURES:
-            raise NoEquilibriumError("finite-strain solver", "no equilibrium", "a smaller depth")
+            slid_off()
+        steps.append(step)
         return move(self, pose, start, step)
 
+    def made(self, *given, every_edge):
+        edges.append(every_edge)
+        return contact(self, *given, every_edge=every_edge)
+
     monkeypatch.setattr(FiniteStrainContact, "move", at_last)
-    place = Placement(-0.962e-3, -4.745e-3, tilt=0.1768, tilt_heading=3.6407)
-    found = solve("digit", Cylinder(1.75e-3, 0.4e-3), place, depth=1.1554e-3, tier="full", friction=0)
-    assert found.penetration < 1e-9
-    np.testing.assert_allclose(found.force[1:], [2.587, 0.5], rtol=0.01)
+    monkeypatch.setattr(Body, "contact", made)
+    found = solve(*PRESS, **SHALLOW).force
+    assert steps == [FRICTION_STEP] and edges == [False, False, False, True]
+    np.testing.assert_allclose(found, expected, atol=1e-5 * expected[1])  # as above

@@ -10,7 +10,7 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.recordings import PrepareOptions, electrode_gains, prepare, read
+from tactile_core.recordings import PrepareOptions, electrode_gains, prepare
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.polarity import contact_signals
 from tactile_core.recordings.preparer import Preparer
@@ -91,8 +91,7 @@ def test_what_a_drift_leaves_is_no_contact():
 
 
 @pytest.mark.parametrize("factor", [1 / 27.4, 36.5, -1.0])
-def test_a_pressure_of_another_unit_shows_no_other_film(factor, request):
-    shipped = read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
+def test_a_pressure_of_another_unit_shows_no_other_film(factor, shipped):
     other = dataclasses.replace(shipped, pdc=np.rint(factor * (shipped.pdc - shipped.pdc[0])))
     assert prepare(other).report["film"]["thickness"] == 1.0
 

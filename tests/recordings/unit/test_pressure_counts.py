@@ -5,7 +5,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from tactile_core.recordings import read
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.unit.pressure_counts import PRESSURES, counts_a_unit, in_counts
 
@@ -48,10 +47,9 @@ def test_what_is_neither_is_taken_as_not_recorded():
     assert warnings == ["PDC goes beyond 12 bit, and is no pressure in Pa, hPa, kPa or psi: taken as not recorded"]
 
 
-def test_a_recording_with_kilopascals_is_prepared_as_with_counts(request):
-    simulated = read(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5")
-    kilo = dataclasses.replace(simulated, pdc=np.round(simulated.pdc * COUNT / 1e3, 4))
-    of_counts, of_kilo = (Preparer()(each) for each in (simulated, kilo))
+def test_a_recording_with_kilopascals_is_prepared_as_with_counts(shipped):
+    kilo = dataclasses.replace(shipped, pdc=np.round(shipped.pdc * COUNT / 1e3, 4))
+    of_counts, of_kilo = (Preparer()(each) for each in (shipped, kilo))
     np.testing.assert_allclose(of_kilo.pdc, of_counts.pdc, atol=0.01)
     np.testing.assert_array_equal(of_kilo.change, of_counts.change)
     assert "PDC is taken as kPa: 27.4 counts a unit" in of_kilo.warnings
