@@ -206,13 +206,13 @@ def _arrow(style: str) -> bpy.types.NodeTree:
     turn.axis = "Z"
     nodes.tree.links.new(back.outputs[0], turn.inputs["Vector"])
     placed = nodes.add("GeometryNodeTransform", given.outputs["Geometry"])
-    for name, socket in (("Translation", _deepest(nodes, seen.outputs["Geometry"])), ("Rotation", turn.outputs[0]),
+    for name, socket in (("Translation", _mean_dent(nodes, seen.outputs["Geometry"])), ("Rotation", turn.outputs[0]),
                          ("Scale", length)):  # fmt: skip
         nodes.tree.links.new(socket, placed.inputs[name])
     return _painted(nodes, nodes.store(placed.outputs[0], COLOUR, (*ARROW, 1.0), "FLOAT_COLOR"))
 
 
-def _deepest(nodes: NodeGroup, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
+def _mean_dent(nodes: NodeGroup, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Mean of the nodes' places, weighted by the square of how far each has moved."""
     here = nodes.add("GeometryNodeInputPosition").outputs[0]
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")

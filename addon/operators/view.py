@@ -100,7 +100,7 @@ def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window
 def open_tab(context: bpy.types.Context) -> None:
     """Open the sidebar with the tab "Tactile" in each 3D view.
 
-    Older Blenders let no script choose a tab. There, one whose sidebar was never opened opens it on the first tab.
+    Older Blenders let no script choose a tab. There, this tab is made the first, on which a new sidebar opens.
     """
     for area in context.window.screen.areas if context.window else ():
         if area.type == "VIEW_3D":

@@ -25,7 +25,7 @@ _ROUNDED_OTHERWISE = {"cos", "sin", "exp", "arcsinh"}  # in their last bits, by 
 
 @functools.cache
 def available() -> bool:
-    """Return true if loops are to be compiled: numba is installed, and nobody has switched it off."""
+    """Return true if loops are to be compiled: numba is installed, and TACTILE_COMPILED is not 0."""
     return os.environ.get(SWITCH, "1") != "0" and importlib.util.find_spec("numba") is not None
 
 

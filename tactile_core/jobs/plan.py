@@ -60,7 +60,7 @@ class Plan(NamedTuple):
 
 @functools.cache
 def costs() -> dict[str, Any]:
-    """Read the results of ``scripts/benchmarks/measure_costs.py``."""
+    """Read the shipped costs.json, which ``scripts/benchmarks/measure_costs.py`` writes."""
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 

@@ -168,7 +168,7 @@ class Pictures:
             self._write_camera(folder / CAMERA)
 
     def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
-        """Write one frame. values : displacement (M, 3) m or heights (H, W) m."""
+        """Write one frame. values : displacement (M, 3) m of the gel's nodes, or its heights (H, W) m."""
         with self.clock.stage("height_map"):
             height = values if self.heights else gel_mapper(self.renderer.camera)(values)
         with self.clock.stage("radiance"):

@@ -241,7 +241,7 @@ _HARDLY_APART = 0.1e-3  # m: at first touch a node is mostly this near
 
 
 def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """Return the thickness, m, at the node of the resting surface nearest to an indenter at first touch."""
+    """Return ``sensors.thickness_at``, m, of the resting surface's node nearest to an indenter at first touch."""
     surface, reach = sensors.sensor_surface(sensor), _HARDLY_APART
     nodes, gap = surface.blocks.near(indenter, pose, reach)
     while not len(nodes):

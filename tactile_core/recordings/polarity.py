@@ -158,7 +158,7 @@ def _as_drift(change: np.ndarray, electrodes: np.ndarray) -> bool:
 
 
 def touching(change: Framewise) -> np.ndarray:
-    """Mark (T,) bool the changes (T, 19) counts that are contacts."""
+    """Mark (T,) bool the changes (T, 19) counts that are contacts: the root of the sum of squares reaches TOUCHING."""
     found = np.empty(len(change), bool)
     for start in range(0, len(change), BLOCK):  # their squares would take as much memory as a long recording
         rows = slice(start, start + BLOCK)

@@ -127,9 +127,9 @@ class Signals:
 
     @property
     def typical(self) -> np.ndarray:
-        """Change (T, 19) counts, converted to a unit that rests at ``sensors.typical_rest``, the networks' input. Only
-        raw readings are converted, as others do not show their unit's rest, and only of a sensor with a typical
-        rest."""
+        """Change (T, 19) counts, converted by ``divider.typical`` to a unit that rests at ``sensors.typical_rest``, the
+        networks' input. Only raw readings are converted, as others do not show their unit's rest, and only of a
+        sensor with a typical rest."""
         if self.kind != "raw" or typical_rest(self.sensor) is None:
             return self.change
         return Changes(len(self.change), self.typical_of)[EVERY]

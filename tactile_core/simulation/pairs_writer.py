@@ -101,7 +101,7 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks in order into one HDF5 file of ``count`` contacts. Raises TactileError where that fails."""
+    """Join blocks in order into an HDF5 file of the first ``count`` contacts. Raises TactileError where that fails."""
     import h5py
 
     try:

@@ -110,7 +110,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return the quantiles at QUANTILES of `silence`: results below them are no contact."""
+    """Return quantiles, at "levels", of what noise alone is translated to (`silence`): less may be no contact."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 

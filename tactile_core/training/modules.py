@@ -168,7 +168,7 @@ class MeshVae(Vae):
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, from the places in latents (B, L) to the contacts' true ones."""
+        """Mean distance, in cells of the surface, from the places that begin latents (B, L) to the true ones."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:

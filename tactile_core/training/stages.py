@@ -195,7 +195,7 @@ def length(vectors: Tensor) -> Tensor:
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Mean absolute deviation of the log largest node error, whose minimum is the median."""
+    """Loss of ``Model.expected_error``: mean absolute error of the logarithms, so that it learns the median error."""
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)

@@ -21,7 +21,7 @@ from tactile_core.translation.translate import load_translator
 
 
 def main(arguments: list[str]) -> int:
-    """Write the tables; returns the exit status."""
+    """Write the tables, by networks in a folder or those that ship, beside the sensor; returns the exit status."""
     folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
     signals = reference_signals.read(folder).typical.astype(np.float16)
     pressures = load_translator(folder).nets.pressure(signals.astype(np.float64)).astype(np.float32)

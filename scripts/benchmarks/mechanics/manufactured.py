@@ -19,7 +19,7 @@ _COMPLEX_STEP = 1e-30  # a derivative without cancellation: Im f(x + i h) / h
 
 
 def deformed(points: np.ndarray) -> np.ndarray:
-    """Deformed points (..., 3) of the unit cube: three shears in a row, which keep volumes, then 1 % of swelling."""
+    """Deformed points (..., 3) of the unit cube: three shears, which keep volumes, then at most 1 % of swelling."""
     x, y, z = np.moveaxis(points, -1, 0)
     x = x + 0.1 * np.sin(np.pi * y)
     y = y + 0.1 * np.sin(np.pi * z)

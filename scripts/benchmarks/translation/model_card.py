@@ -32,7 +32,7 @@ CONDITIONS = "| condition | of these networks and contacts |", "|---|---|"
 
 
 def expected(rows: Sequence[Row]) -> list[str]:
-    """Return the lines of a small table: the errors of shallow and of deeper contacts, each beside its baseline."""
+    """Return a Markdown table's lines: errors of contacts 0.1 to 0.3 mm deep and of deeper ones, beside baselines."""
     by_set = {(row["name"], part): row for row in rows for part in (SHALLOW, DEEP) if part in (row["set"] or "")}
     lines = [HEAD, "|---|---|---|---|---|"]
     for words, name, unit in EXPECTED:

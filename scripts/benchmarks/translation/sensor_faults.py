@@ -228,7 +228,7 @@ def confident(found: Translation) -> np.ndarray:
 
 
 def wrong(found: Translation, true: Translation) -> np.ndarray:
-    """Mark (T,) bool the frames whose force is not the true one's."""
+    """Mark (T,) bool the frames whose force is off by more than half of the true one, and by more than `NOTHING`."""
     seen, force = accuracy.lengths(found.force), accuracy.lengths(true.force)
     return np.abs(seen - force) > np.maximum(NOTHING, HALF * force)
 

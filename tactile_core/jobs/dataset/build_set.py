@@ -181,7 +181,7 @@ def _labels(path: str, file: File) -> dict[str, str]:
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
-    """Return numbers beside a recording, one text a frame: force in N from its file, columns of its own file."""
+    """Return texts, one a frame: force, N, beside a recording; columns of its file. path : the file, and the finger."""
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():

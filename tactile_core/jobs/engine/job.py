@@ -124,7 +124,7 @@ def _encodes(name: str) -> bool:
 
 
 def prepared_file(folder: Path, name: str) -> Path:
-    """Return the path of the prepared recording of that name."""
+    """Return the path of the prepared recording of that name, ``prepared/NAME.h5``, existing or not."""
     return folder / PREPARED / f"{name}.h5"
 
 

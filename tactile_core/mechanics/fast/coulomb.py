@@ -180,7 +180,7 @@ def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001,
 
 @Loop
 def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001, ANN201
-    """Prescribed motion (3 k + c, columns) m of touching points; slipping nodes may slip in addition.
+    """Prescribed motion (3 k + c, columns) m of touching points, 0 of others; slipping nodes are free along friction.
 
     The first column closes gaps and takes sticking nodes back to their spots, the second is a metre of ``direction``.
     """

@@ -43,7 +43,7 @@ class Friction:
     def solve(self, begin: Try, axial_force: float | None) -> Try:
         """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
 
-        Raises UnsolvedError.
+        The result is not ``settled`` where iterations run out or stall. Raises UnsolvedError where a step fails.
         """
         k = self.block.k
         force, core, shift = np.ascontiguousarray(begin.force), begin.core_force, begin.shift

@@ -128,7 +128,7 @@ class Frictionless:
     def solve(self, begin: Try, axial_force: float | None) -> Try:
         """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
 
-        Raises UnsolvedError.
+        The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step fails.
         """
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
         gap, normal = self.distance(place, state.shift)

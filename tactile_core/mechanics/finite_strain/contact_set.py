@@ -116,7 +116,7 @@ class ContactSet:
         self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 
     def begin(self, at: np.ndarray) -> np.ndarray:
-        """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first axis.
+        """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first column.
 
         One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
         """
@@ -129,16 +129,16 @@ class ContactSet:
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         self._frames = np.stack([self.normals, first, np.cross(self.normals, first)], -1)
         if self.friction:
-            self._look(at)
-            self._rub()
+            self._stretch(at)
+            self._apply_friction()
         return self._frames
 
-    def _look(self, at: np.ndarray) -> None:
+    def _stretch(self, at: np.ndarray) -> None:
         """Measure how far nodes are from their anchors, along the obstacle."""
         away = at[self.nodes] - self.obstacle.pose.from_own(self.anchor[self.active])
         self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
 
-    def _rub(self) -> None:
+    def _apply_friction(self) -> None:
         """Compute friction from the normal forces and the springs."""
         self.rubbing, self.slipping[self.active] = self._capped(self._trial)
 
@@ -224,7 +224,7 @@ class ContactSet:
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
-            self._rub()
+            self._apply_friction()
             self.imbalance = float(np.abs(self.rubbing - before).max() / max(self.pressing.max(initial=0), 1e-12))
 
     def press(self, reaction: np.ndarray) -> None:
@@ -247,8 +247,8 @@ class ContactSet:
         self.normals, self.pressing = normal[self.active], pressing[self.active]
         self.rubbing = np.zeros_like(self.normals)
         if self.friction:
-            self._look(at)
-            self._rub()
+            self._stretch(at)
+            self._apply_friction()
         return bool(settled)
 
 

@@ -172,7 +172,7 @@ def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
 
 
 def sheet(tried: list[Evaluation]) -> bytes:
-    """Draw each press's photograph, render and difference (doubled, on grey) as a PNG; equal input, equal bytes."""
+    """Draw photograph, render and difference (doubled, on grey) of the first LARGEST_SHEET presses. Returns a PNG."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

@@ -118,3 +118,10 @@ def quadrature_points(mesh):
     corners = mesh.nodes[mesh.cells].reshape(-1, 3, 3, 3, 3)[:, ::2, ::2, ::2]
     x, y, z = (np.stack([1 - points[:, k], 1 + points[:, k]]) / 2 for k in range(3))
     return np.einsum("cq,bq,aq,ecbad->eqd", z, y, x, corners)
+
+
+def test_a_cell_turned_inside_out_is_noticed(block):
+    state = block.rest()
+    state.displacement = -2 * block.mesh.nodes
+    with pytest.raises(FloatingPointError, match="inside out"):
+        stress.cauchy(block, state)
