@@ -48,7 +48,7 @@ MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
 TOO_SMALL = "no change is larger than what the fluid's drift leaves: taken for no contact, light touches with it"
 UNSURE = (
     "film taken as {:g} of a typical unit's by the counts at rest: another fluid over a typical film rests alike, and "
-    "force would be some {:.1f} times as large. `tactile adapt` on recordings with PDC or a force tells them apart"
+    "force would be some {:.1f} times as large. `tactile adapt` tells them apart by PDC, and finds the scale of a force"
 )
 SKIN = 0.75, 0.35  # measured over simulated pressure of real skins (descriptor of the BioTac), and its spread (assumed)
 NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another unit or sensor: four spreads
