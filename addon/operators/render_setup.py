@@ -132,7 +132,7 @@ def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings, for this panel and the sidebar's."""
+    """Draw the settings, for this panel and the sidebar's; the preset is grey beside a largest error."""
     settings = context.scene.tactile_render
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")

@@ -20,7 +20,7 @@ Progress = Callable[[int, int], None]
 
 
 def main(folder: Path) -> int:
-    """Run the job in a folder; returns the exit status."""
+    """Run the job in a folder; returns the exit status: 0, or 2 where it has reported an error."""
     from tactile_core.errors import TactileError
 
     job = json.loads((folder / "job.json").read_text(encoding="utf-8"))

@@ -197,7 +197,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
-    """Least CPU time: other programs on the machine make it longer, through caches that they empty."""
+    """Return the least CPU time, ms: other programs on the machine make it longer, through caches that they empty."""
     spent = []
     for _ in range(repeats):
         start = time.process_time()

@@ -38,7 +38,7 @@ class Options:
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
     prepare : options of the preparation, None for automatic; overwrite : replace an older result
     sensor : the unit's rest, gains and offsets, from `tactile adapt`
-    calibration : file of the DIGIT that is drawn, for the note; None for the one that ships"""
+    calibration : the DIGIT's file, for the note alone: ``ToolOptions`` has the one that draws; None for the shipped"""
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     keep: tuple[str, ...] = results.DEFAULT_KEEP

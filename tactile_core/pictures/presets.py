@@ -85,7 +85,7 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Return ms by variant and error, grey levels, of each preset, as ``measure_presets.py`` wrote them."""
+    """Return the table of ``measure_presets.py``: in "presets", by name, ms by variant and error, grey levels."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 

@@ -137,7 +137,7 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark rows (T,) of electrodes (T, e) equal to the row before; also return whether noise rules that out."""
+    """Mark rows (T,) of electrodes (T, e) equal to the row before; also return true if noise makes them faults."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and _noisy(electrodes[~same])
 

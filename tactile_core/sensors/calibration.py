@@ -248,7 +248,7 @@ class Calibration:
 
     @property
     def ambient_unit(self) -> np.ndarray:
-        """Unit of radiance (3,) of the ambient light's polynomials, levels."""
+        """Radiance (3,), levels, that 1 in ``ambient`` means: a LED's on a coating facing it at AMBIENT_DISTANCE."""
         return self._lit([AMBIENT_DISTANCE**2] * 3)
 
     def _lit(self, squares: list[float]) -> np.ndarray:

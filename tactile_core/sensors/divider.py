@@ -28,7 +28,7 @@ def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
 
 
 def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19) after the films' part alone of impedances grew by factors from rest counts (19,)."""
+    """Return counts (..., 19) after the films' impedances alone grew by factors (..., 19) from rest counts (19,)."""
     return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 

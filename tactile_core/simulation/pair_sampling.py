@@ -131,7 +131,7 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 def pair_row(
     biotac: Solution, digit: Solution, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Return the arrays stored of one paired contact, see ``units``; keep : fields of both solutions to add."""
+    """Return arrays stored of a paired contact, see ``pairs_writer.units``; keep : both solutions' fields to add."""
     source, target = pair
     both = (source, biotac), (target, digit)
     return {

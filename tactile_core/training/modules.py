@@ -80,7 +80,7 @@ class ContactPosterior(nn.Module):
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Return the negative logarithm (B,), nats, of the mixture's density at the true state (B, STATE)."""
+        """Return minus the log density (B,), nats, of the mixture at the true state (B, STATE), but for a constant."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)

@@ -32,7 +32,7 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def parts_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add `place_arguments` for a verb whose job is in a folder beside its result."""
+    """Add ``--plan`` and `place_arguments`, for a verb whose job is in a folder beside its result."""
     place_arguments(verb)
     verb.add_argument(
         "--plan",

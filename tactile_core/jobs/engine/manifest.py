@@ -71,7 +71,7 @@ def _aside(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """List a job's files that are damaged, or missing by its manifest. progress : (done, in all)"""
+    """List a job's files that are damaged, or missing by its manifest. progress : (files done, in all)"""
     shards = [shard for recording in _read(folder) for shard in recording.shards]
     listed = {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]

@@ -206,7 +206,7 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Return where (n, 3) m, in its frame, nodes moving straight from ``first`` to ``last`` first meet an indenter.
 
-    Nodes that do not meet it are given at ``last``.
+    Nodes that do not meet it are given at ``last``, nodes that begin inside it at ``first``.
     """
     way = last - first
     share, on_way = np.zeros(len(first)), np.arange(len(first))

@@ -139,7 +139,7 @@ def rubs(features: np.ndarray) -> np.ndarray:
 
 
 def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the kernel's factor for contacts of friction a and b, ``rubs``: larger where both have some, or none."""
+    """Return a kernel's factor for amounts of friction a and b, see ``rubs``: larger where both have some, or none."""
     return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
 
 

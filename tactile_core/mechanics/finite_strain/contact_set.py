@@ -205,7 +205,7 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what is held, (k, 3) bool, and its steps (k, 3) m, in ``begin``'s frames; fixed (k, 3) bool stays."""
+        """Hold normals, which close gaps, and fixed (k, 3) bool: return held (k, 3), steps m, in ``begin``'s frames."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True

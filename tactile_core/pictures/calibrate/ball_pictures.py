@@ -60,7 +60,7 @@ class BallPictures(abc.ABC):
         see. Light is not yet spread by the coating."""
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the heights (H, W) float32, m, of the gel under a ball (right, down, depth, radius), m."""
+        """Return the gel's heights (H, W) float32, m, see ``print_on``; ball : (right, down, depth, radius), m"""
         return print_on(self.rest, self.right, self.down, ball, self.thickness)
 
     def deepest(self, radius: float) -> float:

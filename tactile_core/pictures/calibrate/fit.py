@@ -134,9 +134,9 @@ class _Search:
         self.start, self.radius = start, radius
         self.presses = list(photographs.presses)
         self._sights = [Sight(press) for press in self.presses]
-        self.aside: dict[str, float] = {}
+        self.aside: dict[str, float] = {}  # photographs left out: name -> share unexplained
         self._progress, self._done = progress, 0
-        self._object = np.array(NAMES) == "object_light"
+        self._object = np.array(NAMES) == "object_light"  # free while balls are placed; others stay
 
     def place(self) -> None:
         """Fit presses, gain and the object's light alone; the unit's other numbers stay those of the start."""

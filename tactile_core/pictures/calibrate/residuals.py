@@ -54,7 +54,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return a calibration with other ``numbers`` (22,) and the same gain; raises TactileError for meaningless ones."""
+    """Return a calibration with other numbers (22,), as NAMES, and its ``gain``; raises TactileError out of range."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
