@@ -103,7 +103,8 @@ class Preparer:
         sign = 1.0 if signals.report["polarity"] == FALLS else -1.0
         change, thickness = signals.change + sign * (signals.rest - rest), signals.film
         if given and signals.report["film"] is not None:  # its rest was not known there
-            change, thickness = self._of_typical_film(change, rest, part.time[rows], part.sensor)
+            found, change = self._of_typical_film(change, rest, part.time[rows], part.sensor)
+            thickness, warnings = found.thickness, (*warnings, *found.warnings)
         change = np.where(unanswered(signals)[:, None], 0.0, change)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
@@ -113,15 +114,15 @@ class Preparer:
 
     def _of_typical_film(
         self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str
-    ) -> tuple[np.ndarray, float]:
-        """Return changes (T, 19) counts from rest (19,) at times (T,) s, converted to a typical film, and the film."""
+    ) -> tuple[film.Film, np.ndarray]:
+        """Return the film, and changes (T, 19) counts from rest (19,) at times (T,) s, converted to a typical one."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
             whole, Changes(len(change), level.at), time, None, sensor,
             thickness=options.film, own_rest=False, drifts=options.drift,
         )  # fmt: skip
-        return found.changes(whole, level)[EVERY], found.thickness
+        return found, found.changes(whole, level)[EVERY]
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
         """Keep the rest at the part's end: a calm level of the next part is rest only near it; a grip is calm, too."""

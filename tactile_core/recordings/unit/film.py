@@ -24,7 +24,8 @@ WINDOW, MOST_WINDOWS = 5.0, 300  # s that say of the conductivity what one conta
 LEAST, MOST = 0.2, 3.0  # thickness that a unit may have over a typical one's (assumed)
 THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # over a typical unit's, that are tried: .33 to 1.52
 # TYPICAL : number of the thickness 1. CLEARLY : nats by which another must be likelier. Without it made-up typical
-# units move; at 1 nat forces of made-up films of .5 are 87 % off, at .25 32 %. DRIFTS : the same of a drift (assumed).
+# units move; at 1 nat forces of made-up films of .5 are 87 % off, at .25 33 %, as those over fluids of .5, which rest
+# alike, then are. DRIFTS : the same of a drift (assumed).
 TYPICAL, CLEARLY, DRIFTS = 8, 0.25, 3.0
 CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 4 counts apart at rest
 # Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of five units, whose
@@ -60,7 +61,7 @@ class Film:
     thickness : over a typical unit's; evidence : for it, in words
     conductivity : (P,) log of the fluid's over that at rest, at rising frames (P,); linear between them
     sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves
-    unsure : true if neither the user nor the fluid's pressure says that it is no typical film over another fluid"""
+    unsure : true if it may be a typical film over another fluid: neither the user nor the fluid's pressure decides"""
 
     thickness: float
     evidence: str
@@ -172,8 +173,8 @@ def find(
     unsure = False
     if thickness is None:
         measured = None if pressure is None else pressure[frames]
-        thickness, evidence, by_pressure = _thickness(seen, np.exp(log)[seen.window_of, None], measured)
-        unsure = thickness != 1 and not by_pressure
+        thickness, evidence, pressure_decides = _thickness(seen, np.exp(log)[seen.window_of, None], measured)
+        unsure = thickness != 1 and not pressure_decides
     else:
         evidence = "given"
     middle = np.bincount(seen.window_of, frames) / np.bincount(seen.window_of)
@@ -257,7 +258,7 @@ def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | Non
             ratio, pressed = pressure_ratio(typical, pressure, seen.sensor)
             if pressed >= FEWEST_PRESSED:
                 by_pressure[row] = (np.log(ratio / SKIN[0]) / SKIN[1]) ** 2 / 2
-    told = bool(by_pressure.min() < NO_SKIN)
-    if told:
+    pressure_decides = bool(by_pressure.min() < NO_SKIN)
+    if pressure_decides:
         doubt += np.where(np.isfinite(by_pressure), by_pressure, by_pressure.min())
-    return _believed(doubt), f"{evidence}, {contacts} different contacts", told
+    return _believed(doubt), f"{evidence}, {contacts} different contacts", pressure_decides
