@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
-import os
 import textwrap
 import warnings as python_warnings
 from collections.abc import Iterator, Sequence
@@ -16,8 +14,7 @@ import numpy as np
 from .. import accuracy
 from ..files import atomic
 from ..recordings import flags
-from ..sensors import SOURCE, title
-from ..sensors.camera import Camera
+from ..sensors import title
 from ..translation.card import doubt
 from ..translation.simulated_likeness import contradicted
 from ..translation.trust_words import DENIED, LOW_CONFIDENCE, SENTENCES
@@ -105,76 +102,46 @@ class ConversionReport:
         return describe_miss(total, force, solved=self._tools.drawer.solve is not None)
 
     def draw_sheet(self, path: Path) -> None:
-        """Draw the contact sheet once all frames were added."""
+        """Draw the contact sheet once all frames were added; equal frames make equal bytes."""
+        with _plain_matplotlib():
+            content = self._sheet().png()
+        atomic.write_bytes(path, content)
+
+    def _sheet(self) -> SheetFigure:
         recording, signals = self._rows.recording, self._rows.signals
+        camera, source = self._tools.drawer.camera, self._tools.translator.source
         shown, rows = np.array(list(self._shown)), self._rows.at(self._frames)
-        columns = {name: np.stack([at[name] for at in self._shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
-        truth, timeless = recording.truth, bool(np.isnan(recording.time).all())
-        skin = None if truth is None else truth.displacement_biotac
-        contents = Contents(
-            name=recording.name,
-            camera=self._tools.drawer.camera,
-            time=self._frames if timeless else recording.time[rows],
-            snapshots=timeless,
-            electrodes=signals.change[rows],
-            frames=np.searchsorted(self._frames, shown),
-            true_displacement_biotac=None if skin is None else skin[self._rows.at(shown)],
-            simulated=recording.simulated,
-            mount_shift=self._tools.translator.answer.mount_shift,
-            pressure=np.concatenate(self._pressure),
-            explained=np.concatenate(self._explained),
-            pressure_measured=signals.pressure_measured[rows],
-            warnings=self.warnings(),
-            source=self._tools.translator.source,
-            **columns,
-        )
-        contact_sheet(path, contents)
+        of = {name: np.stack([at[name] for at in self._shown.values()]) for name in (*SHEET_ARRAYS, "pictures")}
+        skin = None if recording.truth is None else recording.truth.displacement_biotac
+        truth = None if skin is None else skin[self._rows.at(shown)]
+        snapshots = bool(np.isnan(recording.time).all())
+        time, columns = self._frames if snapshots else recording.time[rows], np.searchsorted(self._frames, shown)
+        lines = _sentences(self.warnings(), of["confidence"])
+        figure = SheetFigure(len(shown), camera, lines, truth is not None, snapshots=snapshots)
+        # File names may hold what is no text at all.
+        figure.title("".join(letter if letter.isprintable() else "?" for letter in recording.name), recording.simulated)
+        figure.electrodes(time, signals.change[rows], columns)
+        figure.explained(time, np.concatenate(self._explained))
+        figure.pressure(time, np.concatenate(self._pressure), signals.pressure_measured[rows])
+        figure.headings(time[columns])
+        skin_of, gel = f"{title(source)}, unrolled\n", title(camera.sensor)
+        largest = scale(of["displacement_biotac"], truth)
+        centers = np.stack([of["contact_center"], of["second_center"]], axis=1)
+        on_finger = centers - self._tools.translator.answer.mount_shift
+        label = skin_of + ("translated" if recording.simulated else "displacement")
+        figure.skin_row(label, of["displacement_biotac"], largest, on_finger, source)
+        if truth is not None:
+            figure.skin_row(f"{skin_of}true (simulated)", truth, largest, None, source)
+        figure.gel_row(f"{gel} gel\ndisplacement", of["displacement_digit"], centers)
+        figure.picture_row(f"{gel} picture", of["pictures"])
+        dent = accuracy.lengths(of["displacement_digit"]).max(axis=1)
+        figure.captions(of["force"], of["confidence"], of["flags"], of["expected_error_digit"], dent)
+        return figure
 
 
 WARNING_LINES, WARNING_WIDTH = 5, 200
 # Lines in pieces: Agg refuses a noisy line of a hundred thousand points as a whole.
 STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Contents:
-    """Contents of a sheet of a recording of T frames, in k columns.
-
-    name : of the recording; time : (T,) s, of snapshots their numbers; electrodes : (T, 19) counts, change from rest
-    pressure, pressure_measured : (T,) Pa, rise of the fluid's as translated and by PDC; NaN where it was not measured
-    explained : (T,), share of the electrodes' change that the translation explains; NaN without contact
-    frames : (k,) which of the T frames are the columns
-    displacement_biotac : (k, N, 3) m; displacement_digit : (k, M, 3) m; pictures : (k, H, W, 3) uint8
-    force : (k, 3) N; confidence : (k,) 0..1; flags : (k,) uint16; expected_error_digit : (k,) m, of the largest node
-    contact_center : (k, 2) m = (x, z) on the DIGIT, NaN without contact; mount_shift : (2,) m, of a mount in it
-    second_center : (k, 2) m of a second contact, likewise
-    true_displacement_biotac : (k, N, 3) m of a simulated recording; warnings : sentences for the reader
-    source : the sensor that was read, whose skin is drawn; camera : of the gel
-    """
-
-    name: str
-    camera: Camera
-    time: np.ndarray
-    electrodes: np.ndarray
-    frames: np.ndarray
-    displacement_biotac: np.ndarray
-    displacement_digit: np.ndarray
-    pictures: np.ndarray
-    force: np.ndarray
-    confidence: np.ndarray
-    flags: np.ndarray
-    expected_error_digit: np.ndarray
-    contact_center: np.ndarray
-    pressure: np.ndarray
-    explained: np.ndarray
-    pressure_measured: np.ndarray
-    true_displacement_biotac: np.ndarray | None = None
-    simulated: bool = False
-    mount_shift: np.ndarray | float = 0.0
-    warnings: Sequence[str] = ()
-    source: str = SOURCE
-    snapshots: bool = False
-    second_center: np.ndarray | float = np.nan
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
@@ -191,13 +158,6 @@ def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
     return np.sort(chosen)
 
 
-def contact_sheet(path: str | os.PathLike, shown: Contents) -> None:
-    """Draw the sheet and write it to `path` as a PNG; equal contents make equal bytes."""
-    with _plain_matplotlib():
-        content = _drawn(shown).png()
-    atomic.write_bytes(path, content)
-
-
 @contextlib.contextmanager
 def _plain_matplotlib() -> Iterator[None]:
     """Use matplotlib's settings of this package alone: a user's own must not change the bytes."""
@@ -209,36 +169,6 @@ def _plain_matplotlib() -> Iterator[None]:
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(STYLE)
         yield
-
-
-def _drawn(shown: Contents) -> SheetFigure:
-    displacement, truth = shown.displacement_biotac, shown.true_displacement_biotac
-    figure = SheetFigure(
-        len(shown.frames),
-        shown.camera,
-        _sentences(shown.warnings, shown.confidence),
-        truth is not None,
-        snapshots=shown.snapshots,
-    )
-    # File names may hold what is no text at all.
-    figure.title("".join(letter if letter.isprintable() else "?" for letter in shown.name), shown.simulated)
-    figure.electrodes(shown.time, shown.electrodes, shown.frames)
-    figure.explained(shown.time, shown.explained)
-    figure.pressure(shown.time, shown.pressure, shown.pressure_measured)
-    figure.headings(shown.time[shown.frames])
-    largest = scale(displacement, truth)
-    name = title(shown.source)
-    centers = np.stack(np.broadcast_arrays(shown.contact_center, shown.second_center), axis=1)
-    label = f"{name}, unrolled\n" + ("translated" if shown.simulated else "displacement")
-    figure.skin_row(label, displacement, largest, centers - shown.mount_shift, shown.source)
-    if truth is not None:
-        figure.skin_row(f"{name}, unrolled\ntrue (simulated)", truth, largest, None, shown.source)
-    gel = title(shown.camera.sensor)
-    figure.gel_row(f"{gel} gel\ndisplacement", shown.displacement_digit, centers)
-    figure.picture_row(f"{gel} picture", shown.pictures)
-    dent = accuracy.lengths(shown.displacement_digit).max(axis=1)
-    figure.captions(shown.force, shown.confidence, shown.flags, shown.expected_error_digit, dent)
-    return figure
 
 
 def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:

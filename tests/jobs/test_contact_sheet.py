@@ -1,39 +1,57 @@
 import io
+from collections.abc import Sequence
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tactile_core import sensors
-from tactile_core.jobs.conversion_report import Contents, choose_frames, contact_sheet
+from tactile_core.jobs.conversion_report import ConversionReport, choose_frames
+from tactile_core.jobs.frame_pass import Tools
 from tactile_core.jobs.sheet_figure import CAPTION, FOOT, SheetFigure
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
+from tactile_core.translation.answer import Answer
+
+COUNT = 2
 
 
-@pytest.fixture
-def columns() -> dict:
-    """A made-up recording of 50 frames, two of them shown."""
+def drawn(path: Path, warnings: Sequence[str] = (), truth: bool = False, touched: bool = True, **about: Any) -> Path:
+    """Draw the sheet of a made-up recording; truth : with the true skin; about : of ``Recording``"""
     rng = np.random.default_rng(0)
-    biotac, digit = len(sensors.biotac_surface().rest), len(sensors.digit_surface().rest)
-    return {
-        "name": "touch",
-        "camera": load_calibration().camera,
-        "time": np.arange(50) / 100,
-        "electrodes": rng.normal(size=(50, 19)),
-        "frames": np.array([10, 30]),
-        "displacement_biotac": rng.normal(size=(2, biotac, 3)) * 1e-4,
-        "displacement_digit": rng.normal(size=(2, digit, 3)) * 1e-4,
-        "pictures": rng.integers(0, 256, (2, 320, 240, 3), dtype=np.uint8),
-        "force": np.array([[0, 1.0, 0], [0, 0, 0]]),
-        "confidence": np.array([0.9, 0.1]),
-        "flags": np.array([0, 4], np.uint16),
-        "expected_error_digit": np.array([30e-6, 90e-6]),
-        "contact_center": np.array([[-7e-3, 1e-3], [np.nan, np.nan]]),
-        "pressure": np.linspace(0, 2e3, 50),
-        "pressure_measured": np.full(50, np.nan),
-        "explained": np.r_[np.full(10, np.nan), np.linspace(-3, 1, 40)],
-    }
+    known = {"name": "touch", "time": np.arange(COUNT) / 100, "simulated": truth, "truth": None} | about
+    skin = (len(known["time"]), len(sensors.biotac_surface().rest), 3)
+    if truth:
+        known["truth"] = SimpleNamespace(displacement_biotac=rng.normal(size=skin) * 1e-4)
+    recording, count = SimpleNamespace(**known), len(known["time"])
+    unknown, frames = np.full(count, np.nan), np.arange(count)
+    change = rng.normal(size=(count, 19)) if touched else np.full((count, 19), np.nan)
+    signals = SimpleNamespace(change=change, pressure_measured=unknown, warnings=warnings)
+    rows = SimpleNamespace(
+        recording=recording, signals=signals, at=lambda frames: frames, read=lambda frames: (None, signals)
+    )
+    translator = SimpleNamespace(card={}, answer=Answer(), source="biotac")
+    drawer = SimpleNamespace(camera=load_calibration().camera, target="digit", describe_gel=tuple)
+    made = SimpleNamespace(folded=0, pictures=lambda arrays, rows: list(arrays["image"][rows]))
+    report = ConversionReport(rows, frames, Tools(translator, drawer), made)
+    gel = (count, len(sensors.digit_surface().rest), 3)
+    report.take(frames, {
+        "displacement_biotac": touched * rng.normal(size=skin) * 1e-4,
+        "displacement_digit": touched * rng.normal(size=gel) * 1e-4,
+        "image": rng.integers(0, 256, (count, 320, 240, 3), dtype=np.uint8),
+        "force": touched * np.tile([0, 1.0, 0], (count, 1)),
+        "confidence": np.full(count, 0.9),
+        "flags": np.zeros(count, np.uint16),
+        "expected_error_digit": np.full(count, 30e-6),
+        "contact_center": np.tile([-7e-3, 1e-3] if touched else [np.nan, np.nan], (count, 1)),
+        "second_center": np.full((count, 2), np.nan),
+        "pressure": np.linspace(0, 2e3, count) if touched else unknown,
+        "explained": np.linspace(-3, 1, count) if touched else unknown,
+    })  # fmt: skip
+    report.draw_sheet(path)
+    return path
 
 
 def size(path: Path) -> tuple[int, int]:
@@ -43,54 +61,41 @@ def size(path: Path) -> tuple[int, int]:
         return picture.size
 
 
-def test_same_input_makes_the_same_bytes_without_a_date(tmp_path: Path, columns: dict) -> None:
-    first, second = tmp_path / "a.png", tmp_path / "b.png"
-    contact_sheet(first, Contents(**columns))
-    contact_sheet(second, Contents(**columns))
+def test_same_input_makes_the_same_bytes_without_a_date(tmp_path: Path) -> None:
+    first, second = drawn(tmp_path / "a.png"), drawn(tmp_path / "b.png")
     assert first.read_bytes() == second.read_bytes()
     assert b"Software" not in first.read_bytes()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.png", "b.png"]  # no half file is left
 
 
-def test_own_matplotlib_settings_change_nothing(tmp_path: Path, columns: dict) -> None:
+def test_own_matplotlib_settings_change_nothing(tmp_path: Path) -> None:
     import matplotlib
 
-    first, second = tmp_path / "a.png", tmp_path / "b.png"
-    contact_sheet(first, Contents(**columns))
+    first = drawn(tmp_path / "a.png")
     with matplotlib.rc_context({"font.size": 20, "lines.linewidth": 5}):
-        contact_sheet(second, Contents(**columns))
+        second = drawn(tmp_path / "b.png")
         assert matplotlib.rcParams["font.size"] == 20
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path, columns: dict) -> None:
+def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path) -> None:
     path = tmp_path / "a.png"
-    contact_sheet(path, Contents(**columns))
-    width, plain = size(path)
+    width, plain = size(drawn(path))
     assert width == 1600
-    contact_sheet(path, Contents(**columns, true_displacement_biotac=columns["displacement_biotac"], simulated=True))
-    with_truth = size(path)[1]
-    assert with_truth > plain + 200
-    contact_sheet(path, Contents(**columns, warnings=["rectified: the sign is lost", "no quiet part"]))
-    assert plain + 30 < size(path)[1] < plain + 60
-    contact_sheet(path, Contents(**columns, warnings=["many words " * 40] * 30))  # cut off, with a line that says so
-    assert size(path)[1] < plain + 120
+    assert size(drawn(path, truth=True))[1] > plain + 200
+    assert plain + 30 < size(drawn(path, ["rectified: the sign is lost", "no quiet part"]))[1] < plain + 60
+    many = ["many words " * 40] * 30  # cut off, with a line that says so
+    assert size(drawn(path, many))[1] < plain + 120
 
 
 @pytest.mark.parametrize("name", ["$\\alpha", "名前", "a\udcff\nb", "x" * 300])
-def test_any_name_can_be_drawn(tmp_path: Path, columns: dict, name: str, recwarn: pytest.WarningsRecorder) -> None:
-    contact_sheet(tmp_path / "a.png", Contents(**columns | {"name": name}))
+def test_any_name_can_be_drawn(tmp_path: Path, name: str, recwarn: pytest.WarningsRecorder) -> None:
+    drawn(tmp_path / "a.png", name=name)
     assert not recwarn.list
 
 
-def test_one_frame_without_contact(tmp_path: Path, columns: dict) -> None:
-    given = ("displacement_biotac", "displacement_digit", "pictures", "force", "confidence", "flags")
-    for what in (*given, "expected_error_digit", "contact_center"):
-        columns[what] = 0 * columns[what][:1]
-    columns |= {"frames": np.array([0]), "time": np.zeros(1), "electrodes": np.full((1, 19), np.nan)}
-    columns |= {name: np.full(1, np.nan) for name in ("pressure", "pressure_measured", "explained")}
-    contact_sheet(tmp_path / "a.png", Contents(**columns))
-    assert size(tmp_path / "a.png")[0] == 1600
+def test_one_frame_without_contact(tmp_path: Path) -> None:
+    assert size(drawn(tmp_path / "a.png", touched=False, time=np.zeros(1)))[0] == 1600
 
 
 def test_frames_are_the_strongest_that_lie_apart() -> None:
