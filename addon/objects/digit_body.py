@@ -17,7 +17,7 @@ _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0,
 
 
 def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
-    """Return the gel's parts that are in a scene; appending a gel alone brings its others too, in none."""
+    """Return the gel's parts that a scene shows; those that came with an appended gel are in none."""
     return [thing for thing in gel.children_recursive if thing.users_scene]
 
 
@@ -129,7 +129,7 @@ def watts_per_brightness(per_metre: float) -> float:
 
 
 def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) -> None:
-    """Put a camera where the sensor's own seems to be, with its angle of view."""
+    """Put the camera object ``lens`` where a calibration's ``camera`` seems to be, with its angle of view."""
     per_metre, high = gel.tactile.per_metre, camera.apparent_height
     lens.location = image_frame.to_gel([[0, 0, high]], camera, per_metre)[0]
     # It looks up into the gel, its own -Z along the scene's Z; the fingertip, -X, is up in the picture.

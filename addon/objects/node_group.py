@@ -28,16 +28,16 @@ class NodeGroup:
         return node
 
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a math node and return its output."""
+        """Add a math node and return its output; links : as of `add`"""
         return self.add("ShaderNodeMath", *links, operation=operation).outputs[0]
 
     def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
-        """Read a named attribute of the mesh."""
+        """Add a node that reads a named attribute of the mesh; return its output."""
         node = self.add("GeometryNodeInputNamedAttribute", name, data_type=kind)
         return next(s for s in node.outputs if s.enabled and s.name == "Attribute")
 
     def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
-        """Give the geometry a named attribute of its points."""
+        """Add a node that stores ``value`` as a named attribute of a geometry's points; return that geometry."""
         return self.add("GeometryNodeStoreNamedAttribute", geometry, None, name, value, data_type=kind,
                         domain="POINT").outputs[0]  # fmt: skip
 
@@ -51,6 +51,6 @@ class NodeGroup:
             item.min_value = least
 
     def end(self, geometry: bpy.types.NodeSocket) -> bpy.types.NodeTree:
-        """Make the geometry the group's output."""
+        """Make the geometry the group's output; return the finished group."""
         self.tree.links.new(geometry, self.tree.nodes.new("NodeGroupOutput").inputs[0])
         return self.tree

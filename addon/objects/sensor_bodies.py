@@ -39,9 +39,10 @@ def add_parts(thing: bpy.types.Object) -> None:
 
 
 def stack(part: dict[str, Any], middle: list[float], border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Build one part: nodes (n, 3) mm and triangles (m, 3), seen from outside.
+    """Build one part, a stack of rings: nodes (n, 3) mm and triangles (m, 3), outward.
 
-    part : a table of the file; middle : of its outline; border : (k, 3) mm of the gel, empty for other sensors
+    part : a table of ``sensor_bodies.toml``; middle : (2,) mm of its outline
+    border : (k, 3) mm, outline of the gel's surface; (0, 3) for other sensors
     """
     shape, rows = part["outline"], [(*row, 0.0)[:3] for row in part["rows"]]
     outline = border[:, :2] if isinstance(shape, str) else _rectangle(*shape) + middle

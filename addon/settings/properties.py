@@ -133,14 +133,14 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
 
 
 def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "") -> TactileObject:
-    """Mark an object of ours; sensor : of skins and gels."""
+    """Set an object's role, Blender units a metre and, for a skin or a gel, sensor; return its properties."""
     about = thing.tactile
     about.role, about.per_metre, about.sensor, about.format = role, per_metre, sensor, FORMAT
     return about
 
 
 def set_up_part(thing: bpy.types.Object, parent: bpy.types.Object, role: str) -> None:
-    """Mark an object of ours that goes with another one, in whose collection it is shown."""
+    """Give an object a role, and make it a child of ``parent``, shown in the same collection."""
     set_up(thing, role, parent.tactile.per_metre)
     home_of(parent).objects.link(thing)
     thing.parent = parent
@@ -198,7 +198,7 @@ def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.
 
 
 def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object:
-    """Return the gel that ``gel_of`` does. Raises TactileError where the scene itself has none."""
+    """Return the gel that ``gel_of`` finds. Raises TactileError where the scene has none, or only an instance."""
     gel = gel_of(scene, near)
     if gel is not None:
         return gel
@@ -211,7 +211,7 @@ def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> 
 
 
 def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
-    """Return whether what an operator needs is there, for its poll: else its greyed button says why not."""
+    """Return true if ``need()`` raises no TactileError; else its text is what the operator's grey button shows."""
     try:
         need()
     except TactileError as error:

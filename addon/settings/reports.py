@@ -39,7 +39,7 @@ ADVICE = "Install the extension's zip for this platform, which brings it"
 
 
 def in_blender(text: str) -> str:
-    """Put Blender's own names in place of the command line's."""
+    """Return a message with the command line's options and advice replaced by what Blender's buttons call them."""
     for pattern, words in WORDS:
         text = re.sub(pattern, words, text)
     return text

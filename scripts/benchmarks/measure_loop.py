@@ -80,7 +80,7 @@ def quantiles(times: Times) -> list[float]:
 
 
 def as_rows(name: str, times: Times, error: str) -> list[Row]:
-    """Make six rows."""
+    """Return six rows, the ``quantiles`` of times; error : of the measured contacts, in words"""
     of = f"{len(times)} contacts, one core; error {error}"
     labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
     key = f"loop_{name.replace(', ', '_').replace(' ', '_')}"
@@ -88,7 +88,7 @@ def as_rows(name: str, times: Times, error: str) -> list[Row]:
 
 
 def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield a name, times and the error in words."""
+    """Yield each measured thing's name, times, and error in words; count : contacts a sensor"""
     for sensor in ("digit", "biotac"):
         for name, times, error, last in of_sensor(sensor, count):
             yield name, times, error
@@ -99,7 +99,7 @@ def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
 
 
 def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
-    """Yield the same of a sensor's contacts alone and on paths, and the contacts at the paths' ends."""
+    """Yield name, times, error in words and last contacts, of a sensor's ``count`` contacts alone and on paths."""
     tier = measured()["tiers"]["fast"][sensor]["bins"][1]
     stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
     for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
@@ -109,7 +109,10 @@ def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[F
 
 
 def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
-    """Times of random contacts, and the contacts at the ends of their paths, None where there is none."""
+    """Measure ``count`` random contacts, each reached in ``steps`` even steps of depth, from 2 on the first not timed.
+
+    Returns times of the steps, and the contacts at the ends, None where none is found.
+    """
     times: Times = []
     last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):

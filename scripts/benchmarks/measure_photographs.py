@@ -73,7 +73,7 @@ def other_unit(data: Path) -> Photographs:
 
 
 def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
-    """Yield a fit without each ``count``-th of the photographs, and these."""
+    """Split photographs into ``count`` parts; yield a fit to all but one part, and that part, for each."""
     names = [press.name for press in photographs.presses]
     for fold in range(count):
         apart = names[fold::count]
@@ -82,7 +82,7 @@ def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[
 
 
 def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
-    """Yield the means over photographs, and the worst."""
+    """Yield the metrics' means over photographs, and the worst PSNR; of : the photographs, in words"""
     ours, baseline = mean_metrics(tried)
     for name, unit in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("through_psnr", "dB"), ("through_l1", "levels")):
         yield row(name, ours[name], unit, baseline=baseline[name], of=of)
@@ -143,7 +143,9 @@ def recordings(data: Path) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def level_rows(pictures: np.ndarray, rest: np.ndarray, of: str) -> Iterator[Row]:
-    """Yield the levels of touched pixels of pictures (n, H, W, 3); rest : of the untouched gel, the same or one."""
+    """Yield rows of pictures (n, H, W, 3): % of clipped values, and percentiles over touched pixels of their
+    saturation, of their levels, and of their levels divided by those at rest.
+    rest : of the untouched gel, levels, one picture or n; of : the pictures, in words"""
     rest = np.broadcast_to(rest, pictures.shape)
     touched = np.abs(pictures - rest.clip(0, LARGEST_LEVEL)).max(-1) > CHANGE
     seen, share = pictures[touched].astype(float), pictures[touched] / np.maximum(rest[touched], 1)

@@ -121,7 +121,7 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
 
 
 def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
-    """Yield the errors of contacts that both tiers solved."""
+    """Yield the errors of one tier's contacts against a finer one's, both as of ``keep``, where both found one."""
     for one, other in zip(found, true, strict=False):
         if one and other:
             pair = one["displacement"], float(one["force"]), other["displacement"], float(other["force"])

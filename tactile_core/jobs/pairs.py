@@ -53,7 +53,7 @@ def make_pairs(
 
     progress : called with (blocks of presses done, known so far). Blocks are kept in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
-    place : executor, by the job's folder
+    place : function from the job's folder to the executor of tasks
     pair : the sensors, source and target; keep : words of ``pairs_file.KEEPABLE``
     Raises TactileError for a bad scene or count, and for parts of another scene or seed."""
     out = Path(out)

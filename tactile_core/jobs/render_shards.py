@@ -38,7 +38,7 @@ def render_in_parts(
     progress: Callable[[int, int], None],
 ) -> Path:
     """Do ``render.render`` in a job, kept in ``<out>.parts`` until complete; the same call resumes it. Raises alike.
-    place : executor, by the job's folder; progress : (tasks done, known so far)"""
+    place : function from the job's folder to the executor of tasks; progress : (tasks done, known so far)"""
     out = Path(out)
     job = plan(path, out, options)
     with (
@@ -82,7 +82,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
-    """Read the input (a scene is simulated) and keep the values to render."""
+    """Read the input (a scene is simulated) and keep the values to render; returns as ``recipes`` says."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None
@@ -97,7 +97,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
 
 
 def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
-    """Render the frames of a shard, unless they are there."""
+    """Render the frames of a shard, unless they are there; returns true if they were made."""
     one, recipe = job.inputs[index], job.recipe
     file = jobs.shard_file(folder, one.name, number)
     if checksummed.verified_checksum(file) is not None:
@@ -115,7 +115,7 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | None:
-    """Return the number of frames of an inspected input."""
+    """Return the number of frames and of shards of a prepared input; None where it is not prepared."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     return InputFacts(count(folder, job), _frames(folder, job))

@@ -152,7 +152,7 @@ def simulate_grid(
     place: Callable[[Path], Place] = InProcess,
 ) -> None:
     """Simulate all recordings of a `plan` into the folder ``out``; the job is in ``<out>.parts`` until all are done.
-    progress : (tasks done, known so far); place : executor, by the job's folder
+    progress : (tasks done, known so far); place : function from the job's folder to the executor of tasks
     Raises TactileError for what cannot be done."""
     for sensor in PAIR:
         compliance_of(sensor)  # built once here, not by every worker at the same time
@@ -197,7 +197,7 @@ def prepare_input(folder: Path, job: Job[Simulate], index: int) -> tuple[int, bo
 
 
 def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
-    """Simulate a recording."""
+    """Simulate recording `index`, unless its file is there; returns true if it was made."""
     from ..simulation.scene_recording import simulate_recording
 
     one = job.inputs[index]

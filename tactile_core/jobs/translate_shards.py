@@ -44,7 +44,7 @@ def count(frames: int, job: Job[Translate]) -> int:
 
 
 def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare a recording."""
+    """Prepare a recording; returns the number of its shards, and true if it was prepared now."""
     frames, made = prepared_signals.make(folder, job, index)
     return count(frames, job), made
 

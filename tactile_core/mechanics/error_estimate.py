@@ -39,7 +39,10 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Enlarge a depth's errors for a sharp indenter of ``radius`` m; without nodes the shape's is ``depth`` m."""
+    """Enlarge a depth's errors (shape m, force relative) for an indenter of least radius ``radius`` m.
+
+    nodes : number that touch; at 0 the errors are ``depth`` m and 1
+    """
     if not nodes:
         return _of_nothing(depth)
     sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))
@@ -49,7 +52,7 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
     """Enlarge a depth's errors, full or reference tier, where few nodes touch or the indenter cuts in between them.
 
-    nodes : that touch; across : nodes across the contact, by the full tier's spacing
+    nodes : number that touch; across : number across the contact, by the full tier's spacing
     hidden : m, how deep the indenter lies under the surface between nodes
     """
     if not nodes:
@@ -63,7 +66,7 @@ def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hid
 
 
 def _of_nothing(depth: float) -> Errors:
-    """Errors without contact of a body deeper than first touch, between nodes that it misses: its force is unknown."""
+    """Errors (shape m, force relative) where no node touches: a body deeper than first touch lies between nodes."""
     return (depth, 1.0) if depth > _ROUNDING else (0.0, 0.0)
 
 

@@ -62,9 +62,9 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Find the additional distance, m, to first touch after an indenter has slid from ``pose``, itself at first touch.
+    """Find how much farther, m, first touch is at the pose ``slid`` than at ``pose``, itself at first touch.
 
-    Where it has slid off the sensor, as far as its motion is followed.
+    Where the indenter has slid off the sensor: ``_FARTHEST``.
     """
     if same_line(pose, slid):
         return 0.0
@@ -110,7 +110,7 @@ def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pos
 
 
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
-    """Find where a body's foremost point meets a surface, also between nodes: place (1, 2) and point (1, 3) m.
+    """Find where a body's foremost point meets a surface: row and column, real-valued, (1, 2), and point (1, 3) m.
 
     axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
     None where no node lies near its way.

@@ -49,7 +49,7 @@ class Solution(Summary):
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
     centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
-    penetration : m, deepest place of a node in the indenter or the core; slipping : share of touching nodes
+    penetration : m, largest depth of a node in the indenter or the core; slipping : share of touching nodes that slip
     core_nodes : number of inner-skin nodes that press on the core; load_steps : number since the solution before
     volume : the solid and its state, of the full and the reference tier
     between : (m, 3) N, loads on the solid's nodes by which the indenter's force between nodes acts, if there is any

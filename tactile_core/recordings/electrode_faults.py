@@ -117,7 +117,7 @@ def _noisy(electrodes: np.ndarray) -> bool:
 def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Interpolate what was not read and, with `repair`, glitches and repeats; return readings, flags (T,), a report."""
+    """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats; return them, flags and a report."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:

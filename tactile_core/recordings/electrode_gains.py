@@ -36,9 +36,9 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     gain : counts a count; offset_counts : counts; note : how it was made
     rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
         single recordings; rest_pdc : counts
-    film : thickness of its fluid film over a typical unit's, where known
-    stiffness : of its skin over a typical unit's, where a measured force showed it: scales force and pressure under the
-        same signals; stiffness_error : relative"""
+    film : thickness of its fluid film, divided by a typical unit's, where known
+    stiffness : of its skin, divided by a typical unit's, where a measured force showed it: scales force and pressure
+        under the same signals; stiffness_error : relative"""
 
     note: str
     gain: Row
@@ -51,7 +51,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     stiffness_error: float | None = None
 
     def rest(self) -> Rest | None:
-        """Return the unit's rest in the form that `prepare` takes."""
+        """Return the unit's rest in the form that `prepare` takes; None where it is unknown."""
         if self.rest_counts is None:
             return None
         return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * len(self.gain)), self.rest_pdc)
@@ -80,7 +80,8 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     def gains_for(
         self, recording: str | os.PathLike, section: str, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
-        """Return the unit that made the recording of a `section`. Raises TactileError where there is none."""
+        """Return the gains of the unit that made a recording, by its `section`; where : this file, for messages.
+        Raises TactileError where there is none."""
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
             expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
@@ -93,7 +94,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
 
 
 def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> SensorFile:
-    """Put units together, by the names of their sections."""
+    """Return the content of a file of units, each under the name of its section."""
     topics = {name: unit for name, unit in units.items() if "/" in name}
     plain: dict[str, Any] = {name: unit for name, unit in units.items() if name not in topics}
     return SensorFile(FORMAT, **plain, sensor=sensor, topics=topics or None)

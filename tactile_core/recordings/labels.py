@@ -39,7 +39,7 @@ Runs = dict[str, list[tuple[str, int]]]  # name -> texts in order, each with the
 
 
 def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) -> None:
-    """Add to runs, which reach up to frame ``start``, the labels of the frames up to ``stop``."""
+    """Add to ``runs``, which end before frame ``start``, the labels (stop - start,) of frames ``start`` to ``stop``."""
     for name in {**runs, **labels}:
         held = runs.setdefault(name, [("", start)] * bool(start))
         column = labels[name].tolist() if name in labels else [""] * (stop - start)

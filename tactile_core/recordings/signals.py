@@ -27,7 +27,7 @@ SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/source
 
 @dataclass(frozen=True)
 class Rest:
-    """Rest of a unit, found in other recordings of it. counts, spread : of E1..E19; pdc : counts, or None"""
+    """Rest of a unit, found in other recordings of it. counts, spread : (e,) counts, of E1 on; pdc : counts, or None"""
 
     counts: tuple[float, ...]
     spread: tuple[float, ...]
@@ -53,7 +53,7 @@ class PrepareOptions:
     smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
     polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
     rest : the unit's own, for raw recordings that hold no calm part near it
-    film : thickness of a raw recording's fluid film over a typical unit's; None: as rest and contacts show it
+    film : thickness of a raw recording's fluid film, divided by a typical unit's; None: as rest and contacts show it
     columns : which column of a CSV file is what, for those who read the recording; None: as its layout says
     """
 
@@ -99,8 +99,8 @@ class Signals:
     warnings : the recording's and those found here; doubts among them carry their reason, see `doubt`
     report : what was found and done, fit for JSON
     sensor : whose signals; shapes above say 19, as of a BioTac
-    film : thickness of the unit's film over a typical unit's, which the changes were converted from
-    stiffness : of the unit's skin over a typical one's; force and pressure are larger by it"""
+    film : thickness of the unit's film, divided by a typical unit's, which the changes were converted from
+    stiffness : of the unit's skin, divided by a typical one's; force and pressure are to be multiplied by it"""
 
     change: np.ndarray
     rest: np.ndarray

@@ -32,7 +32,7 @@ _MARGIN = 20  # cells of rest round the lattice, so that opposite rims do not me
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """Return positions (T, 2) = (x, z) m on the resting gel of places (T, 2) of a latent, bilinearly."""
+    """Return positions (T, 2) = (x, z) m on the resting gel, bilinearly; place : (T, 2), of ``ContactFrame.place``"""
     return between_nodes(_grid(frame.sensor, frame.rows, frame.columns), place)
 
 
@@ -52,7 +52,7 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel have rim places."""
+    """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel get its rim's places."""
     grid = _grid(frame.sensor, frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)

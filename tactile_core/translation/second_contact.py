@@ -20,8 +20,9 @@ PARTED = 0.25  # of the signal's length, the unit of half the difference between
 
 
 class SecondContact(NamedTuple):
-    """Second contacts in n of T frames.
-    skin : (n, N, 3) m; gel : (n, M, 3) m; predicted : changes (n, e) counts; center : (T, 2) m; force : (T, 3) N"""
+    """Second contacts in n of T frames. rows : (n,), which frames
+    skin, gel : (n, N, 3), (n, M, 3) m, displacements; predicted : (n, e) counts, the electrodes' changes under them
+    center : (T, 2) m on the gel, NaN without; force : (T, 3) N, zero without"""
 
     rows: np.ndarray
     skin: np.ndarray

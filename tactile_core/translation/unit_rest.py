@@ -36,7 +36,7 @@ class UnitRest:
         middle half)
     pdc : counts, None where the recordings have none
     recordings : number that rest was averaged over, 0 for a recording of the rest itself
-    film : thickness over a typical unit's, None where it was not looked for"""
+    film : thickness, divided by a typical unit's, None where it was not looked for"""
 
     counts: np.ndarray
     spread: np.ndarray

@@ -65,7 +65,7 @@ class Choice(NamedTuple):
 
 
 def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> Learned:
-    """Kernel ridge regression on samples and their mirror images."""
+    """Fit a correction to samples and their mirror images, by kernel ridge regression with the three ``choices``."""
     x = np.concatenate([known.x, known.x * MIRRORED])
     fields = np.concatenate([known.fields, mirrored(known.fields)])
     log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)

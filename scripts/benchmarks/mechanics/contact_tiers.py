@@ -32,7 +32,7 @@ Bin = dict[str, float | int]
 class Miss:
     """Error of one contact against the truth at the same depth.
 
-    press : of contacts that follow each other, none in two; share : depth from first touch over the thickness there
+    press : number of the press that the contact belongs to; share : depth from first touch over the thickness there
     shape : rms m over nodes that truly move more than 10 um; force : relative; baseline : rms m of no displacement
     """
 
@@ -52,7 +52,10 @@ def miss(press: int, share: float, found: np.ndarray, force: float, true: np.nda
 
 
 def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
-    """The fast tier at the depths of a scene's contacts that the full tier solved with friction, where it settles."""
+    """Yield the fast tier's errors at the depths of contacts that the full tier solved with friction, if it converges.
+
+    pairs : those contacts, of presses of the scene
+    """
     for press in np.unique(pairs.press):
         rows = np.flatnonzero(pairs.press == press)
         indenter = scene.indenters[int(pairs.indenter[rows[0]])].build()

@@ -59,7 +59,7 @@ def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Volume at depth, pressed and pumped up."""
+    """Yield relative errors of a full cavity's volume under a ball, and the ball's force over that on an empty one."""
     mesh, cavity = hollow()
     rest = cavity.volume(mesh.nodes)
     empty, lost = pressed(full=False)

@@ -26,7 +26,7 @@ Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one way of calculating."""
+    """Measure a translation, ``name`` as "numpy_1": one of KINDS, and the number of frames in a call."""
     kind, batch = name.rsplit("_", 1)
     pairs = read_pairs(TEST_SET)
     if quick:
@@ -82,7 +82,7 @@ def _numpy_confidence() -> Surfaces:
 
 
 def plain_signals(change: Change) -> Any:
-    """Signals without a fault."""
+    """Return changes (T, 19) counts as signals of a tared recording without flags or warnings."""
     from tactile_core.recordings import Signals
 
     count = len(change)

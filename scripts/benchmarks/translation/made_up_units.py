@@ -54,7 +54,7 @@ OTHERS, CHECKED, EDGES, FEWEST = 64, 24, (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """A finger: its film's thickness, fluid's conductivity and skin's stiffness, each over a typical unit's."""
+    """A finger: its film's thickness, fluid's conductivity, skin's stiffness, each divided by a typical unit's."""
 
     film: float = 1.0
     conductivity: float = 1.0
@@ -208,7 +208,7 @@ def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSE
 
 
 def translated_contacts(network: Translator, made: Sequence[Played], taken: str) -> Translation:
-    """Translate the contacts of recordings, one after the other."""
+    """Translate the contacts of recordings, joined; taken : how their units are treated, a key of TAKEN"""
     answers = []
     for each in made:
         options, unit = TAKEN[taken](each.unit)

@@ -131,7 +131,7 @@ def louder(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let each reading lag: a tenth of all changes comes a second late (a skin that creeps)."""
+    """Let a tenth of all changes lag, with a time constant of 1 s (a skin that creeps)."""
     slow, late = electrodes[0].copy(), np.empty_like(electrodes)
     for frame, reading in enumerate(electrodes):
         slow += (reading - slow) / 100
@@ -170,12 +170,12 @@ def frozen(frames: int) -> Fault:
 
 
 def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Send each second row twice."""
+    """Put the row before in place of each second row (T, 19)."""
     return electrodes[np.arange(len(electrodes)) // 2 * 2]
 
 
 def bits(by: float) -> Fault:
-    """Read counts of another number of bits."""
+    """Return a fault: readings are ``by`` times as large, whole and clipped, as of another number of bits."""
     return lambda electrodes, rest, random: np.clip(np.floor(electrodes * by), 0, COUNT_MAX)
 
 

@@ -42,7 +42,7 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclass(frozen=True)
 class Asked:
-    """Options of a data set; layouts : names of ``export.layouts``; place : executor of tasks, by a job's folder
+    """Options of a data set; layouts : names of ``export.layouts``; place : job's folder -> executor of its tasks
     say : callback for sentences; bar : (name, unit) -> context of a callback (done, in all)"""
 
     layouts: Sequence[str]

@@ -199,8 +199,8 @@ def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
     """Do a whole job, yield its folder to be merged into `out`, and remove it after that.
-    place : executor, by the job's folder. Raises TactileError for the first task that failed, and as `begun` and `run`
-        do."""
+    place : function from the job's folder to the executor of tasks
+    Raises TactileError for the first task that failed, and as `begun` and `run` do."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)
         for name, why in sorted(done.aside.items()):

@@ -42,7 +42,7 @@ class BiotacSheet:
     wet : (k,) the sheet's nodes in the inner skin's surface
     sensing : (k,) which of ``sensing_points.sensing_nodes`` they are
     film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
-    unresolved : (e + 4,) what the grid is too coarse for: resistance of each electrode in a film of 1 m and 1 S/m
+    unresolved : (e + 4,) ohm that the grid is too coarse for, of each electrode in a film of 1 m and 1 S/m
     """
 
     fluid: FluidFilm

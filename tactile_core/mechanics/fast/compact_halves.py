@@ -34,7 +34,7 @@ class Segment(NamedTuple):
 
 
 class Basis(NamedTuple):
-    """Unknowns of a half: first the touched nodes' axes, then loads, then the other nodes' axes.
+    """Unknowns of one half's matrix: first the touched nodes' axes, then loads, then the other nodes' axes.
 
     touched : how many are axes of touched nodes; rows : how many are those or loads
     unknown : (n,) int, axis 3 i + k of the i-th kept node, or number of the load, of each
@@ -108,7 +108,7 @@ def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
 
 
 def _half(basis: Basis, matrix: np.ndarray) -> Half:
-    """Sort what the basis has in its own order."""
+    """Cut a half's matrix (rows, n), in the basis's order of unknowns, into its parts, in the order of their nodes."""
     touched, rows, unknown = basis.touched, basis.rows, basis.unknown
     surface = np.r_[:touched, rows : len(unknown)]
     columns = surface[np.argsort(unknown[surface])]

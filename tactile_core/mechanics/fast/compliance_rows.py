@@ -17,12 +17,12 @@ _INNER = 2**40  # more than a surface has degrees of freedom
 
 
 class Rows(Protocol):
-    """Compliance among points near an indenter: ``ComplianceRows`` of nodes, or of nodes and points between them."""
+    """Compliance among points near an indenter, numbered in ``near`` (n,): nodes, or nodes and points between them."""
 
     near: np.ndarray  # sorted numbers (n,) of the points
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among sorted, near numbers (k,)."""
+        """Return the compliance (3 k, 3 k) float32 m/N among the points of sorted numbers (k,), all in ``near``."""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""

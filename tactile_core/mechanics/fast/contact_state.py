@@ -29,7 +29,7 @@ class Contact:
     slipping : (k,) bool, nodes whose friction is spent; without friction all
     converged : whether it may be used; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
-    penetration : m, deepest place of a node in the indenter or of the inner skin in the core
+    penetration : m, the largest depth of a node in the indenter or of the inner skin in the core
     sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
     """
 
@@ -54,7 +54,7 @@ class Contact:
         return surface_motion(self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force)
 
     def at_depth(self, depth: float) -> Contact:
-        """Return the same contact with its depth, m, measured from another first touch."""
+        """Return the same contact with ``depth``, m, as its depth, counted from another first touch."""
         moved = dataclasses.replace(self, depth=depth)
         if "displacement" in vars(self):  # is known already, and does not depend on it
             vars(moved)["displacement"] = self.displacement
@@ -87,7 +87,7 @@ class Contact:
 
 
 def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
-    """Return the forces (k, 3) N across the normals (k, 3) there, over the whole force."""
+    """Return the norm of the forces' (k, 3) N parts across the normals (k, 3), over the size of the summed force."""
     size = np.linalg.norm(force.sum(axis=0))
     across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
     return float(np.linalg.norm(across) / size) if size else 0.0

@@ -94,7 +94,7 @@ class Learned:
 
 @dataclasses.dataclass(frozen=True)
 class Correction:
-    """Correction of one sensor: ``still`` without friction, ``rubbing`` with a coefficient of 0.78; else between."""
+    """Correction of one sensor, interpolated from ``still``, without friction, to ``rubbing``, coefficient 0.78."""
 
     still: Learned
     rubbing: Learned
@@ -104,7 +104,7 @@ class Correction:
         return float(np.exp(self._blend(features, Learned.log_factor)))
 
     def field(self, features: np.ndarray) -> np.ndarray:
-        """See ``Learned``."""
+        """Return the correction on the grid (g, 3), per metre of depth; features : (f,)"""
         return self._blend(features, Learned.field)
 
     def _blend(self, features: np.ndarray, of: Callable[[Learned, np.ndarray], _Answer]) -> _Answer:
@@ -231,7 +231,7 @@ def learned() -> dict[str, Correction]:
 
 @dataclasses.dataclass(frozen=True)
 class Corrected:
-    """A fast contact with its correction. displacement : (n, 3) m; factor : times all its forces."""
+    """Correction of a fast contact. displacement : (n, 3) m, corrected; factor : by which to multiply its forces"""
 
     displacement: np.ndarray
     factor: float
@@ -246,7 +246,7 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
 
 
 def correct(compliance: Compliance, contact: Contact) -> Corrected:
-    """Correct a fast contact to what the full tier gives at the same depth; as it is where no correction ships."""
+    """Correct a fast contact to the full tier's result at the same depth; unchanged where no correction ships."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return Corrected(contact.displacement, 1.0)

@@ -28,7 +28,8 @@ WAVERS = 2  # times that a node has stuck again before it may pass its limit by 
 
 
 class Law(NamedTuple):
-    """Coulomb's coefficient; spare : N, by which a wavering node may pass its limit; gap_tolerance : m."""
+    """Coulomb's law. friction : its coefficient; gap_tolerance : m, of touching points
+    spare : N of friction by which a node that keeps changing between stick and slip may pass its limit"""
 
     friction: float
     spare: float
@@ -55,7 +56,7 @@ class Points(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of nodes to where a step begins. moves : (k, 3) m; slip : (k, 3) m, from the spots; gap : (k,) m, then."""
+    """Motion of nodes to where a step begins, (k, 3) m. slip : (k, 3) m, then, from the spots; gap : (k,) m, then."""
 
     moves: np.ndarray
     slip: np.ndarray

@@ -35,7 +35,7 @@ _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A sensor's solid with all that a contact on it needs; ``graded`` knows the way to the lattice's nodes."""
+    """A sensor's solid with all that a contact on it needs; ``graded`` interpolates to the lattice's nodes."""
 
     sensor: Sensor
     tier: Literal["full", "reference"]

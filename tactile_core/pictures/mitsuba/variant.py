@@ -62,7 +62,8 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """Return the ``cheapest`` preset for a variant (None: the one that works here); without Mitsuba as without LLVM."""
+    """Return the ``cheapest`` preset for an error, grey levels, by a variant; None: the one that works here, or that
+    without LLVM where Mitsuba is missing."""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:

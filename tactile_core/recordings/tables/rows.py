@@ -21,7 +21,7 @@ def is_row(line: str, header: Header) -> bool:
 
 
 def clean(rows: list[str], header: Header) -> np.ndarray | None:
-    """Parse rows of finite numbers alone by numpy's reader, in a tenth of the time; None if any cell is none."""
+    """Parse rows to (n, columns), ten times as fast as `row` does; None if any cell is no finite number."""
     trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
     if not all(map(str.strip, trimmed)):
         return None

@@ -57,9 +57,9 @@ NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another u
 
 @dataclass(frozen=True)
 class Film:
-    """Film of the unit that made a recording.
-    thickness : over a typical unit's; evidence : for it, in words
-    conductivity : (P,) log of the fluid's over that at rest, at rising frames (P,); linear between them
+    """Fluid film of the unit that made a recording.
+    thickness : divided by a typical unit's; evidence : for it, in words
+    conductivity : (P,) log of the fluid's, divided by that at rest, at rising frames (P,); linear between them
     sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves
     unsure : true if it may be a typical film over another fluid: neither the user nor the fluid's pressure decides"""
 
@@ -108,7 +108,7 @@ class Film:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings, in words, of changes taken for none and of a film that may be another."""
+        """Warnings for the user: changes so small that all were taken for drift; a film that may be misjudged."""
         found = [TOO_SMALL] if self.idle else []
         return [*found, UNSURE.format(self.thickness, 1 / self.thickness)] if self.unsure else found
 
