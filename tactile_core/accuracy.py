@@ -127,7 +127,7 @@ def row(
 
 
 def line(row: Row) -> str:
-    """Format a row as a line of the table."""
+    """Return a row as a line of a Markdown table: name, value, unit, target, baseline, set, and "ok" or "MISSED"."""
     mark = {None: "", True: "ok", False: "MISSED"}[row["ok"]]
     cells = [row["name"], row["value"], row["unit"], row["target"], row["baseline"], row["set"], mark]
     return "| " + " | ".join("" if cell is None else str(cell) for cell in cells) + " |"

@@ -109,7 +109,7 @@ def draw(
     stopped: Callable[[], bool],
     better: Callable[[np.ndarray], None],
 ) -> np.ndarray:
-    """Draw by a worker that lives on for the next picture of the preset; see ``Tracer.draw``."""
+    """Draw a picture (H, W, 3) uint8 by a preset's worker, which stays for the next one; see ``Tracer.draw``."""
     global _last_used
     with _in_use:
         if preset not in _kept:

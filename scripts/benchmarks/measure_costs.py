@@ -81,7 +81,7 @@ def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
 
 
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
-    """Measure `tactile simulate --keep`."""
+    """Measure the cost of `tactile simulate --keep`; force : N, of the ball on its way"""
     costs, sizes = [], []
     scene, out = folder / "scene", folder / "out.h5"
     scene.mkdir(exist_ok=True)
@@ -126,7 +126,7 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
 
 
 def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
-    """Make three rows a part."""
+    """Return two rows a part, ms a frame and MB, and a row for each time of a full tier's contact, ms."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))

@@ -120,7 +120,10 @@ def working_variants() -> list[str]:
 
 
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
-    """Rows of every preset's error, from converged direct light and the full model; baseline: the background alone."""
+    """Yield every preset's error on heights (H, W) m, against converged direct light and the full model ``truth``.
+
+    baseline : of the rows, the background alone
+    """
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
     of, levels, spread = (
         f"{len(heights)} fields",
@@ -168,7 +171,7 @@ def converge(
 
 
 def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
-    """Root mean square of all numbers, or of their differences."""
+    """Root mean square of all numbers of pictures, or of their differences from others of the same shapes."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
 
@@ -182,7 +185,7 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """CPU ms of a frame on one thread, after one that compiles: the median over fields of the best of a few."""
+    """Row of a preset's CPU ms a frame on one thread: median over heights (H, W) m of the best of a few calls."""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
     slow = name == REFERENCE.name
@@ -197,7 +200,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
-    """Return the least CPU time, ms: other programs on the machine make it longer, through caches that they empty."""
+    """Return the least CPU time, ms, of drawing heights (H, W) m: other programs, which empty caches, lengthen it."""
     spent = []
     for _ in range(repeats):
         start = time.process_time()

@@ -28,7 +28,8 @@ def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
-    """Read all arrays, or those named in `names`, or some of their rows. Raises TactileError for a damaged file."""
+    """Read arrays by name: all, or those in `names`, and of each all rows, or those that `rows`, an index, selects.
+    Raises TactileError for a damaged file."""
     import h5py
 
     found: dict[str, np.ndarray] = {}

@@ -38,7 +38,7 @@ def needing(extra: str) -> Iterator[None]:
 
 
 def require(extra: str, library: str) -> None:
-    """Raise that error before any work where a library of the extra is missing."""
+    """Raise ModuleNotFoundError, with how to install the extra, where its ``library`` is missing; imports nothing."""
     with needing(extra):
         if find_spec(library) is None:
             raise ModuleNotFoundError(f"No module named {library!r}", name=library)

@@ -49,7 +49,7 @@ class ConversionReport:
         self._shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def take(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Add the arrays of some frames."""
+        """Add the arrays, by the names of frames.h5, of rising frames (n,)."""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
         self._pressure.append(arrays["pressure"])

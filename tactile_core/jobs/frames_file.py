@@ -165,7 +165,7 @@ class FramesFile:
         self._disk.check()
 
     def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
-        """Write frames from `start` on, without arrays that are not kept. Floats become float32."""
+        """Write arrays (n, ...) of frames from `start` on, those that are kept. Floats become float32."""
         with self._checked():
             for name, array in arrays.items():
                 if name in self._about:

@@ -154,7 +154,7 @@ class _Trial:
 
 
 def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> BodyContact:
-    """Find the contact of a BioTac's skin: the most likely of `likely_contacts`.
+    """Find the contact of a BioTac's skin displaced by (3650, 3) m: the most likely of `likely_contacts`.
 
     >>> contact = skin_contact(displacement, [tactile.indenters.Sphere(2e-3)])
     >>> gel = contact.on_gel().displacement

@@ -161,9 +161,9 @@ def disc_tables() -> tuple[np.ndarray, np.ndarray]:
 
 
 def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the visible area, and its upward moment, of a unit disc cut by a horizon `sight` (t) below its centre,
-    both over the disc's area (circular segment): 1/2 + (t sqrt(1 - t^2) + asin t) / pi, and 2 (1 - t^2)^(3/2) / (3
-    pi)."""
+    """Return the visible area (...), and its upward moment (...), of a unit disc cut by a horizon `sight` t (...) below
+    its centre, both divided by the disc's area (circular segment): 1/2 + (t sqrt(1 - t^2) + asin t) / pi, and
+    2 (1 - t^2)^(3/2) / (3 pi)."""
     share, moment = disc_tables()
     place = ((sight + 1) * (_TABLE_STEPS / 2)).astype(np.intp)
     return share.take(place), moment.take(place)

@@ -93,7 +93,7 @@ class HeightMapper:
         return maps
 
     def covers(self, x: np.ndarray, z: np.ndarray) -> bool:
-        """Return true if all places x, z m lie on the even part of the resting surface."""
+        """Return true if all places x, z (n,) m lie on the even part of the resting surface."""
         ends = ((spline.nodes[0], spline.nodes[-1]) for spline in (self.along, self.across))
         return all(low <= place.min() and place.max() <= high for place, (low, high) in zip((x, z), ends, strict=True))
 

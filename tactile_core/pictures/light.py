@@ -93,7 +93,7 @@ def lambert(surface: Surface, positions: np.ndarray) -> Lit:
 
 
 def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
-    """Return strength facing / (length square^1.5), the light of one LED; strength : m2, its |l|^2 in ``lambert``"""
+    """Return strength facing / (length square^1.5), one LED's light (H, W), as ``Lit`` names; strength : m2, |l|^2"""
     return facing / (square * np.sqrt(square) * length) * strength
 
 

@@ -160,7 +160,7 @@ def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[
 
 
 def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that samples maps of ``shape`` at fractional rows and columns, bilinearly; edges continue."""
+    """Return a function that samples maps of ``shape`` (H, W) bilinearly at fractional row, column (n,); edges held."""
     row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
     return lambda values: bilinear(values, row, column)
 

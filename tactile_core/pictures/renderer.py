@@ -205,7 +205,7 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Convert values to float32. Raises TactileError, with their name, for another shape or non-finite values."""
+    """Return values as float32. Raises TactileError, with ``name``, for another ``shape`` or values not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")

@@ -20,7 +20,7 @@ from .signals import EVERY, FRAMEWISE, PrepareOptions, Signals
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
     """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
-    frames : those whose signals are returned; all frames of the recording decide the result"""
+    frames : (n,) or slice, whose signals are returned; all frames of the recording decide the result"""
     options = options or PrepareOptions()
     options.check()
     check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)

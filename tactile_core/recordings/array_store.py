@@ -66,7 +66,7 @@ class Store:
         return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
-        """Read the array as floats; None in shape allows any length. Raises TactileError for anything wrong."""
+        """Read an array as ``dtype``; shape : expected, None for any length. Raises TactileError for anything wrong."""
         where = f"{self.path}, {name}"
         if name not in self.shapes:
             raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")
@@ -88,7 +88,7 @@ class Store:
         return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Read the array, or return None where the file does not hold it."""
+        """Read an array as `array` does; return None where the file does not hold it."""
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:

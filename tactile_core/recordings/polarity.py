@@ -167,7 +167,7 @@ def touching(change: Framewise) -> np.ndarray:
 
 
 def spread_out(count: int, most: int) -> np.ndarray:
-    """Return at most ``most`` indices out of ``count``, evenly spread."""
+    """Return indices (n,) of at most ``most`` out of ``count`` things, evenly spread."""
     return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 

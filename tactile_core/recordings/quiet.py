@@ -95,7 +95,8 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
-    """Return the window for rest where nothing is quiet: that of lowest PDC or, without PDC, of least movement."""
+    """Return the window for rest where nothing is quiet: that of lowest PDC or, without PDC, of least movement.
+    electrodes : (T, 19), pdc : (T,) counts; rate : Hz"""
     n = min(window_frames(rate), len(electrodes))
     if pdc is not None and np.isfinite(pdc).all():
         start = int(np.argmin(_sums(pdc, n)))

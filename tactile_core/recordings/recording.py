@@ -45,7 +45,7 @@ class Truth(Summary):
     traction: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     def at(self, frames: np.ndarray) -> Truth:
-        """Return the values of some frames alone."""
+        """Return the values of frames (n,) alone."""
         held: dict[str, Any] = {name: value for name, value in vars(self).items() if value is not None}
         for name, value in held.items():
             arrays = isinstance(value, Mapping)

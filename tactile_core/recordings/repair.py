@@ -63,7 +63,7 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
 
 
 def is_time_series(glitches: np.ndarray) -> bool:
-    """Return false where so many frames look like glitches that the rows can be no time series."""
+    """Return false if so many frames hold glitches (T, C) bool that the rows can be no time series."""
     return not glitches.any() or float(glitches.any(axis=1).mean()) <= MAX_SHARE
 
 

@@ -117,7 +117,7 @@ class Signals:
     stiffness: float = 1.0
 
     def at(self, frames: np.ndarray | slice) -> Signals:
-        """Return the signals of some frames alone; rest and drift stay those of the recording."""
+        """Return the signals of frames (n,) alone; rest and drift stay those of the recording."""
         return replace(self, **{name: getattr(self, name)[frames] for name in FRAMEWISE})
 
     @property

@@ -88,7 +88,7 @@ def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def tell_rate(seconds: np.ndarray) -> list[str]:
-    """Return a sentence on frames much faster or slower than those that the filters were made for."""
+    """Return a sentence if frames at times (T,) s come much faster or slower than the filters were made for."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     if not len(forward):

@@ -51,12 +51,12 @@ def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarr
 
 
 def _film(counts: np.ndarray | float) -> np.ndarray:
-    """Return the film's impedance over the load; below 0 for counts that are higher than any film allows."""
+    """Return the film's impedance, divided by the load's; below 0 for counts higher than any film allows."""
     return COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES
 
 
 def film_impedance(counts: np.ndarray) -> np.ndarray:
-    """Return the impedance (..., 19) of the film over each electrode at counts (..., 19), over the load."""
+    """Return the impedance (..., 19) of the film over each electrode at counts (..., 19), divided by the load's."""
     return np.maximum(_film(counts), 1e-3)
 
 
@@ -65,7 +65,7 @@ def of_typical_film(
 ) -> np.ndarray:
     """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one with typical films.
 
-    thickness : of its films at rest, over a typical unit's; conductivity : its fluid's, over that at rest
+    thickness : of its films at rest, divided by a typical unit's; conductivity : its fluid's, divided by that at rest
     A movement u of the skin over a film h makes the impedance grow by g = h / (h - u); over a typical film of h /
     thickness the same u makes it grow by 1 / (1 - thickness (1 - 1 / g)), for each electrode by itself. Compared with
     the conducting sheet (111 simulated contacts), 7, 9, 12 and 14 % of the change remain as error at .8, .6, .45 and

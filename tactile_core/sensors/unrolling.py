@@ -38,7 +38,7 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def rolled_x(sensor: str) -> np.ndarray:
-    """Unrolled x (stations,) m: arc length along the pad's lowest line from the common point."""
+    """Unrolled x (stations,) m of a skin's stations: ``origin_x``, plus arc length from there along the lowest line."""
     skin = skin_of(sensor)
     origin = skin.descriptor.unrolling.origin_x
     line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles))]

@@ -29,8 +29,8 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping on
 def press_rows(
     scene: Scene, seed: int, press: int, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
-    """Return the contacts of one press: force grows by the scene's ratio until either sensor reaches its greatest
-    depth, or finds no further contact.
+    """Return the contacts of a press, each as ``pair_row`` has it: force grows by the scene's ratio until a sensor
+    reaches its greatest depth, or finds no further contact.
 
     Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
     with its slide, at the force it had reached, along the same path on both sensors. A scene with ``depth_steps`` pairs

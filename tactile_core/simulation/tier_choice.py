@@ -21,7 +21,8 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier for a bound; error : um rms that 95 of 100 contacts stay below; ms : a contact; share : reached depth"""
+    """Tier for a bound. error : um rms that 95 of 100 contacts stay below; ms : CPU time of a contact
+    share : depth that is reached, divided by the thickness"""
 
     tier: Tier
     error: float
@@ -29,7 +30,7 @@ class TierChoice(NamedTuple):
     share: float
 
     def describe(self, sensor: str) -> str:
-        """Explain the choice in words."""
+        """Return the choice for a sensor as a sentence: tier, depth, and the error there."""
         return (
             f"{title(sensor)}: {self.tier} tier, to {self.share:.0%} of the thickness within {self.error:.3g} um of "
             "the exact solution in 95 of 100 contacts"

@@ -124,7 +124,7 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Compute `Networks.signal_distance`'s inputs: training latents' mean and whitening, SVB's residuals."""
+    """Compute `Networks.signal_distance`'s tensors: training latents' mean (K,), whitening (K, K), SVB's residuals."""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)

@@ -69,7 +69,7 @@ class Model(nn.Module):
         return torch.cat([state[:, :PLACE], self.across(latent_source)[:, PLACE:]], -1)
 
     def back(self, latent_target: Tensor) -> Tensor:
-        """Map latent_target to latent_source."""
+        """Map latent_target (B, L') to latent_source (B, L)."""
         return self.D2BPN(self.MVD.placed(latent_target))
 
     def to_signal(self, latent_source: Tensor) -> Tensor:
@@ -103,7 +103,7 @@ class Stage:
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the noisy signal's reconstruction over its mean square, and KL."""
+    """Mean square error of the noisy signal's reconstruction, divided by its mean square, plus beta times KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
     change = signal[:, :-1]
@@ -112,21 +112,21 @@ def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def mvb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the BioTac's reconstructed displacement, and KL."""
+    """Error of the BioTac's reconstructed displacement, `SurfaceCodec.loss`, plus beta times the KL divergence."""
     latent, divergence = model.MVB.sample(batch.biotac, generator)
     return model.MVB.loss(latent, batch.rows) + options.beta * divergence
 
 
 def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the DIGIT's reconstructed displacement, and KL."""
+    """Error of the DIGIT's reconstructed displacement, `SurfaceCodec.loss`, plus beta times the KL divergence."""
     latent, divergence = model.MVD.sample(batch.digit, generator)
     return model.MVD.loss(latent, batch.rows) + options.beta * divergence
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Sum of the true contact's negative log likelihood, nats, and the errors of the BioTac's code and of SVB. (By
-    likelihood a contact is not estimated fainter than its signal makes it.) SVB trains along, to keep what separates
-    contacts."""
+    """Sum of the true contact's negative log likelihood, nats, `latent_loss` of the BioTac's latent, and `svb_loss`.
+    (By likelihood a contact is not estimated fainter than its signal makes it.) SVB trains along, to keep what
+    separates contacts."""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
     found, surprise = model.given(batch.signal, batch.state)
@@ -141,7 +141,8 @@ def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Mean square errors of place and code of latents (B, L), each over its mean square."""
+    """Weighted mean of two errors of latents (B, L): of their places and of the rest, the shape's code. Each is the
+    mean square error divided by the target's mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)

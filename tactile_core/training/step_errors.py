@@ -108,7 +108,7 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Return the largest node errors, m, of signal to BioTac mesh and to DIGIT mesh, and the error head's estimates.
+    """Return columns (B,): largest node errors, m, of BioTac and DIGIT meshes from signals, and the head's estimates.
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
@@ -161,7 +161,8 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
-    """Return the mean over depths of the mean over indenters of contacts' mean (or median); None without any."""
+    """Return the mean over bins of depth of the mean over indenters of the mean (or median) of values; None for none.
+    values : (C,), NaN left out; depth : (C,) m; indenter : (C,) numbers"""
     middle = np.median if median else np.mean
     bins = []
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):
@@ -209,7 +210,7 @@ def metric_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and mask over ``rows`` of each subset that has rows of its own: light, by depth, deeper, sliding."""
+    """Yield name and mask (C,) over ``rows`` (C,) of each subset with rows of its own: light, by depth, sliding ..."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -57,7 +57,7 @@ class Evidence(Posterior):
     second: np.ndarray
 
     def at(self, frames: slice | np.ndarray) -> Evidence:
-        """Return the evidence of some frames alone."""
+        """Return the evidence of frames (n,) alone."""
         return Evidence(**{name: values[frames] for name, values in vars(self).items()})
 
     @classmethod

@@ -36,7 +36,7 @@ DISTANCES = tuple(field.name for field in fields(SignalDistance))
 
 
 def compress(change: np.ndarray) -> np.ndarray:
-    """Convert counts to the networks' scale: arcsinh(change / 15 counts).
+    """Convert changes (...) counts to the networks' scale: arcsinh(change / 15 counts).
 
     A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
     variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one."""

@@ -38,7 +38,7 @@ class Known(NamedTuple):
     rubbing: np.ndarray
 
     def select_rows(self, which: np.ndarray) -> Known:
-        """Select some of the samples."""
+        """Return some of the samples; which : (n,) bool, or their numbers"""
         return Known(*(values[which] for values in self))
 
 

@@ -84,7 +84,10 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
 def paired(
     sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
 ) -> Iterator[Sample]:
-    """Solve a press in the fast tier at the full tier's depths; yield a sample of each contact that both tiers hold."""
+    """Solve a press in the fast tier at the full tier's depths; yield a sample of each contact that both tiers hold.
+
+    number : of the press; full : its contacts, as ``full_press`` returns them
+    """
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None

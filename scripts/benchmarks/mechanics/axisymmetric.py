@@ -50,7 +50,7 @@ class QuadMesh:
 def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
     """A disc bonded at y = 0 with its free side toward -y.
 
-    radii, heights : m, from 0, both of odd length
+    radii (n,), heights (m,) : m, of the nodes, from 0; n and m odd
     The second node of a row is moved outward by a tenth of its step: were it in the middle of its cell, a constant
     pressure would put no force on the node of the axis, contact would lose that node, and the cell would buckle.
     """

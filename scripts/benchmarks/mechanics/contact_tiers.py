@@ -128,7 +128,7 @@ class Truth:
 
 
 def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], seed: int) -> None:
-    """Contacts by sensor, each with number, share, displacement m, force N and seconds, as one file."""
+    """Write contacts by sensor, each with number, share, displacement (n, 3) m, force N and seconds, to one file."""
     arrays = {"seed": np.int64(seed)}
     for sensor, contacts in found.items():
         for name in ("number", "share", "force", "seconds"):

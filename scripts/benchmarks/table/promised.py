@@ -38,7 +38,7 @@ class Promise:
     of: str
 
     def covered(self, among: np.ndarray | None = None) -> float:
-        """Share of all, or of a mask's, that stayed below."""
+        """Share of all C, or of those that ``among`` (C,) bool marks, that stayed below their bounds."""
         held = self.found <= self.bound
         return float((held if among is None else held[among]).mean())
 

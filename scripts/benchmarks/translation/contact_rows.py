@@ -59,7 +59,7 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
 
 
 def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Depth of the gel's dent, place and silence where the same signals have lost their sign.
+    """Rows of the gel's depth, place and silence for signals read as ``change`` (C, 19) that have lost their sign.
 
     Over contacts that press without sliding; baseline of the depth: the true one, which a translation should reach.
     """
@@ -89,7 +89,8 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
 
 
 def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """Shares of true places in the posterior's regions, and its energy score beside those of single answers."""
+    """Shares of true places in the regions of posteriors for ``change`` (C, 19) counts, and their energy score beside
+    those of single answers."""
     true = np.concatenate([_true_place(nets, pairs, part) for part in parts(len(change))])
     posterior = nets.posterior(nets.encode_signal(change))
     drawn = draw_places(posterior, DRAWS, np.random.default_rng(0))

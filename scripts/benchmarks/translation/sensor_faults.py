@@ -117,21 +117,21 @@ def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray
 
 
 def swapped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Swap two electrodes' plugs."""
+    """Swap two of the electrodes (T, 19)."""
     two = _drawn(electrodes, random, 2)
     electrodes[:, two] = electrodes[:, two[::-1]]
     return electrodes
 
 
 def louder(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Double four electrodes' gains."""
+    """Double the changes of four of the electrodes (T, 19) from rest (19,)."""
     some = _drawn(electrodes, random, 4)
     electrodes[:, some] += electrodes[:, some] - rest[some]
     return electrodes
 
 
 def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let a tenth of all changes lag, with a time constant of 1 s (a skin that creeps)."""
+    """Let a tenth of all changes of electrodes (T, 19) lag, with a time constant of 1 s (a skin that creeps)."""
     slow, late = electrodes[0].copy(), np.empty_like(electrodes)
     for frame, reading in enumerate(electrodes):
         slow += (reading - slow) / 100
@@ -140,7 +140,7 @@ def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarra
 
 
 def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat."""
+    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat, to electrodes (T, 19)."""
     return electrodes + 5 * np.sin(2 * np.pi * 50 * np.arange(len(electrodes)) / 100.3)[:, None]
 
 
@@ -191,7 +191,7 @@ def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndar
 
 
 def inverted(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let counts rise where they should fall."""
+    """Mirror electrodes (T, 19) about rest (19,): counts rise where they should fall."""
     return 2 * rest - electrodes
 
 

@@ -110,6 +110,6 @@ def _row(
 
 
 def quantile(values: np.ndarray, level: int) -> float | None:
-    """Return the value that ``level`` per cent of values stay below; None where that is a lost contact's, infinity."""
+    """Return the ``level`` per cent quantile of values (n,) without NaN; None where it is infinite: a lost contact."""
     found = float(np.nanpercentile(values, level, method="higher"))
     return found if np.isfinite(found) else None

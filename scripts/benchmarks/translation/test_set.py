@@ -83,7 +83,8 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
 def expected_error_rows(
     translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
 ) -> list[Row]:
-    """Rank correlation of expected and true largest error, share below the bound, share flagged as out of range."""
+    """Rank correlation of expected and true largest error, share below the bound, share flagged as out of range.
+    rows : (C,) of the pairs; change : (C, 19) counts, their signals as read; name : of the set"""
     nets, silent = translator.nets, translator.silent("digit_m")
     columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))
     flagged = translator.out_of_range(change)

@@ -50,7 +50,8 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Optional library; module : to import; package : in the index; extra : of ours that brings it, or """ ""
+    """Optional library. module : to import; package : in the index; use : what needs it
+    extra : the one of this package's that brings it, or "" """
 
     module: str
     package: str

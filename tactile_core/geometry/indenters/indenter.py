@@ -108,7 +108,7 @@ class Pose:
 
     @property
     def own_direction(self) -> np.ndarray:
-        """Direction of motion in the indenter's own frame."""
+        """Unit vector (3,) of the motion in the indenter's own frame."""
         return _OWN_DOWN if self.push is None else self.push @ self.axes
 
     def moved(self, depth: float) -> Pose:

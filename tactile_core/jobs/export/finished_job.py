@@ -52,7 +52,7 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield all arrays, or all but some, in blocks of frames, always under the names of a BioTac and a DIGIT."""
+        """Yield blocks of frames: arrays (n, ...) by the names of a BioTac and a DIGIT; without : names to leave out"""
         import h5py
 
         for path in self.shards:

@@ -115,7 +115,7 @@ class UnitResiduals:
         self.gain = self._start_gain
 
     def unit(self, x: np.ndarray) -> Calibration:
-        """Return the calibration of x, with the gain of the last accepted cost."""
+        """Return the calibration of x (n,), with the gain of the last accepted cost."""
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
@@ -131,7 +131,7 @@ class UnitResiduals:
         return x[self._free.sum() :].reshape(-1, 3)
 
     def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares, with the best gain; infinity where a number is meaningless."""
+        """Return half the sum of squares at x (n,), with the best gain; infinity where a number is meaningless."""
         if not self._sensible(x):
             return np.inf
         try:
@@ -148,7 +148,7 @@ class UnitResiduals:
         return float(cost / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return x with the light through the coating at least 0, the nearest that ``cost`` takes."""
+        """Return the nearest x (n,) that ``cost`` takes: its light through the coating is at least 0."""
         least = np.full(len(x), -np.inf)
         least[: self._free.sum()][np.flatnonzero(self._free) == OBJECT_LIGHT] = 0
         return np.maximum(x, least)
@@ -200,7 +200,7 @@ class UnitResiduals:
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return Gauss-Newton's matrix and gradient over x with the gain eliminated (Schur's complement): A - sum over
+        """Return Gauss-Newton's matrix (n, n), gradient (n,) over x, gain eliminated (Schur's complement): A - sum over
         channels of B G^-1 B^T, A of x alone, G of the gain, B mixed. The gain's own gradient is zero at its optimum."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())

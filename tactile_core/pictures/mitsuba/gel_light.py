@@ -117,7 +117,7 @@ class GelLight:
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield what ``radiance`` returns; where paths are traced, before it the noisier mean after each pass."""
+        """Yield what ``radiance`` returns, (H, W, LED); of traced paths the noisier mean after each pass first."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)

@@ -31,7 +31,7 @@ def air_over_window(camera: Camera, index: float) -> float:
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
-    """Return the pinhole's apparent height, m above height zero, for pixels that look a distance, m, off its axis.
+    """Return the pinhole's apparent height (...), m over height zero, for pixels that look ``distance`` (...) m aside.
     Snell's law through a flat window. A camera nearer than its window is thick keeps its height."""
     air = air_over_window(camera, index)
     if air <= 0:

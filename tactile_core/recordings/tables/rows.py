@@ -80,7 +80,8 @@ def no_number(cell: str) -> str:
 
 
 def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """Return a sentence on blank lines between the header and the last row: a frame may be missing there."""
+    """Return a sentence, or none, on blank lines between header and last row, where frames may be missing.
+    rows : (T,) line of each frame"""
     count = int(rows[-1]) - header_line - len(rows)
     if count == 0:
         return ()
