@@ -18,7 +18,7 @@ _SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
 
 
 def to_blender(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """Convert sensor points or displacements (..., 3) m to float32 Blender units."""
+    """Convert sensor points or displacements (..., 3) m to float32 Blender units, ``per_metre`` in a metre."""
     return np.asarray(points, np.float32)[..., [0, 2, 1]] * (_SIGNS * np.float32(per_metre))
 
 

@@ -24,7 +24,7 @@ def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensors.SOURCE) -> bpy.types.Object:
-    """Add the resting outer skin of a sensor and return it."""
+    """Add the resting outer skin of a sensor and return it; per_metre : Blender units in a metre"""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} skin"
     skin = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)

@@ -121,6 +121,7 @@ def _power(led: Led, gel: bpy.types.Object) -> float:
 
 def watts_per_brightness(per_metre: float) -> float:
     """Blender's power, W, of a lamp of radiance x radius^2 = 1 level m^2, with which 255 levels render as white.
+    per_metre : Blender units in a metre
 
     A point lamp of power P lights a matte coating of albedo a at distance d to a P / (4 pi^2 d^2); the calibration's
     sphere of radiance L and radius r to a L r^2 / d^2 levels.

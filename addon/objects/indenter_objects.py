@@ -20,7 +20,8 @@ _LOWEST = 1e-7  # m: vertices this near to the lowest one belong to one flat, as
 
 
 def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bpy.types.Object:
-    """Add an object of a spec of ``indenter_specs`` and return it; its origin is where the body touches."""
+    """Add the object of a spec of ``indenter_specs``, whose origin is where the body touches, and return it.
+    per_metre : Blender units in a metre"""
     import msgspec
 
     from .indenter_shapes import shape_of

@@ -92,7 +92,7 @@ def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
 
 
 def play(thing: bpy.types.Object, file: Path, first: float, step: float) -> None:
-    """Let an object play a file from a frame of the scene on; step : frames of the scene a frame of the file."""
+    """Let an object play a file from the scene's frame ``first`` on; step : frames of the scene a frame of the file."""
     modifier = thing.modifiers.get("Tactile") or thing.modifiers.new("Tactile", "MESH_CACHE")
     thing.modifiers.move(list(thing.modifiers).index(modifier), 0)  # what it moves is what the others show
     modifier.cache_format = "PC2"

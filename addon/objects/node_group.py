@@ -42,7 +42,7 @@ class NodeGroup:
                         domain="POINT").outputs[0]  # fmt: skip
 
     def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
-        """Add an input of the group that users change in the modifier."""
+        """Add an input of the group that users change in the modifier; text : what it is; least : its lower limit"""
         item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
         item.description = text
         if value is not None:

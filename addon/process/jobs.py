@@ -60,7 +60,7 @@ class Job:
             self._process.stdin.flush()
 
     def poll(self, wait: float = 0.0) -> bool:
-        """Take in what the worker has said; returns true if it is over. Raises TactileError when it failed."""
+        """Take in what the worker has said, waiting up to ``wait`` s; true if it is over. TactileError if it failed."""
         error = None
         for message in self._messages(wait):
             error = message.get("error", error)

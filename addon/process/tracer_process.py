@@ -125,7 +125,7 @@ def draw(
 
 
 def prepare(preset: str, unit: Calibration, around: Surroundings) -> None:
-    """Start the worker of a preset, which lives on for its first picture; not while another draws."""
+    """Start a preset's worker, get it ready for its first picture and end others; do nothing while one draws."""
     global _last_used
     if preset in _kept or not _in_use.acquire(blocking=False):
         return

@@ -162,7 +162,7 @@ def role_of(sensor: str) -> str:
 
 
 def sensor_items(gels_only: bool = False) -> list[tuple[str, str, str]]:
-    """List the sensors with a descriptor for a menu, the usual pair first."""
+    """List the sensors with a descriptor, or their gels alone, for a menu, the usual pair first."""
     return _items(descriptor.names(), gels_only)
 
 

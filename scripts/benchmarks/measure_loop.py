@@ -183,7 +183,7 @@ def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
 
 
 def gel_steps(count: int) -> Times:
-    """Time whole steps of a ``Gel`` along paths, with their pictures."""
+    """Time whole steps of a ``Gel``, with their pictures, along paths to ``count`` contacts."""
     times: Times = []
     for number, contact in enumerate(random_contacts(-(-count // STEPS) + WARM, SEED)):
         gel = Gel("digit", contact.indenter)

@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
-    """Yield all rows; errors are measured with the faster variant, and once between the variants."""
+    """Yield all rows, on ``count`` fields; errors are of the faster variant, and once between the variants."""
     heights = fields(unit, count)
     variants = working_variants()
     best = variants[0]
@@ -92,7 +92,7 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
-    """Height maps (H, W) m of random contacts in the picture, up to ``DEEPEST`` deep, solved by the fast tier."""
+    """``count`` height maps (H, W) m of random contacts in the picture, up to ``DEEPEST`` deep, by the fast tier."""
     camera, found = unit.camera, []
     for contact in random_contacts(40 * count, seed):
         row, column = camera.to_pixel(contact.place.x, contact.place.z)
@@ -200,7 +200,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
-    """Return the least CPU time, ms, of drawing heights (H, W) m: other programs, which empty caches, lengthen it."""
+    """Return the least CPU time, ms, of ``repeats`` drawings of heights (H, W) m: other programs only lengthen it."""
     spent = []
     for _ in range(repeats):
         start = time.process_time()

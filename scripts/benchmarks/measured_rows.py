@@ -74,7 +74,7 @@ def renew_tables(page: Path, tables: dict[str, list[str]]) -> None:
 
 
 def short(value: float | None) -> str:
-    """Format with two digits, hundreds whole."""
+    """Format a value with two digits, from 10 on without decimals; "-" for None."""
     return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 

@@ -79,7 +79,7 @@ def duration(seconds: float) -> str:
 
 
 def agree(cost: str, seconds: float, agreed: bool) -> None:
-    """Print a cost; ask to begin where it takes long, unless `agreed`. Raises TactileError without consent."""
+    """Print a cost; ask to begin if it takes many `seconds`, unless `agreed`. Raises TactileError without consent."""
     say(cost)
     if agreed or seconds <= LONG:
         return

@@ -77,7 +77,8 @@ def measured() -> dict[str, Any]:
 
 
 def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
-    """Return the shape error, m rms, and relative force error of 95 of 100 contacts at a depth over thickness.
+    """Return the shape error, m rms, and relative force error that 95 of 100 contacts stay below at a depth.
+    share : the depth, divided by the thickness
 
     The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
     NaN for a sensor whose errors nobody has measured.

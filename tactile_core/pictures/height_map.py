@@ -38,7 +38,7 @@ SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area
 
 @contextlib.contextmanager
 def folds_counted() -> Iterator[list[int]]:
-    """Count folds, place by place, for each map made inside the block, in place of a log entry."""
+    """Yield a list that takes, of each map made inside the block, how many places are folded; these are not logged."""
     folded: list[int] = []
     token = _folded.set(folded)
     try:

@@ -26,7 +26,8 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file; shapes : as declared; attributes : of its root; taken : names already used"""
+    """Named arrays of an open file. shapes : name -> shape and type, as declared; load, load_rows : read one, or rows
+    attributes, attributes_of : of the root, of an array; taken : names of arrays that a reader has used"""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]

@@ -28,7 +28,8 @@ SHOWN = 8  # problems spelled out one by one; more are counted
 
 @dataclass(frozen=True)
 class Problem:
-    """Unreadable place in a file: frame index, line, column; essential : true for an electrode or the time."""
+    """Unreadable place in a file. frame : its index; row : its line; field : the column; found : what is there
+    essential : true for an electrode or the time"""
 
     frame: int
     row: int

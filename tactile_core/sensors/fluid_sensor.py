@@ -73,7 +73,8 @@ class Core:
 
 @dataclasses.dataclass(frozen=True)
 class SkinLattice:
-    """Node intervals of the skin's surface: along a meridian, and round the axis."""
+    """Numbers of node intervals of the skin's surface: along a meridian over tip, trunk and base; round the axis over
+    pad and back."""
 
     tip_rows: int = number(above=1, below=MOST_NODES)
     trunk_rows: int = number(above=1, below=MOST_NODES)
@@ -109,7 +110,8 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """Voltage dividers and a converter. polarity : falls or rises, as a film thins; pressure : Pa a count"""
+    """Voltage dividers and a converter. bits : of a count; rate : Hz; load : ohm, of a divider; pressure : Pa a count
+    polarity : whether counts fall or rise as a film thins"""
 
     bits: int = number(above=0, below=32)
     rate: float = number("hz", above=0)

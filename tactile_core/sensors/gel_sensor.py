@@ -15,8 +15,8 @@ ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex t
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The outline on the plane, symmetric in z, m. tip : half circle (round) or square; corner_radius : of square
-    ends"""
+    """The outline on the plane, m, from x = tip_x to base_x and |z| up to half_width. tip : half circle (round) or
+    square; corner_radius : of square ends"""
 
     half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     tip_x: float = number("mm")
@@ -27,8 +27,8 @@ class Outline:
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A gel between its surface and flat, bonded back; m. thickness : at the apex; edge_drop, edge_width : of its
-    edges"""
+    """A gel between its surface and a flat back at y = back_y, bonded; m. thickness : at the apex
+    edge_drop, edge_width : how far its surface falls toward the outline, and over what width"""
 
     back_y: float = number("mm")
     thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
@@ -50,7 +50,8 @@ class Dome:
 
 @dataclasses.dataclass(frozen=True)
 class GelLattice:
-    """Nodes of a gel's surface: an even window, m, and the number of nodes from its edges to the outline."""
+    """Nodes of a gel's surface. window_x, window_z : m, ends of the part with even steps; window_nodes : along x and z
+    rim_tip, rim_base, rim_side : number of nodes from the window's edges to the outline"""
 
     window_x: tuple[float, float] = number("mm")
     window_z: tuple[float, float] = number("mm")

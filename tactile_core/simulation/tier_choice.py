@@ -56,7 +56,8 @@ def _up_to(tier: str, sensor: str, share: float) -> float:
 
 
 def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
-    """Choose the cheapest tier within a bound, um; fast without one. Raises TactileError where none is."""
+    """Choose the cheapest tier within a bound, um, for presses up to a share of the thickness; fast without a bound.
+    Raises TactileError where none is within it."""
     rows = tier_errors(sensor, share)
     what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
     found = rows[0] if bound is None else cheapest(rows, bound, "um", what)

@@ -40,7 +40,7 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks on the test presses, with the training's noise on the signals."""
+    """The exported networks on the test presses, with the training's noise on the signals; rows : (C,) contacts"""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
         self.networks, self.contacts, self.bodies, self.seed = networks, contacts, bodies, seed
@@ -48,7 +48,7 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """Return signals (C, 19) counts as a sensor reads them, with their sign."""
+        """Return signed signals (C, 19) counts of contacts ``rows`` (C,) as a sensor reads them; stream : of noise"""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 

@@ -55,7 +55,7 @@ def _rms(values: np.ndarray) -> np.ndarray:
 
 
 def parts(count: int) -> list[slice]:
-    """Yield slices of at most ROWS contacts."""
+    """Return slices that cut ``count`` contacts into parts of at most ROWS."""
     return [slice(start, start + ROWS) for start in range(0, count, ROWS)]
 
 

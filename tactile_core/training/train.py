@@ -230,7 +230,8 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for one pass over the data; returns the mean loss. The rate rises at first, then falls as a cosine."""
+    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss. The rate rises up to ``rate`` at
+    first, then falls as a cosine."""
     total = 0.0
     for step, loss in enumerate(losses):
         share = (epoch * len(losses) + step + 1) / (epochs * len(losses))
@@ -248,7 +249,7 @@ def train_epoch(
 
 
 def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: int) -> float:
-    """Compute the stage's loss on the validation presses, with the same noise in every epoch."""
+    """Compute the mean loss of a stage, number ``index``, on the validation presses, with the same noise every time."""
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)

@@ -80,7 +80,7 @@ def card_entry(card: dict, net: str, path: Path) -> dict:
 
 
 def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = ELECTRODES) -> None:
-    """Check that the networks fit together: each latent's size is the same in all networks that share it."""
+    """Raise TactileError unless networks fit together: a latent's size is the same in all networks that share it."""
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),

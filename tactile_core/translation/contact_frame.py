@@ -122,7 +122,8 @@ class ContactFrame:
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:
-    """Return the moving frame of a sensor's surface; the nodes of a skin are rotated by their angle about its axis."""
+    """Return the moving frame of a sensor's surface, its window ``half`` cells to each side. A skin's nodes are rotated
+    by their angle about its axis."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):

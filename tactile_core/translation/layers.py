@@ -78,7 +78,7 @@ def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Apply a residual MLP with a linear skip, (T, inputs) to (T, outputs); see docs/sources.md, Networks."""
+    """Apply a residual MLP of ``blocks`` and a linear skip, (T, inputs) to (T, outputs); docs/sources.md, Networks."""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")

@@ -38,7 +38,7 @@ class ReferenceSignals:
     bias_rectified: np.ndarray
 
     def bias(self, rectified: bool) -> np.ndarray:
-        """Return the log gain (19,) to subtract from a match."""
+        """Return the log gain (19,) to subtract from a match of rectified, or of signed, readings."""
         return self.bias_rectified if rectified else self.bias_signed
 
 

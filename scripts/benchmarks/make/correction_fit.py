@@ -29,7 +29,8 @@ WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
 
 
 class Known(NamedTuple):
-    """Samples: features x (n, f), log force ratios (n,), fields (n, g, 3), folds (n,); rubbing (n,), with friction"""
+    """n samples. x : (n, f) features; log_ratio : (n,) of the full tier's force to the fast one's
+    fields : (n, g, 3), see ``Learned``; fold : (n,) in which it is held out; rubbing : (n,) bool, with friction"""
 
     x: np.ndarray
     log_ratio: np.ndarray

@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write(path: Path, solid: compliance.Solid, even: Half, odd: Half, step: float) -> None:
-    """Pack the halves of a solid into a file."""
+    """Pack the halves of a solid into a file; step : m/N, to which their entries are rounded"""
     import h5py
 
     basis = basis_of(solid, even, step)

@@ -164,7 +164,8 @@ _TOLERANCE = Tolerance(gap=1e-9, balance=1e-8, step=1e-13)
 def disc_mesh(
     radius: float, thickness: float, reach: float, spacing: float, fine_depth: float, growth: float = 1.1
 ) -> QuadMesh:
-    """Nodes ``spacing`` m apart out to ``reach`` and down to ``fine_depth``, steps growing by ``growth`` beyond."""
+    """A disc of a radius and thickness, m: nodes ``spacing`` m apart out to ``reach`` and down to ``fine_depth``, steps
+    growing by ``growth`` beyond."""
     heights = thickness - graded(fine_depth, spacing, thickness, growth)[::-1]
     heights[0] = 0.0
     return disc(graded(reach, spacing, radius, growth), heights)

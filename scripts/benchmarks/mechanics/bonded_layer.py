@@ -15,9 +15,9 @@ GOLDEN_FORCE = {0.2e-3: 0.4176, 0.6e-3: 2.9513, 1.0e-3: 7.7420, 1.4e-3: 14.787, 
 def quarter_disc(
     radius: float, thickness: float, fine: float, intervals: tuple[int, int], layers: np.ndarray
 ) -> tuple[HexMesh, np.ndarray]:
-    """A quarter of a disc with an even grid near the middle, and its fixed degrees of freedom (3 n,) bool.
+    """A quarter of a disc of a radius and thickness, m, and its fixed degrees of freedom (3 n,) bool.
 
-    fine : m, side of the even part; intervals : node intervals inside and outside of it, both even
+    fine : m, side of the even grid in the middle; intervals : node intervals inside and outside of it, both even
     layers : (k,) 0 at the bonded back to 1 at the surface (-y), k odd
     The grid of the square is bent onto the disc by (u sqrt(1 - v^2 / 2), v sqrt(1 - u^2 / 2)).
     """
@@ -49,7 +49,8 @@ def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
 def exact_layer(
     depth: float, radius: float, thickness: float, youngs: float, poisson: float
 ) -> tuple[float, float, float]:
-    """Contact radius m, depth m and force N of a rigid paraboloid on a bonded layer, exact at small strain.
+    """Contact radius m, depth m and force N of a rigid paraboloid, of a tip's ``radius`` m, pressed to ``depth`` m into
+    a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
 
     With p = integral of phi(t) cos(xi t) the pressure's Hankel transform, the dual integral equations become
     pi/2 phi(x) - integral of K(x, t) phi(t) dt = E / (2 (1 - nu^2)) (d - x^2 / R), where phi vanishes at the contact's

@@ -47,7 +47,7 @@ def _outward(side: np.ndarray, nodes: np.ndarray, middle: np.ndarray) -> np.ndar
 
 
 def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
-    """A ball on the block, the cavity ``full`` of fluid or empty; also the cavity's volume, m3."""
+    """A ball on the block, its cavity ``full`` of fluid, ``pumped`` m3 added, or empty; also the cavity's volume."""
     mesh, cavity = hollow()
     ball = Sphere(2e-3)
     pose = pose_on(ball, np.array([_SIDE / 2, -_SIDE, _SIDE / 2]), np.array([0, -1.0, 0]))

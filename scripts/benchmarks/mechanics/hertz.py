@@ -23,7 +23,8 @@ _NODES = 50  # along the contact radius
 
 
 def force(depth: float, ball: float, youngs: float, poisson: float) -> float:
-    """Force, N, on a rigid ball on a half space. Johnson, Contact Mechanics, 1985, eq. 4.23."""
+    """Force, N, on a rigid ball of radius ``ball`` m, ``depth`` m in a half space; youngs : Pa. Johnson, Contact
+    Mechanics, 1985, eq. 4.23."""
     return 4 / 3 * youngs / (1 - poisson**2) * np.sqrt(ball) * depth**1.5
 
 

@@ -40,7 +40,7 @@ def as_line(method: Method) -> str:
 
 
 def short(value: float | None) -> str:
-    """Format with three digits, of the four that a row keeps."""
+    """Format a value with three digits, of the four that a row keeps."""
     if value is None:
         return ""
     kept = float(f"{value:.4g}")

@@ -61,14 +61,14 @@ class Promise:
 
 
 def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
-    """Rows, and the page's table."""
+    """Return the rows of all promises' coverage, and the page's table of it, its lines by heading."""
     promises = [*of_mechanics(quick), *of_translation(quick)]
     lines = [line for promise in promises for line in promise.lines()]
     return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
-    """The fast tier's shape and force."""
+    """Yield the promises on the fast tier's shape and force."""
     pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
@@ -94,7 +94,7 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
 
 
 def of_translation(quick: bool) -> Iterator[Promise]:
-    """The largest node error from signals."""
+    """Yield the promises on the largest node error of translations."""
     pairs, translator = read_pairs(TEST_SET), load_translator()
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))

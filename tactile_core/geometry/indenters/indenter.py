@@ -67,7 +67,7 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def check_length(kind: str, name: str, value: float) -> None:
-    """Raise TactileError for a length that is no number between 0.001 mm and 1 m."""
+    """Raise TactileError for a length ``value``, m, that is no number between 0.001 mm and 1 m; kind, name : whose"""
     if not (np.isfinite(value) and 1e-6 < value < 1.0):
         raise TactileError(
             f"{kind}, {name}",
@@ -116,7 +116,7 @@ class Pose:
         return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
-        """Return the pose after sliding, m, along the indenter's own x and y."""
+        """Return the pose after sliding by ``along`` and ``across``, m, the indenter's own x and y."""
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:

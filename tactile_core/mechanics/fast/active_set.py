@@ -33,7 +33,7 @@ class Work:
     left: float = np.inf
 
     def spend(self, unknowns: int, iterations: int) -> None:
-        """Take off what a solver has used."""
+        """Take off ``left`` what a solver of ``unknowns`` has used in its iterations."""
         self.left -= float(unknowns) ** 3 * iterations
 
     def check(self) -> None:

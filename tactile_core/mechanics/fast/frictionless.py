@@ -117,7 +117,8 @@ class Frictionless:
         self._probes = bool(probe.any())
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gaps (k,) m and normals (k, 3); at a crease's second face measured a little toward it."""
+        """Return gaps (k,) m and normals (k, 3) for displacements (k, 3) m and a shift of the indenter, m, along its
+        motion; at a crease's second face measured a little toward it."""
         points = self.rest + displacement
         there = self.pose.moved(shift) if shift else self.pose
         if not self._probes:

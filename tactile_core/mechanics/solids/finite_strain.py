@@ -240,7 +240,7 @@ class Linearised:
     """A solid's equations at one state, cell by cell, pressure eliminated.
 
     residual, condensed : (n_cells, 81) N, the second with the pressure's own residual carried over
-    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
+    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node); the last two arrays are ``pressure_step``'s
     """
 
     solid: FiniteStrainSolid

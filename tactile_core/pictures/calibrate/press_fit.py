@@ -87,7 +87,7 @@ class Sight:
         return seen - self.shown, slope
 
     def radius(self, common: float) -> float:
-        """Return the radius, m, of the photograph's own ball, else that of the whole set."""
+        """Return the radius, m, of the photograph's own ball, else ``common``, that of the whole set."""
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:

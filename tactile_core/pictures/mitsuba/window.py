@@ -26,7 +26,7 @@ def window_height(camera: Camera) -> float:
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Return the air, m, between window and pinhole with which that appears at the camera's height (Snell's law)."""
+    """Return the air, m, between window and pinhole that lets the pinhole appear at the camera's height (by Snell)."""
     return (camera.apparent_height - window_height(camera)) / index
 
 

@@ -35,7 +35,7 @@ class Match:
 
 
 def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float = PRIOR) -> Match:
-    """Match frames in contact to typical signals.
+    """Match frames in contact to typical signals. prior : contacts that a gain of 1 counts as
     change : (n, 19) counts, absolute where `rectified`; typical : (P, 19) counts, signed
     Rectified signals give no offset: it is folded away with the sign."""
     typical = np.abs(typical) if rectified else np.asarray(typical, np.float64)
