@@ -133,7 +133,7 @@ def _show(gel: bpy.types.Object, shown: digit_unit.ShownUnit, moved: np.ndarray,
 
 
 def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: bpy.types.Object) -> None:
-    """Show the fast picture of what an operator has made; why there is none is a warning, and the work is kept."""
+    """Show a gel's fast picture after an operator's work, which is kept where drawing fails: that is a warning."""
     try:
         view.show_picture(context, update(gel, context.evaluated_depsgraph_get()))
     except (TactileError, OSError) as error:

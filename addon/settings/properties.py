@@ -147,7 +147,7 @@ def set_up_part(thing: bpy.types.Object, parent: bpy.types.Object, role: str) ->
 
 
 def sensor_name(thing: bpy.types.Object) -> str:
-    """Name the sensor of a skin or a gel; those of former files are the BioTac's and the DIGIT's."""
+    """Return the sensor of a skin or a gel; an object of an older version names none: BioTac or DIGIT by its role."""
     return thing.tactile.sensor or OF_ROLE[thing.tactile.role]
 
 
@@ -221,7 +221,7 @@ def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
 
 
 def home_of(thing: bpy.types.Object) -> bpy.types.Collection:
-    """Return the collection that shows an object in a scene; those of light linking show none."""
+    """Return the collection that shows an object in a scene, not one that Blender keeps for light linking."""
     shown = {group for scene in bpy.data.scenes for group in (scene.collection, *scene.collection.children_recursive)}
     return next((group for group in thing.users_collection if group in shown), thing.users_collection[0])
 

@@ -51,7 +51,7 @@ def missing(*names: str) -> list[str]:
 
 
 def require(*names: str) -> None:
-    """Raise TactileError naming the modules that are not there."""
+    """Raise TactileError naming those of the modules that Blender's Python does not have."""
     lacking = missing(*names)
     if lacking:
         uses = ", ".join(dict.fromkeys(MODULES[name] for name in lacking))

@@ -75,7 +75,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def quantiles(times: Times) -> list[float]:
-    """Median, 95 and 99 % of CPU, then of wall ms."""
+    """Return median, 95 % and 99 % quantile of CPU ms, then the three of wall ms."""
     return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
 

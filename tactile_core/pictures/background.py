@@ -42,7 +42,7 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Mean and largest difference, grey levels, of a picture at rest (H, W, 3) from that of a radiance (H, W, 3)."""
+    """Mean and largest difference, levels, of a picture at rest (H, W, 3) from the one a radiance (H, W, 3) gives."""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 

@@ -85,7 +85,8 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Return the table of ``measure_presets.py``: in "presets", by name, ms by variant and error, grey levels."""
+    """Return the table of ``measure_presets.py``: in "presets", for each name, its ms by variant and its error in
+    grey levels."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 

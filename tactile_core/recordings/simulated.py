@@ -132,7 +132,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
 
 
 def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
-    """Read stamps (T,) s and true values of such a file, with electrodes or without. Raises TactileError."""
+    """Read times (T,) s and true values of a simulated recording, with electrodes or without. Raises TactileError."""
     with open_hdf5(os.fspath(path)) as store:
         if store.attributes.get("format") != FORMAT:
             raise TactileError(path, f"format {store.attributes.get('format')!r}", repr(FORMAT))

@@ -220,7 +220,8 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts 80/10/10 by press (C,), which keeps similar ones together. TactileError for under five presses."""
+    """Split contacts into 80 % training, 10 % validation, 10 % test by press (C,), which keeps similar ones together.
+    Raises TactileError, which names ``where``, for under five presses."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"

@@ -34,7 +34,7 @@ def main() -> int:
 
 
 def table(name: str = "biotac_sp") -> str:
-    """The table as text, of the thickness in the descriptor of a sensor that is there."""
+    """Return the table as text, with the skin's thickness and middle from the descriptor of sensor ``name``."""
     skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
     outer, core = 1e3 * RESTING, 1e3 * CORE

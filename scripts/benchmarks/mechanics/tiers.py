@@ -24,7 +24,7 @@ _DEPTHS = {"digit": (0.2, 0.4, 0.6, 0.8, 1.2), "biotac": (0.3, 0.6, 0.9, 1.2)}  
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """A 7 mm ball at one place of each sensor, without and (in the long form) with friction."""
+    """Yield tiers' errors and times under a 7 mm ball at one place, without and (in the long form) with friction."""
     for sensor in ("digit", "biotac"):
         depths = _DEPTHS[sensor][1:2] if quick else _DEPTHS[sensor]
         yield from _sensor(sensor, [1e-3 * d for d in depths], 0.0)
@@ -33,7 +33,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def thickness_of(sensor: Sensor) -> float:
-    """The thickness, m, under the ball."""
+    """Return the sensor's thickness, m, under this check's ball."""
     return thickness_under(sensor, _BALL, pose_at(sensor, _BALL, _PLACE))
 
 

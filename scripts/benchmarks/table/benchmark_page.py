@@ -107,7 +107,7 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def steps(front: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The front as a staircase: between two methods there is none."""
+    """Return the front's (time, error) with corners between, a staircase, as no method lies between two others."""
     corners = [front[0]]
     for point in front[1:]:
         corners += [(point[0], corners[-1][1]), point]

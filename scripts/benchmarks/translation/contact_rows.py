@@ -171,7 +171,7 @@ def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: s
 
 
 def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Error (C,) of gels (C, M, 3) m over that of no displacement, rms over nodes above a tenth of the peak."""
+    """Error (C,) of gels (C, M, 3) m, divided by that of no displacement, rms over nodes above a tenth of the peak."""
     size = accuracy.lengths(true)
     felt = size > FELT * size.max(1, keepdims=True)
     left, all_of_it = ((np.square(each) * felt).sum(1) for each in (accuracy.lengths(gel - true), size))

@@ -74,7 +74,7 @@ def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one of the electrodes (T, 19) read the same throughout, a count among those it has."""
+    """Let one of the electrodes (T, 19) read the same throughout, one of its own counts at random."""
     (one,) = _drawn(electrodes, random, 1)
     electrodes[:, one] = random.choice(electrodes[:, one])
     return electrodes
@@ -111,7 +111,7 @@ def noisy(count: int, counts: float) -> Fault:
 
 
 def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Clip the electrodes (T, 19), as an amplifier does that ends within their range, a third of it from below."""
+    """Clip each of the electrodes (T, 19) to the upper two thirds of its range, as too small an amplifier does."""
     low, high = electrodes.min(axis=0), electrodes.max(axis=0)
     return np.maximum(electrodes, low + (high - low) / 3)
 

@@ -56,7 +56,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, in the same order of components."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, with its arguments and order of components."""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

@@ -42,7 +42,7 @@ class Summary:
     told: dict[str, np.ndarray] = field(default_factory=dict)
 
     def numbers(self) -> dict[str, Any]:
-        """Return its numbers for a report; None for unknown ones."""
+        """Return the recording's name, part and frames, labels and shares, by name for a report; None if unknown."""
         known = {"touched": self.touched, "guesses": self.guesses, "explained": self.explained,
                  "confidence": self.confidence, "force_n": self.force}  # fmt: skip
         rounded = {name: round(value, 4) if np.isfinite(value) else None for name, value in known.items()}

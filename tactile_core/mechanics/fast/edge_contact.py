@@ -130,7 +130,7 @@ class EdgeContactProblem(ContactProblem):
 
 
 class InterpolatedPoints(NamedTuple):
-    """Points between nodes, as sums of 16; nodes : (v, 16), numbers among touchable ones; weights : (v, 16)"""
+    """v points between nodes, each a weighted sum of 16. nodes : (v, 16), touchable indices; weights : (v, 16)"""
 
     nodes: np.ndarray
     weights: np.ndarray

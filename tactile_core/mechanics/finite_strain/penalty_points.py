@@ -58,7 +58,7 @@ class Push:
         return loads
 
     def add_to(self, residual: np.ndarray, blocks: np.ndarray, pattern: BlockPattern) -> None:
-        """Load the nodes: residual (n, 3) N, and blocks (n_blocks, 3, 3) N/m on a solid's pattern, in place."""
+        """Subtract the loads from residual (n, 3) N, add their stiffness to blocks (n_blocks, 3, 3) N/m, in place."""
         residual -= self.loads(len(residual))
         pairs = (self.weights[:, :, None] * self.weights[:, None])[..., None, None] * self.stiffness[:, None, None]
         rows, columns = np.repeat(self.nodes, 9, axis=1), np.tile(self.nodes, 9)

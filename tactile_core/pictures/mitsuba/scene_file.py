@@ -43,7 +43,7 @@ _TAGS = {
 
 
 def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
-    """Return the three files of a scene, see above. Raises TactileError for another ending than .xml."""
+    """Return the paths of a scene's .xml, .ply and .camera.exr. Raises TactileError for another ending than .xml."""
     path = Path(path)
     if path.suffix != ".xml":
         raise TactileError(path, f"the ending {path.suffix!r}", "a name that ends in .xml")
