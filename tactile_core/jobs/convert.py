@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .. import recordings
 from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.presets import FAST
+from ..recordings import PrepareOptions, labels
 from ..sensors import SOURCE, TARGET
 from ..translation.answer import Answer
 from ..translation.translate import PreparedRows, load_translator
@@ -25,9 +27,8 @@ from .frame_pass import FramePass, Tools
 from .results import SOLVED, TRANSLATED, GelKind, frames_text, select
 
 if TYPE_CHECKING:
-    from ..recordings import PrepareOptions, Recording
+    from ..recordings import Recording
     from ..recordings.electrode_gains import SensorFile
-    from ..recordings.tables.column_map import ColumnMap
     from ..translation.translator import Translator
 
 
@@ -36,21 +37,14 @@ class Options:
     """Options of the conversion of a recording.
 
     frames : part of it, the same for every recording; keep : words of results.KEEPABLE
-    prepare : options of the preparation, None for automatic; overwrite : replace an older result
-    sensor : the unit's rest, gains and offsets, from `tactile adapt`
-    calibration : the DIGIT's file, for the note alone: ``ToolOptions`` has the one that draws; None for the shipped"""
+    prepare : options of the preparation; overwrite : replace an older result
+    sensor : the unit's rest, gains and offsets, from `tactile adapt`"""
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     keep: tuple[str, ...] = results.DEFAULT_KEEP
-    prepare: PrepareOptions | None = None
+    prepare: PrepareOptions = PrepareOptions()  # noqa: RUF009 - frozen
     overwrite: bool = False
     sensor: SensorFile | None = None
-    calibration: str | os.PathLike | None = None
-
-    @property
-    def columns(self) -> ColumnMap | None:
-        """Map of the columns of the recordings; None: as their layouts say."""
-        return None if self.prepare is None else self.prepare.columns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,7 +83,8 @@ def load_tools(options: ToolOptions) -> Tools:
     of another shape, and as `load_drawer` does."""
     translator, solves = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
-    return Tools(translator, load_drawer(*unit, translator.target, options.object_reflectance, solves=solves))
+    drawer = load_drawer(*unit, translator.target, options.object_reflectance, solves=solves)
+    return Tools(translator, drawer, options.calibration)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -113,11 +108,9 @@ def convert(
     progress : called with (frames done, frames in all)
     Raises TactileError for a recording that cannot be read, a selection without frames, a disk that cannot be written.
     """
-    from .. import recordings
-
     clock, answer = Stopwatch(), tools.translator.answer
     with clock.stage("read"):
-        recording = recordings.read(recording_path, options.columns, tools.translator.source, lean=True)
+        recording = recordings.read(recording_path, options.prepare.columns, tools.translator.source, lean=True)
         check_order(recording, answer)
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
@@ -166,8 +159,8 @@ def _write_frames(
     name = recording.name.encode(errors="replace").decode()  # HDF5 text is UTF-8, file names need not be
     about = {"recording": name, "simulated": recording.simulated}
     at = rows.at(frames)
-    labels = {name: column[at] for name, column in recording.labels.items()}
-    made.write(folder / results.FRAMES, frames, rows.signals, recording.start_time, about, take, labels)
+    texts = {name: column[at] for name, column in recording.labels.items()}
+    made.write(folder / results.FRAMES, frames, rows.signals, recording.start_time, about, take, texts)
 
 
 class _Pictures:
@@ -194,10 +187,7 @@ def check_order(recording: Recording, answer: Answer) -> None:
 
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
     """Return a result's origin for JSON: only what the same input reproduces, so no paths and no time of day."""
-    from ..recordings import labels
-
     recording = rows.recording
-    prepare = None if options.prepare is None else dataclasses.asdict(options.prepare)
     return {
         "format": results.FORMAT,
         "recording": {
@@ -206,7 +196,8 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
             "labels": labels.summary(recording.labels),
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
-        "options": {"frames": frames_text(options.frames), "keep": list(options.keep), "prepare": prepare,
+        "options": {"frames": frames_text(options.frames), "keep": list(options.keep),
+                    "prepare": dataclasses.asdict(options.prepare),
                     "preset": tools.drawer.preset, "object_reflectance": tools.drawer.object_reflectance,
                     "answer": dataclasses.asdict(tools.translator.answer),
                     "gel": TRANSLATED if tools.drawer.solve is None else SOLVED},
@@ -216,7 +207,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         "flagged_frames": report.flagged,
         "explained": report.explained,
         "weights": weights_entry(tools.translator),
-        **_unit_entry(options.calibration),
+        **_unit_entry(tools.calibration),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
 

@@ -25,10 +25,11 @@ Take = Callable[[np.ndarray, dict[str, np.ndarray]], None]
 
 @dataclasses.dataclass(frozen=True)
 class Tools:
-    """Networks and drawer of a conversion; the same for every recording."""
+    """Networks and drawer of a conversion, the same for every recording; calibration : file, None for the shipped."""
 
     translator: Translator
     drawer: Drawer
+    calibration: str | None = None
 
     @property
     def pair(self) -> tuple[str, str]:

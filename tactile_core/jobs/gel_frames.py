@@ -15,6 +15,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files import outside
+from ..files.exr_file import read_height
 from ..files.hdf5_checked import SIGNATURE
 from ..recordings.array_store import open_hdf5, open_npz
 from ..recordings.simulated import FORMAT as SIMULATED
@@ -69,8 +70,6 @@ def read_frames(
     if path.suffix == ".npz":
         return _of_npz(path)
     if path.suffix == ".exr":
-        from ..files.exr_file import read_height
-
         return Frames("height map", np.zeros(1, int), heights=read_height(path)[None])
     return read_displacement(path, gel)
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, provenance
+from ..files.exr_file import write_exr
 from ..files.png_writer import write_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.height_map import gel_mapper, of_unit
@@ -190,14 +191,10 @@ class Pictures:
         write_scene(path, unit, of_unit(height, unit))
 
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
-        from ..files.exr_file import write_exr
-
         write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
 
     def _write_camera(self, path: Path) -> None:
         """Write the response to each LED's light, and the part of the resting picture that is not from LEDs."""
-        from ..files.exr_file import write_exr
-
         ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
         write_exr(path, camera_planes(self.renderer.calibration, ambient), self.about)
 
@@ -219,6 +216,8 @@ def note_of(
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))
     about = PRESETS[preset] if preset != FAST else None
+    variant = renderer.variant
+    traced = {} if variant is None else provenance.versions("mitsuba", "drjit") | {"mitsuba_variant": variant}
     return {
         "format": results.FORMAT,
         "made_by": MAKER,
@@ -233,7 +232,7 @@ def note_of(
             "name": preset, "settings": None if about is None else dataclasses.asdict(about),
             "measured": measured()["presets"][preset],
         },
-        "versions": provenance.versions("PIL") | _mitsuba_versions(renderer.variant),
+        "versions": provenance.versions("PIL") | traced,
     }  # fmt: skip
 
 
@@ -243,12 +242,3 @@ def background_of(renderer: Renderer) -> dict[str, Any] | str:
     if not photograph:
         return "lights"
     return {"photograph": Path(photograph).name, "corrects_lights_by": renderer.correction()}
-
-
-def _mitsuba_versions(variant: str | None) -> dict[str, str]:
-    if variant is None:
-        return {}
-    import drjit
-    import mitsuba
-
-    return {"mitsuba": mitsuba.__version__, "drjit": drjit.__version__, "mitsuba_variant": variant}

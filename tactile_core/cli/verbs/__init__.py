@@ -3,39 +3,10 @@
 A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what an interruption leaves behind), ``arguments``
 (parser) and ``run`` (options -> exit status). It imports its rooms in ``run``, so that help costs nothing."""
 
-from . import (
-    adapt,
-    batch,
-    calibrate,
-    convert,
-    dataset,
-    doctor,
-    export,
-    info,
-    mesh,
-    pairs,
-    render,
-    scenes,
-    simulate,
-    train,
-    watch,
-)
+from importlib import import_module
 
-ALL = (
-    convert,
-    watch,
-    batch,
-    export,
-    dataset,
-    info,
-    adapt,
-    render,
-    calibrate,
-    scenes,
-    simulate,
-    pairs,
-    train,
-    mesh,
-    doctor,
-)
-VERBS = {verb.__name__.rsplit(".", 1)[1]: verb for verb in ALL}
+NAMES = (
+    "convert", "watch", "batch", "export", "dataset", "info", "adapt", "render", "calibrate", "scenes", "simulate",
+    "pairs", "train", "mesh", "doctor",
+)  # fmt: skip
+VERBS = {name: import_module(f".{name}", __name__) for name in NAMES}

@@ -90,14 +90,16 @@ def run(options: argparse.Namespace) -> int:
         place = engine.place(folder, options)
         with bar("batch", "task", options.progress) as shown:
             done = runs.run(folder, job, place, part, shown)
-    status = engine.report_failures(done)
+    for name, why in done.aside.items():
+        complain(f"{name}: {why}")
     if part is None:
         _say_warnings(folder)
     where = str(folder) if part is None else f"{folder}, part {options.array}"
     tell(f"{where}: {counted(done.made, 'shard')} made, {done.kept} kept, {len(done.aside)} set aside")
-    if not status:
-        next_step(_following(folder, job, part))
-    return status
+    if done.aside:
+        return 2
+    next_step(_following(folder, job, part))
+    return 0
 
 
 def _say_cost(job: Job) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import functools
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
@@ -96,7 +95,6 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Convert each recording, going on after a bad one; returns the exit status."""
     one_thread()  # before numpy is imported
-    show = functools.partial(bar, unit="frame", forced=options.progress)
     from ...jobs import convert, plan, results
     from ...pictures.presets import describe_choice
     from ...recordings import readers
@@ -104,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
 
     job, asked, paths, levels = _read(options)
     if options.plan:
-        counts = [len(readers.read(path, job.columns, asked.source or SOURCE, lean=True)) for path in paths]
+        counts = [len(readers.read(path, job.prepare.columns, asked.source or SOURCE, lean=True)) for path in paths]
         chosen = sum(len(results.select(job.frames, count)) for count in counts)
         tell("\n".join(plan.of_frames(chosen, job.keep, asked.preset).lines()))
         return 0
@@ -115,7 +113,7 @@ def run(options: argparse.Namespace) -> int:
     converted = []
     for path, folder in zip(paths, folders, strict=True):
         try:
-            with show(folder.name) as shown:
+            with bar(folder.name, "frame", options.progress) as shown:
                 done = convert.convert(path, folder, job, tools, shown)
         except TactileError as error:
             complain(str(error))
@@ -153,7 +151,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
     budget = Budget() if options.error is None else parse_budget(options.error)
     levels = budget.only("levels", "Nothing else can be chosen in a translation")
     preset = presets.FAST if levels is None else variant.fitting(levels)
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor, options.calibration)
+    job = convert.Options(frames, keep, prepare, options.overwrite, sensor)
     pictures = options.calibration, preset, None
     asked = convert.ToolOptions(
         options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance

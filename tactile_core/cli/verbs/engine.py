@@ -10,10 +10,11 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from ...errors import TactileError
-from ..terminal import complain, next_step, say, tell
+from ..terminal import next_step, say, tell
 
 if TYPE_CHECKING:
-    from ...jobs.engine.run import Outcome, Place
+    from ...jobs.engine.job import Job
+    from ...jobs.engine.run import Place
 
 
 ASSEMBLES = "the command that planned it, without --plan, which makes the result"
@@ -88,13 +89,10 @@ def tell_plan(planned: Path, folder: Path, after: str) -> None:
     next_step(f"{parts}, for each I from 0 to N - 1, on any machines; then {after}")
 
 
-def tell_planned_parts(folder: Path) -> None:
-    """Print the folder of a planned job whose shards are merged into one result, and how to make them."""
+def plan_parts(out: str, job: Job) -> int:
+    """Write a job whose shards are merged into one result, and print how to make them; returns the exit status."""
+    from ...jobs.engine import run as runs
+
+    folder = runs.write(out, job)
     tell_plan(folder, folder, ASSEMBLES)
-
-
-def report_failures(done: Outcome) -> int:
-    """Print an error for each task that could not be done; returns the exit status."""
-    for name, why in done.aside.items():
-        complain(f"{name}: {why}")
-    return 2 if done.aside else 0
+    return 0

@@ -51,7 +51,6 @@ def run(options: argparse.Namespace) -> int:
     engine.check_counts(options, "workers")
     check_seed(options.seed)
     from ...jobs import pairs, plan, results
-    from ...jobs.engine import run as runs
     from ...simulation.pairs_file import KEEPABLE
 
     pair = options.source, options.target
@@ -60,8 +59,7 @@ def run(options: argparse.Namespace) -> int:
         job, _, _ = pairs.plan(options.scene, options.count, options.seed, options.out, pair, keep)
         for line in plan.of_pairs(options.count, pair).lines():
             say(line)
-        engine.tell_planned_parts(runs.write(options.out, job))
-        return 0
+        return engine.plan_parts(options.out, job)
     place = engine.place_of(options)
     with bar("pairs", "block", options.progress) as shown:
         pairs.make_pairs(

@@ -112,12 +112,10 @@ def run(options: argparse.Namespace) -> int:
 
 def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
     """Render in other processes, or write the plan of that."""
-    from ...jobs.engine import run as runs
     from ...jobs.render_shards import plan, render_in_parts
 
     if options.plan:
-        engine.tell_planned_parts(runs.write(options.out, plan(options.input, options.out, asked)))
-        return 0
+        return engine.plan_parts(options.out, plan(options.input, options.out, asked))
     with bar("render", "task", options.progress) as shown:
         done = render_in_parts(options.input, options.out, asked, lambda folder: engine.place(folder, options), shown)
     return _done(done)

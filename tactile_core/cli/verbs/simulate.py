@@ -134,12 +134,10 @@ def _run_grid(options: argparse.Namespace, keep: tuple[str, ...]) -> int:
     if options.error:
         raise TactileError("--grid", "given with --error", "one of the two")
     from ...jobs import simulate
-    from ...jobs.engine import run as runs
 
     job = simulate.plan(options.scene, options.grid, options.out, options.seed, keep)
     if options.plan:
-        engine.tell_planned_parts(runs.write(options.out, job))
-        return 0
+        return engine.plan_parts(options.out, job)
     with bar("simulate", "task", options.progress) as shown:
         simulate.simulate_grid(job, options.out, shown, engine.place_of(options))
     tell(options.out)

@@ -185,7 +185,7 @@ def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():
-        recording = read(path, recipe.columns)
+        recording = read(path, recipe.prepare.columns)
         times, sizes = read_force(str(measured), recording)
         found[FORCE] = np.interp(recording.time, times, sizes, left=np.nan, right=np.nan)
     if recipe.values:

@@ -60,8 +60,8 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
         if fits is None:
             others += 1
             continue
-        if not _encodes(name):
-            shown = name.encode(errors="backslashreplace").decode()
+        shown = name.encode(errors="backslashreplace").decode()
+        if shown != name:
             unfit[shown] = f"{folder / shown}: a name that is no UTF-8; expected one that a table can hold. Rename it"
             continue
         labels = fits.groupdict()
@@ -91,14 +91,6 @@ def _compiled(pattern: str) -> re.Pattern[str]:
         text += (f"(?P={field})" if field in held else f"(?P<{field}>[^/]+)") + re.escape(after)
         held.add(field)
     return re.compile(f"(?:.*/)?{text}", re.DOTALL)
-
-
-def _encodes(name: str) -> bool:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
 
 
 def _split(recipe: Recipe, labels: dict[str, str]) -> str:

@@ -12,7 +12,6 @@ from msgspec import Meta
 from ...errors import TactileError
 from ...files.outside import read_toml_text
 from ...files.shipped import shipped
-from ...recordings.tables.column_map import ColumnMap
 from ...sensors import SOURCE
 from ..engine.recipes import Prepare
 from ..export.formats.imagefolder import NUMBERS
@@ -89,11 +88,6 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     prepare: Prepare = Prepare()
     unit: Unit = Unit()
     split: Split = Split()
-
-    @property
-    def columns(self) -> ColumnMap | None:
-        """Return the map of the files' columns, if they need one."""
-        return self.prepare.columns
 
 
 def known() -> dict[str, Path]:

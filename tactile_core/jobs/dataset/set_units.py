@@ -37,13 +37,13 @@ def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, s
         path = str(file.path)
         try:
             content_hash(file.path)
-            found = readers.sensor_of(path, recipe.columns)
+            found = readers.sensor_of(path, recipe.prepare.columns)
             if found != recipe.sensor:
                 expected = f"one of a {title(recipe.sensor)}, as the recipe says"
                 raise TactileError(path, f"a recording of a {title(found)}", expected)
-            for finger in readers.each_finger(path, recipe.columns):
+            for finger in readers.each_finger(path, recipe.prepare.columns):
                 if recipe.unit.found == "adapt":
-                    read(finger, recipe.columns, recipe.sensor)
+                    read(finger, recipe.prepare.columns, recipe.sensor)
         except TactileError as error:
             aside[path] = str(error)
         else:
@@ -70,7 +70,7 @@ def calibrated(
             return electrode_gains.read(out)
     say(f"finding the unit of {len(files)} files")
     if how.found == "rest":
-        sensor = adapt.rest_unit(str(rest), recipe.columns)
+        sensor = adapt.rest_unit(str(rest), recipe.prepare.columns)
     else:
         typical = reference_signals.read(weights or networks.WEIGHTS_FOLDER)
         given = None if rest is None else str(rest)

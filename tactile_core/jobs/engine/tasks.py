@@ -13,6 +13,8 @@ from ...files.threads import one_thread
 from . import job as jobs
 from . import manifest, recipes
 
+_one_thread_once = functools.cache(one_thread)
+
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """First step for input `recording` of the job (shard None), or one of its shards; see ``recipes``."""
@@ -66,11 +68,6 @@ def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
     _one_thread_once()
     reply = _run(Path(folder), msgspec.convert(task, Task))
     return msgspec.to_builtins(reply)
-
-
-@functools.cache
-def _one_thread_once() -> None:
-    one_thread()
 
 
 def _run(folder: Path, task: Task) -> Reply:

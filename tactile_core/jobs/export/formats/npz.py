@@ -20,7 +20,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
     for one in source.recordings:
         with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:
             for name, (shape, kind) in one.arrays().items():
-                _write(archive, one, one.stored(name), (one.frames, *shape), kind)
+                _write(archive, one, name, (one.frames, *shape), kind)
             for label, column in one.labels.items():
                 with archive.open(zipfile.ZipInfo(f"labels/{label}.npy", TIME), "w") as out:
                     np.lib.format.write_array(out, column.astype(str), allow_pickle=False)
@@ -29,13 +29,9 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _write(archive: zipfile.ZipFile, one: Recorded, name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
-    """Write an array of any length: its header first, then its rows, shard by shard."""
-    import h5py
-
+    """Write an array of any length: its header first, then its rows, some at a time."""
     header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
-    with archive.open(zipfile.ZipInfo(f"{name}.npy", TIME), "w", force_zip64=True) as out:
+    with archive.open(zipfile.ZipInfo(f"{one.stored(name)}.npy", TIME), "w", force_zip64=True) as out:
         np.lib.format.write_array_header_2_0(out, header)
-        for path in one.shards:
-            with h5py.File(path, "r") as file:
-                for start in range(0, len(file[name]), 32):
-                    out.write(np.ascontiguousarray(file[name][start : start + 32]).tobytes())
+        for block in one.blocks(without=one.arrays().keys() - {name}):
+            out.write(np.ascontiguousarray(block[name]).tobytes())
