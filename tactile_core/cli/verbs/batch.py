@@ -167,21 +167,21 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     """Return the recipe that the options describe, of these recordings."""
     from ...jobs import results, translate_recipe
-    from ...jobs.engine.recipes import SHARD_FRAMES, Prepare
+    from ...jobs.engine.recipes import SHARD_FRAMES, Prepare, Translate
     from ...recordings import electrode_gains
     from ...translation.answer import parse_answer
 
-    return translate_recipe.make(
-        paths, say,
-        keep=results.parse_keep("latent,displacement" if options.keep is None else options.keep),
+    wanted = Translate(
+        keep=list(results.parse_keep("latent,displacement" if options.keep is None else options.keep)), weights="",
         sensor=None if options.sensor is None else electrode_gains.read(options.sensor),
         prepare=Prepare(**prepare_words(options)),
-        weights=options.weights, calibration=options.calibration, target=options.target, preset=options.preset,
+        target=options.target, preset=options.preset or "",
         answer=parse_answer(
             options.answer, options.frames_apart, options.mount_shift, options.samples, options.contacts
         ),
         gel=options.gel, shard_frames=SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
     )  # fmt: skip
+    return translate_recipe.completed(wanted, paths, say, options.weights, options.calibration)
 
 
 def _status(folder: Path, job: Job) -> int:

@@ -26,6 +26,7 @@ from .. import export, translate_recipe
 from ..engine import inputs
 from ..engine import job as jobs
 from ..engine import run as runs
+from ..engine.recipes import Translate
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
 from . import dataset_card, summary, survival
@@ -123,12 +124,12 @@ def _translated(
     with runs.opened(place, None):
         with asked.bar("reading", "file") as shown:
             listed = inputs.hashed(paths, shown)
-        wanted = translate_recipe.make(
-            paths, asked.say, keep=KEEP, prepare=recipe.prepare, sensor=sensor, weights=asked.weights,
-            calibration=asked.calibration, target=asked.target, preset=asked.preset,
+        wanted = Translate(
+            list(KEEP), "", prepare=recipe.prepare, sensor=sensor, target=asked.target, preset=asked.preset or "",
             answer=Answer(frames_apart=recipe.snapshots), every=recipe.every,
         )  # fmt: skip
-        job = jobs.make(listed, wanted, asked.weights, asked.calibration)
+        whole = translate_recipe.completed(wanted, paths, asked.say, asked.weights, asked.calibration)
+        job = jobs.make(listed, whole, asked.weights, asked.calibration)
         if not jobs.exists(place):
             jobs.write(place, job)
         elif jobs.read(place).id != job.id:
