@@ -69,7 +69,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
-    """Return a ball's way over the pad at constant force, rows (s, x mm, z mm, N); the first frame is free."""
+    """Return a ball's path over the pad, rows (s, x mm, z mm, N): no force in the first frame, then a constant one."""
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 

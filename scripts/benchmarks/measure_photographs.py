@@ -177,7 +177,7 @@ def told_apart(data: Path) -> Iterator[Row]:
 
 
 def share_told(photographs: list[np.ndarray], pictures: list[np.ndarray]) -> float:
-    """Return the share of pieces that a support vector machine tells right, each pair of pictures held out in turn.
+    """Return the share of pieces that a support vector machine takes for what they are, each pair held out in turn.
     photographs, pictures : n pairs of (H, W, 3) grey levels"""
     from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
     from sklearn.pipeline import make_pipeline

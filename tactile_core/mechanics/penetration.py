@@ -66,7 +66,7 @@ def check_follows(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
     closed: bool, behind: float = BEHIND,
 ) -> None:  # fmt: skip
-    """Raise PenetrationError where a body, ``depth`` m deep, has sunk in between a surface's nodes.
+    """Raise PenetrationError where a body, ``depth`` m deep, has passed in between a surface's nodes.
 
     grid : (rows, columns, 3) m, the nodes; closed : whether its last column joins the first
     normals : (k, 3) of the body, at the nodes that carry force; behind : least allowed cosine of theirs and the motion

@@ -115,7 +115,7 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of heights (H, W) m along the picture's right and down, second order, also at its edges."""
+    """Return the slopes (H, W) of heights (H, W) m along the picture's right, and down; second order, at edges too."""
     right, down = camera.pixel_size
     return _differences(height, 1, right), _differences(height, 0, down)
 

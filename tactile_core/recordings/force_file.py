@@ -23,7 +23,7 @@ ADVICE = "Leave in it what is measured beside the recording, in newtons"
 
 
 def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """Read the force beside a recording: from a file, or from columns of the recording's own, ``"fx,fy,fz"``.
+    """Read the force beside a recording. named : a file, or columns of the recording's own file, ``"fx,fy,fz"``
 
     A file with as many rows as the recording has frames needs no time. Otherwise unix time aligns the two if both have
     it; else both begin at the same moment.

@@ -51,7 +51,7 @@ def _reading(path: str) -> Iterator[None]:
 
 @contextmanager
 def opened(path: str) -> Iterator[Opened]:
-    """Open a file once, and tell its kind by its first bytes. Raises TactileError, for the system's errors too."""
+    """Open a file once, and detect its kind from its first bytes. Raises TactileError, for the system's errors too."""
     with _reading(path):
         file, finger, topic = split(path)
         if is_bag_folder(file):

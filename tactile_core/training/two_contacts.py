@@ -80,7 +80,7 @@ def network_input(change: Tensor) -> Tensor:
 
 
 def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -> Tensor:
-    """Return the squared error of the parts in samples of two, and the cross entropy of their number.
+    """Return the parts' squared error, mean over samples of two contacts, plus the cross entropy of one or two.
     read : (B, e) counts; first, second : (B, e) true changes of the contacts, the second all zero for one contact"""
     found, two = network(network_input(read)), second.abs().amax(-1) > 0
     half = found[:, :-1] * read.square().sum(-1, keepdim=True).sqrt() * PARTED

@@ -79,7 +79,8 @@ def drawn(count: int, seed: int) -> list[RandomContact]:
 
 
 def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
-    """Solve a contact from rest, without friction; return its share of the thickness and CPU s. Raises TactileError."""
+    """Solve a contact from rest, without friction; return it, its depth over the thickness, and CPU s. Raises
+    TactileError."""
     pose = pose_at(sensor, contact.indenter, contact.place)
     share = contact.depth / DEEPEST * DEPTH_LIMIT * _ALMOST
     depth, thick = depth_at(share, sensor, contact.indenter, pose), thickness_under(sensor, contact.indenter, pose)

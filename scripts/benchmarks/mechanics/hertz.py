@@ -29,7 +29,7 @@ def force(depth: float, ball: float, youngs: float, poisson: float) -> float:
 
 
 def solve(poisson: float, slope: float) -> tuple[FiniteStrainContact, ContactState, float]:
-    """Contact whose radius by Hertz is ``slope`` of the ball's; also that radius, m."""
+    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m."""
     radius = slope * BALL
     block = _BLOCK * radius
     mesh = disc_mesh(block, block, 1.3 * radius, radius / _NODES, radius, growth=1.2)

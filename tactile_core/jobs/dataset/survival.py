@@ -19,8 +19,8 @@ MOST, FEWEST = 1000, 12  # examples of a task; with fewer nothing is shown (assu
 
 @dataclass(frozen=True)
 class Row:
-    """Accuracy of a classifier. task : the label it tells; by : kind of features it reads; examples, classes : numbers
-    right : share of examples told right, 0..1; error : its standard error"""
+    """Accuracy of a classifier. task : label it predicts; by : kind of features it reads; examples, classes : numbers
+    right : share of examples predicted right, 0..1; error : its standard error"""
 
     task: str
     by: str

@@ -136,7 +136,7 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
 
 
 def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
-    """Yield new rows of a growing file and their arrival time, s; None now and then while no row comes.
+    """Yield new rows of a growing file and their arrival time, s, of time.perf_counter; None while no row comes.
     idle : s without a row after which it ends; None: never. Raises as `Growing.poll` does."""
     growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
     while idle is None or time.perf_counter() - last < idle:

@@ -43,7 +43,7 @@ class _Sprung(Frictionless):
     slack: np.ndarray
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return signed distances, m, and normals, each distance by the slack farther."""
+        """Return signed distances (k,) m, each larger by the slack, and normals (k, 3)."""
         gap, normal = super().distance(displacement, shift)
         return gap + self.slack, normal
 

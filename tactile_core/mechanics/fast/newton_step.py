@@ -96,7 +96,7 @@ def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
 
 @Loop
 def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
-    """Build the system (2 s, 2 s) and right (2 s, r) of slipping nodes: their way, m, along friction, and its turn, N.
+    """Build the system (2 s, 2 s) and right side (2 s, r) of slipping nodes: slip along friction, m, and its turn, N.
 
     Its rows demand that no force is left along t - mu n (``lean``, ``normal``), and that t turns as its slip does.
     inverse : (j, j) N/m, of the compliance; rows : (j,), its places among ``size``; bearing : (s, 3, r), of ``borne``

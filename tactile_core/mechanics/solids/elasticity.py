@@ -14,7 +14,7 @@ _POINTS, _POINT_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 def quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values and slopes (n, 3) of the quadratic Lagrange polynomials on nodes -1, 0, 1."""
+    """Return the values (n, 3) and slopes (n, 3) at t (n,) of the quadratic Lagrange polynomials on nodes -1, 0, 1."""
     value = np.stack([t * (t - 1) / 2, 1 - t**2, t * (t + 1) / 2], -1)
     slope = np.stack([t - 0.5, -2 * t, t + 0.5], -1)
     return value, slope

@@ -73,7 +73,8 @@ def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, 
 
 
 def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float], list[float]]:
-    """Return pdc, tac, tdc, pac and the electrodes, NaN where missing. Raises ValueError for over MOST_PAC samples."""
+    """Return a list of pdc, tac, tdc and samples of pac, NaN where missing, and a list of the electrodes. Raises
+    ValueError for over MOST_PAC samples."""
     row = [float(sensor[name]) if name else float("nan") for name in fields.slow]
     for name in fields.pac:
         samples = sensor[name]
