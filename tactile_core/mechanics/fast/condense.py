@@ -8,6 +8,7 @@ cells form a tree, and each unknown inside goes where the last cell that holds i
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,11 @@ from ...sensors import Material
 from ..solids.elasticity import cell_stiffness
 from ..solids.hex_mesh import HexMesh
 
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+
 _LEAF = 8  # cells a group: smaller groups cost calls, larger ones dense work on zeros
+_BLOCK = 64  # rows mirrored at a time
 _SAME_PLACE = 1e-8  # m, between a node and the mirror image of its partner
 _MIRROR = np.array([1.0, 1.0, -1.0])
 
@@ -44,22 +49,23 @@ def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
 
 
 def condense(
-    mesh: HexMesh, material: Material, keep: np.ndarray, touched: np.ndarray, loads: np.ndarray, parity: int
+    mesh: HexMesh, material: Material, keep: np.ndarray, touched: np.ndarray, loads: csc_array, parity: int
 ) -> Half:
     """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
 
     touched : (r,) indices of those that forces act on, sorted
-    loads : (3 n_nodes, w), unit loads anywhere. Raises ValueError for a solid that is not even in z.
+    loads : (3 n_nodes, w) sparse, unit loads anywhere. Raises ValueError for a solid that is not even in z.
     """
     tree = _Elimination(mesh, material, keep, loads, parity)
     dofs, stiffness = tree.group(np.arange(len(tree.cells)))
     from scipy.linalg import lapack
 
-    factor, failed = lapack.dpotrf(stiffness, lower=1, overwrite_a=1)
+    factor, failed = lapack.dpotrf(stiffness.T, lower=1, overwrite_a=1)  # in place: LAPACK counts by columns
+    del stiffness
     if failed:
         raise ValueError("the stiffness is singular: is the solid held anywhere?")
     inverse, _ = lapack.dpotri(factor, lower=1, overwrite_c=1)
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    mirror_upper(inverse.T)
     place = np.full(tree.free, -1)
     place[dofs] = np.arange(len(dofs))
     held = tree.number[(3 * keep[:, None] + np.arange(3)).ravel()]
@@ -68,7 +74,8 @@ def condense(
     pressed = axes_of(touched)
     pushed = known[pressed]
     answer = np.zeros((len(pressed), len(held)), np.float32)
-    answer[np.ix_(pushed, known)] = inverse[np.ix_(place[held[pressed[pushed]]], rows)]
+    for row in np.flatnonzero(pushed):  # all at once would take 170 MB more
+        answer[row, known] = inverse[place[held[pressed[row]]], rows]
     load = tree.loads[dofs]
     moved = inverse @ load
     under_loads = np.zeros((len(held), loads.shape[1]))
@@ -76,10 +83,21 @@ def condense(
     return Half(answer, under_loads, tree.among + load.T @ moved)
 
 
+def mirror_upper(matrix: np.ndarray) -> None:
+    """Copy the upper triangle of a square matrix, which has zeros below it, to the lower one, in place."""
+    for start in range(0, len(matrix), _BLOCK):
+        part = slice(start, min(start + _BLOCK, len(matrix)))
+        square = matrix[part, part]
+        square += np.triu(square, 1).T
+        matrix[part.stop :, part] = matrix[part, part.stop :].T
+
+
 class _Elimination:
     """Elimination of one half of the solid down to the kept nodes."""
 
-    def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: np.ndarray, parity: int) -> None:
+    def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: csc_array, parity: int) -> None:
+        from scipy import sparse
+
         image = mirror_nodes(mesh.nodes)
         z = mesh.nodes[:, 2]
         plane = image == np.arange(len(z))
@@ -91,10 +109,9 @@ class _Elimination:
         self.free = int(moves.sum())
         own = (3 * stands[:, None] + np.arange(3)).ravel()
         self.dof, self.sign = self.number[own], sign.ravel()
-        self.loads = np.zeros((self.free, loads.shape[1]))
-        known = self.dof >= 0
-        if loads.shape[1]:
-            np.add.at(self.loads, self.dof[known], self.sign[known, None] * loads[known])
+        known = np.flatnonzero(self.dof >= 0)
+        fold = sparse.csr_array((self.sign[known], (self.dof[known], known)), shape=(self.free, len(self.dof)))
+        self.loads = (fold @ loads).toarray()
         self.among = np.zeros((loads.shape[1],) * 2)
         middle = mesh.nodes[mesh.cells].mean(axis=1)
         chosen = middle[:, 2] > -1e-9
@@ -141,10 +158,8 @@ class _Elimination:
         place = np.empty(self.free, int)
         place[dofs] = np.arange(len(dofs))
         front = np.zeros((len(dofs), len(dofs)))
-        while parts:
-            own, stiffness = parts.pop(0)
-            at = place[own]
-            front[np.ix_(at, at)] += stiffness
+        while parts:  # each is freed once it is added
+            _add(front, place, *parts.pop(0))
         n = int(inside.sum())
         if n == 0:
             return dofs, front
@@ -152,12 +167,19 @@ class _Elimination:
         if failed:
             raise ValueError("a cell's stiffness is not positive definite")
         carried = solve_triangular(factor, front[:n, n:], lower=True, check_finite=False)
-        rest = front[n:, n:] - carried.T @ carried
+        rest = carried.T @ carried
+        np.subtract(front[n:, n:], rest, out=rest)
         if self.loads.shape[1]:
             load = solve_triangular(factor, self.loads[dofs[:n]], lower=True, check_finite=False)
             self.loads[dofs[n:]] -= carried.T @ load
             self.among += load.T @ load
         return dofs[n:], rest
+
+
+def _add(front: np.ndarray, place: np.ndarray, own: np.ndarray, stiffness: np.ndarray) -> None:
+    at = place[own]
+    for row, values in zip(at, stiffness, strict=True):  # all at once would hold two copies more
+        front[row, at] += values
 
 
 def axes_of(nodes: np.ndarray) -> np.ndarray:
@@ -169,23 +191,26 @@ class MirrorSymmetry:
     """Joins the even and the odd half of a motion. half : (k,) surface nodes with z >= 0; image : (n,) of each node"""
 
     def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
-        self.half, self.image = half, image
-        self.sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
+        count = 3 * len(half)
+        self._sign = np.tile([1.0, 1.0, -1.0], len(half)).astype(np.float32)
+        self._place = np.empty(3 * len(image), int)  # in a half and, behind it, its mirror image
+        self._place[axes_of(image[half])] = np.arange(count, 2 * count)
+        self._place[axes_of(half)] = np.arange(count)  # after the other: on the mirror plane this one is right
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
         """Return motions (w, 3 n) float32 from the halves' (3 k, v): of load ``column[i]``, mirrored if sign is -1."""
-        answer = np.empty((len(column), 3 * len(self.image)), np.float32)
-        here, there = axes_of(self.half), axes_of(self.image[self.half])
-        for i, (load, mirrored) in enumerate(zip(column, sign, strict=True)):
-            answer[i, there] = (even[:, load] - mirrored * odd[:, load]) * self.sign
-            answer[i, here] = even[:, load] + mirrored * odd[:, load]
-        return answer
+        return self._joined(even.T, odd.T, column, sign.astype(np.float32))
 
     def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
         """Return the motion (3 r, 3 n) float32 under unit forces on the touched nodes, from the halves' (3 r, 3 k)."""
-        here, there = axes_of(self.half), axes_of(self.image[self.half])
-        move = np.empty((len(even), 3 * len(self.image)), np.float32)
-        for answer, of_even, of_odd in zip(move, even, odd, strict=True):
-            answer[there] = (of_even - of_odd) * self.sign
-            answer[here] = of_even + of_odd  # after the other: on the mirror plane this one is right
-        return move
+        return self._joined(even, odd, np.arange(len(even)), np.ones(len(even), np.float32))
+
+    def _joined(self, even: np.ndarray, odd: np.ndarray, rows: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        both = np.empty((2, len(self._sign)), np.float32)
+        joined = np.empty((len(rows), len(self._place)), np.float32)
+        for motion, row, mirrored in zip(joined, rows, sign, strict=True):
+            here = mirrored * odd[row]
+            np.add(even[row], here, out=both[0])
+            np.multiply(even[row] - here, self._sign, out=both[1])
+            both.take(self._place, out=motion, mode="clip")  # "raise" would buffer it
+        return joined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from ...sensors import unrolling
 from ..solids.biotac_core import Core, above_core, facing_core
 from ..solids.hex_mesh import HexMesh, skin_mesh
 from .condense import axes_of, mirror_nodes
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
@@ -28,11 +31,13 @@ class SensingPoints(NamedTuple):
     weights: np.ndarray
     gap: np.ndarray
 
-    def dense(self, size: int, points: np.ndarray) -> np.ndarray:
-        """Return columns ``points`` (p,), sorted, of the matrix as a dense one (size, p); size : 3 n_nodes"""
-        matrix, chosen = np.zeros((size, len(points))), np.isin(self.columns, points)
-        matrix[self.rows[chosen], np.searchsorted(points, self.columns[chosen])] = self.weights[chosen]
-        return matrix
+    def matrix(self, size: int, points: np.ndarray) -> sparse.csc_array:
+        """Return columns ``points`` (p,), sorted, of the matrix (size, p); size : 3 n_nodes"""
+        from scipy import sparse
+
+        chosen = np.isin(self.columns, points)
+        at = self.rows[chosen], np.searchsorted(points, self.columns[chosen])
+        return sparse.csc_array((self.weights[chosen], at), shape=(size, len(points)))
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
