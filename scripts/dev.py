@@ -302,7 +302,7 @@ def read_stamp(folder: Path) -> dict:
 
 
 def write_stamp(folder: Path, content: dict) -> None:
-    """Replace the stamp as one piece."""
+    """Write what is installed in an environment, in place of what was written before, as one piece."""
     fresh = folder / (STAMP + ".new")
     fresh.write_text(json.dumps(content, indent=1), encoding="utf-8")
     os.replace(str(fresh), str(folder / STAMP))

@@ -53,7 +53,7 @@ def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -
 
 
 def colours_of(change: np.ndarray) -> np.ndarray:
-    """Convert (T, e) counts to (T, e, 3) colours, grey at rest."""
+    """Convert (T, e) counts to (T, e, 3) colours: grey at rest, red where they rise, blue where they fall."""
     share = change / max(float(np.abs(change).max(initial=0.0)), 1.0)
     strength = np.sqrt(np.abs(share))[..., None]  # light touches show too
     return _REST + strength * (np.where(share[..., None] > 0, _HIGH, _LOW) - _REST)

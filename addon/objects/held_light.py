@@ -22,7 +22,7 @@ _DARKEST = 1e-3  # of an albedo or a radiance that is divided by
 
 
 def attribute(colour: str) -> str:
-    """Name an LED's attribute."""
+    """Return the name of the mesh attribute that holds the light of the LED of a colour."""
     return f"{NODE} {colour}"
 
 

@@ -38,7 +38,7 @@ class TACTILE_OT_translate(JobOperator):
         return True
 
     def begin(self, context: bpy.types.Context) -> None:
-        """See ``JobOperator``: only a gel that no networks lead to is waited for."""
+        """See ``JobOperator``: a job is started only for a gel that no networks lead to, whose contacts are solved."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin)

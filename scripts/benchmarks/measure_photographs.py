@@ -92,7 +92,7 @@ def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
 
 
 def thirds(data: Path) -> Iterator[Row]:
-    """Yield rows of fits of two thirds of the 14, from round numbers, tried on the third and on the deeper two."""
+    """Yield rows of fits to two thirds of the 14, begun at round numbers, tried on the third and on the deeper two."""
     known = own_unit(data)
     start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
     for unit, third in folds(known, 3, start):
@@ -111,7 +111,7 @@ def five(data: Path) -> Iterator[Row]:
 
 
 def fifths(data: Path) -> Iterator[Row]:
-    """Yield rows of another unit by fifths, from the unit that ships."""
+    """Yield rows of fits to four fifths of another unit's photographs, begun at the unit that ships, on the fifth."""
     tried = []
     for unit, fifth in folds(other_unit(data), 5, load_calibration()):
         tried += evaluate_unit(unit, fifth, DIAMETER / 2, search_radius=False)
@@ -119,7 +119,7 @@ def fifths(data: Path) -> Iterator[Row]:
 
 
 def levels(data: Path) -> Iterator[Row]:
-    """Yield rows of touched places on photographs, and on pictures of real recordings."""
+    """Yield ``level_rows`` of photographs, and of pictures of real recordings."""
     known, other = own_unit(data), other_unit(data)
     for of, each in (("14 photographs", known), ("2 deeper", deeper(data, known)), ("another unit", other)):
         shown = np.stack([press.picture for press in each.presses])

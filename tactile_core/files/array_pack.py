@@ -49,7 +49,7 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
 
 
 def write_files(file: Path, folder: Path) -> None:
-    """Pack all files of a folder and below it."""
+    """Pack all files of a folder and below it into the HDF5 file ``file``."""
     paths = [path for path in sorted(folder.rglob("*")) if path.is_file()]
     write(file, {path.relative_to(folder).as_posix(): np.frombuffer(path.read_bytes(), np.uint8) for path in paths})
 

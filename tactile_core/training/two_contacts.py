@@ -70,7 +70,8 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the sizes of the network from ``network_input`` to half the parts' difference and the logit of "two"."""
+    """Return the layer sizes of the network, from ``network_input`` to half the difference of both parts' signals and
+    the logit of there being two."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 

@@ -64,7 +64,7 @@ def main() -> int:
 
 
 def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Arrays (S, 40, ...) of all sequences."""
+    """Join the arrays (40, ...) of S sequences to arrays (S, 40, ...), by name."""
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -172,7 +172,7 @@ def disc_mesh(
 
 
 def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) -> FiniteStrainContact:
-    """The contact of a ball that touches the middle; nodes within ``reach`` m of the axis may touch it."""
+    """Return the contact problem of a ball that touches the middle, and nodes within ``reach`` m of the axis."""
     near = mesh.surface[mesh.nodes[mesh.surface, 0] < reach]
     middle = mesh.nodes[mesh.surface[0]]
     solid = AxisymmetricSolid(mesh, NeoHookean.from_material(material))

@@ -140,7 +140,7 @@ def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], s
 
 
 def read_truth(file: Path, sensor: str) -> list[Truth]:
-    """The contacts on one sensor."""
+    """Return the reference tier's contacts on one sensor, from a file of ``write_truth``."""
     with np.load(file, allow_pickle=False) as arrays:
         columns = {name: arrays[f"{sensor}_{name}"] for name in ("number", "share", "displacement", "force", "seconds")}
         contacts = drawn(int(columns["number"].max()) + 1, int(arrays["seed"]))

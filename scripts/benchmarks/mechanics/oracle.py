@@ -28,7 +28,7 @@ def skewed() -> FiniteStrainSolid:
 
 
 def disturbed(solid: FiniteStrainSolid) -> State:
-    """A finite deformation with pressures of its own."""
+    """Return a random finite deformation with random pressures, always the same."""
     random = np.random.default_rng(3)
     moved = solid.mesh.nodes @ random.uniform(-0.2, 0.2, (3, 3)).T
     moved += 2e-5 * random.standard_normal(moved.shape)
@@ -36,7 +36,7 @@ def disturbed(solid: FiniteStrainSolid) -> State:
 
 
 def differences() -> dict[str, float]:
-    """Relative differences, largest entry: energy, force, condensed force and tangent, pressure step."""
+    """Return largest differences from scikit-fem, relative to the largest entry, of energy, forces, tangent ..."""
     solid = skewed()
     state = disturbed(solid)
     other = _Other(solid.mesh, state)
@@ -152,7 +152,7 @@ def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield one row a quantity; none where scikit-fem is not installed."""
+    """Yield the ``differences`` from scikit-fem, a row a quantity; none where it is not installed."""
     try:
         found = differences()
     except ImportError:

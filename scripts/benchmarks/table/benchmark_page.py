@@ -70,7 +70,7 @@ def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
 
 
 def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
-    """Draw one panel."""
+    """Draw one panel: each method's error over its time, the Pareto front, and the error of doing nothing."""
     front = pareto([(each.ms, each.error) for each in methods])
     axes.plot(*zip(*steps(front), strict=True), color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
     baselines = {each.baseline for each in methods if each.baseline}

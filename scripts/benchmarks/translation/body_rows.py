@@ -38,7 +38,8 @@ indenters = [
 
 
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
-    """Rows of each set, all contacts: medians of place, force, depth and overlap; the mean share left of the gel."""
+    """Return rows of each set's contacts: median errors of place, force and depth, the median overlap, and the mean of
+    the gel's error, divided by that of no displacement."""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
         "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),

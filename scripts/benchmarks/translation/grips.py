@@ -58,7 +58,8 @@ def hard_to_report(files: list[Path]) -> list[Path]:
 
 
 def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
-    """Rows of a folder, beside the place in simulated contacts. Raises TactileError without the trials it wants."""
+    """Return rows of a folder's grips, and of the place in simulated contacts. Raises TactileError without the trials
+    that rest is found in, or those that are judged."""
     files = find(folder)
     soft = soft_to_choose_by(files)
     hard = hard_to_report(files)

@@ -187,7 +187,8 @@ def unit_of(number: int) -> Unit:
 
 
 def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSES) -> list[Row]:
-    """Shares of contacts whose largest node error is below its bound, a row a bin of confidence, which it should be."""
+    """Return rows of the share of contacts whose largest node error is below its bound, one a bin of confidence: the
+    share should equal the confidence."""
     made = [played(OTHERS + each, unit_of(OTHERS + each), presses) for each in range(units)]
     gel, rows = np.concatenate([each.gel for each in made]), []
     found = [translated_contacts(network, made, taken) for taken in TAKEN]

@@ -206,7 +206,8 @@ FAULTS: dict[str, Fault] = {
 
 
 def bases(phac: Path | None, sensor: str | None) -> list[Base]:
-    """Return the recordings that are broken."""
+    """Return the recordings that faults are put into: the shipped one, an idle finger, and grips in the folder phac.
+    sensor : file of the grips' rest"""
     shipped, random = read(SHIPPED), np.random.default_rng(0)
     at_rest = np.asarray(shipped.electrodes[:QUIET], float).mean(axis=0)
     idle = replace(

@@ -89,7 +89,7 @@ def reporting(folder: str | os.PathLike) -> list[Path]:
 
 
 def beside(path: Path, topic: str) -> Path:
-    """Return the file of another topic beside a recording."""
+    """Return the path of the file that holds another topic of a recording, beside it."""
     return path.with_name(path.name.removesuffix(BIO) + topic)
 
 

@@ -111,7 +111,7 @@ def _share_row(name: str, value: float, low: float | None, high: float | None, s
 
 
 def as_read(change: np.ndarray, seed: int) -> np.ndarray:
-    """Add seeded noise and gains to true changes (C, 19) counts."""
+    """Return true changes (C, 19) counts with seeded noise and gains, as a sensor reads them."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
     return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

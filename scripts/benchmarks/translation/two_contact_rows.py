@@ -32,7 +32,8 @@ HALF = 0.5  # of a field's peak: nodes that overlap (docs/accuracy.md)
 
 
 def rows(pairs: Pairs) -> list[Row]:
-    """Shares that are marked, by how far two contacts are apart; baseline: single contacts marked as well."""
+    """Return rows of the share of two contacts that are marked as two, by their distance; baseline: the share of single
+    contacts that are marked as two."""
     random = np.random.default_rng(SEED)
     felt = np.flatnonzero(lengths(pairs.signal) >= TOUCHING)
     single = _marked(pairs.signal[random.choice(felt, COUNT)])

@@ -141,7 +141,7 @@ class Candidates:
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
-        """Take displacement (k, 3) m and active (k,) bool as the new first guess; ``active`` may be longer."""
+        """Take displacement (k, 3) m and the first k of active (k + c,) bool as the new first guess."""
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:

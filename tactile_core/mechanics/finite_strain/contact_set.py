@@ -266,7 +266,7 @@ class Obstacle(Protocol):
         """Return the distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (n, 3, 3) 1/m of the distance."""
+        """Return the second derivatives (n, 3, 3) 1/m of the distance at points (n, 3) m."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -112,7 +112,7 @@ class SplitBulkModulus:
 
     @classmethod
     def from_law(cls, law: NeoHookean) -> SplitBulkModulus:
-        """Split off ``SHARE`` shear moduli at the points."""
+        """Return the law with ``SHARE`` times its shear modulus as the part of its bulk modulus at the points."""
         return cls(law, SHARE * law.shear)
 
     @property
