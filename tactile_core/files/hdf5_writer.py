@@ -1,10 +1,15 @@
-"""File object through which HDF5 files are written, so that a full disk raises an error instead of a crash."""
+"""Write new HDF5 files so that a full disk raises an error instead of a crash."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import h5py
 
 
 class Disk(io.FileIO):
@@ -40,3 +45,20 @@ class Disk(io.FileIO):
         except OSError as error:
             self._failure = self._failure or error
             return self.tell() if size is None else size
+
+
+@contextmanager
+def new_hdf5(path: Path, room: int = 0) -> Iterator[tuple[h5py.File, Disk]]:
+    """Yield a new file, and its disk to `check` between its parts; the end of the block closes it.
+    room : bytes before the HDF5 part, 0, 512 or a doubling of it. Raises the disk's OSError, also where HDF5 fails by
+    it first."""
+    import h5py
+
+    with Disk(path) as disk:
+        try:
+            with h5py.File(disk, "w", userblock_size=room) as file:
+                yield file, disk
+        except Exception:  # raised again, unless the disk knows better: HDF5 gives many types to one cause
+            disk.check()
+            raise
+        disk.check()

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .. import sensors
-from ..files.hdf5_writer import Disk
+from ..files.hdf5_writer import new_hdf5
 from ..files.version import __version__
 from ..recordings import flags
 from ..sensors import PAIR
@@ -135,57 +134,39 @@ class FramesFile:
         path : new file; count : T; attributes : of the file itself, beside format and version
         room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's checksum; the file then holds
             pictures, too, and a large array has one chunk a frame"""
-        import h5py
-
         self._about = arrays_of(keep, shard=bool(room))
         self._count, self._framed, self._pair = count, bool(room), pair
-        self._disk = Disk(path)
-        self._file = h5py.File(self._disk, "w", userblock_size=room)
-        about = {"format": FORMAT, "tactile_core": __version__, **attributes}
-        self._file.attrs.update({name: netcdf_value(value) for name, value in about.items()})
+        self._attributes, self._opened = attributes, new_hdf5(path, room)
 
     def __enter__(self) -> FramesFile:
+        self._file, self._disk = self._opened.__enter__()
+        about = {"format": FORMAT, "tactile_core": __version__, **self._attributes}
+        self._file.attrs.update({name: netcdf_value(value) for name, value in about.items()})
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *more: object) -> None:
-        try:
-            with self._checked() if kind is None else suppress(Exception):  # the error on its way out says more
-                self._file.close()
-        finally:
-            self._disk.close()
-
-    @contextmanager
-    def _checked(self) -> Iterator[None]:
-        """Raise the disk's error, also where HDF5 fails by it first."""
-        try:
-            yield
-        except Exception:  # raised again; HDF5 gives many types to one cause
-            self._disk.check()
-            raise
-        self._disk.check()
+    def __exit__(self, *error: Any) -> None:
+        self._opened.__exit__(*error)
 
     def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
         """Write arrays (n, ...) of frames from `start` on, those that are kept. Floats become float32."""
-        with self._checked():
-            for name, array in arrays.items():
-                if name in self._about:
-                    own = named(name, self._pair)
-                    data = self._file[own] if own in self._file else self._create(name, array)
-                    data[start : start + len(array)] = array
-                    data.flush()  # else its chunks may lie elsewhere where another thread delays Python's letting go
+        for name, array in arrays.items():
+            if name in self._about:
+                own = named(name, self._pair)
+                data = self._file[own] if own in self._file else self._create(name, array)
+                data[start : start + len(array)] = array
+                data.flush()  # else its chunks may lie elsewhere where another thread delays Python's letting go
+        self._disk.check()
 
     def write_labels(self, labels: dict[str, np.ndarray]) -> None:
         """Write the group ``labels``: a dataset (T,) of UTF-8 text for each label of the converted frames."""
         import h5py
 
-        with self._checked():
-            for name, column in labels.items():
-                self._file.create_dataset(f"labels/{name}", data=column, dtype=h5py.string_dtype(), track_times=False)
+        for name, column in labels.items():
+            self._file.create_dataset(f"labels/{name}", data=column, dtype=h5py.string_dtype(), track_times=False)
 
     def annotate(self, name: str, **attributes: Any) -> None:
         """Add attributes to a dataset that exists."""
-        with self._checked():
-            self._file[name].attrs.update({key: netcdf_value(value) for key, value in attributes.items()})
+        self._file[name].attrs.update({key: netcdf_value(value) for key, value in attributes.items()})
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:
         kind = "float32" if array.dtype.kind == "f" and name != "time" else array.dtype  # an hour has 4e8 us

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import check_plain, declared, open_plain
-from ..files.hdf5_writer import Disk
+from ..files.hdf5_writer import new_hdf5
 from ..recordings import Recording, Signals
 from ..recordings.chunks import read_parts
 from ..recordings.labels import Runs, extend
@@ -78,21 +78,11 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
 
 
 def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
-    import h5py
-
-    disk = Disk(file)
-    try:
-        with h5py.File(disk, "w", userblock_size=checksummed.ROOM) as out:
-            writer = _Writer(out)
-            for recording, signals, repeated in _signals(path, job):
-                writer.append(recording, signals, repeated)
-            writer.close(digest)
-    except Exception:  # raised again, unless the disk knows better
-        disk.check()  # HDF5 stumbles over what the disk refused: that is the error to tell
-        raise
-    finally:
-        disk.close()
-    disk.check()
+    with new_hdf5(file, checksummed.ROOM) as (out, _):
+        writer = _Writer(out)
+        for recording, signals, repeated in _signals(path, job):
+            writer.append(recording, signals, repeated)
+        writer.close(digest)
     return writer.count
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic
-from ..files.hdf5_writer import Disk
+from ..files.hdf5_writer import new_hdf5
 from ..translation.translate import CHUNK
 from ..translation.translator import Translator
 from .gel_frames import read_displacement
@@ -37,28 +37,21 @@ def reverse(
     """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``ARRAYS``.
     translator : its networks lead from the skin to that gel; progress : called with (frames done, frames in all)
     Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
-    import h5py
-
     if os.path.lexists(out) and not overwrite:
         raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
     held = read_displacement(path, translator.target)
     rows = select(frames, len(held.numbers))
-    advice = "Name another --out"
-    with atomic.writing(out, "a file in a writable folder", advice), atomic.new_file(out) as unfinished:
-        disk = Disk(unfinished)
-        with h5py.File(disk, "w") as file:
-            file.attrs.update({"format": FORMAT, "sensor": translator.source, "weights": translator.sha256})
-            for start in range(0, len(rows), CHUNK):
-                some = rows[start : start + CHUNK]
-                gel = np.stack(list(held.iterate_rows(some))).astype(np.float32)
-                arrays = {"frame": held.numbers[some].astype(np.int32), **translator.reverse(gel)}
-                for name, values in arrays.items():
-                    if start == 0:
-                        data = file.create_dataset(
-                            name, (len(rows), *values.shape[1:]), values.dtype, track_times=False
-                        )
-                        data.attrs.update(dict(zip(("unit", "description"), ARRAYS[name], strict=True)))
-                    file[name][start : start + len(some)] = values
-                progress(start + len(some), len(rows))
-        disk.close()
-        disk.check()
+    writable = atomic.writing(out, "a file in a writable folder", "Name another --out")
+    with writable, atomic.new_file(out) as unfinished, new_hdf5(unfinished) as (file, disk):
+        file.attrs.update({"format": FORMAT, "sensor": translator.source, "weights": translator.sha256})
+        for start in range(0, len(rows), CHUNK):
+            some = rows[start : start + CHUNK]
+            gel = np.stack(list(held.iterate_rows(some))).astype(np.float32)
+            arrays = {"frame": held.numbers[some].astype(np.int32), **translator.reverse(gel)}
+            for name, values in arrays.items():
+                if start == 0:
+                    data = file.create_dataset(name, (len(rows), *values.shape[1:]), values.dtype, track_times=False)
+                    data.attrs.update(dict(zip(("unit", "description"), ARRAYS[name], strict=True)))
+                file[name][start : start + len(some)] = values
+            disk.check()
+            progress(start + len(some), len(rows))

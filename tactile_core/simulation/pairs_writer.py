@@ -14,7 +14,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError
 from ..files import array_pack, atomic
-from ..files.hdf5_writer import Disk
+from ..files.hdf5_writer import new_hdf5
 from ..files.provenance import sha256
 from ..files.version import __version__
 from ..sensors import PAIR, SOURCE, TARGET
@@ -102,10 +102,8 @@ class Made(NamedTuple):
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
     """Join blocks in order into an HDF5 file of the first ``count`` contacts. Raises TactileError where that fails."""
-    import h5py
-
     try:
-        with atomic.new_file(out) as partial, Disk(partial) as disk, h5py.File(disk, "w") as file:
+        with atomic.new_file(out) as partial, new_hdf5(partial) as (file, disk):
             file.attrs.update({
                 "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
                 "indenters": json.dumps(made.indenters),

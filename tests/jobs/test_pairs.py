@@ -10,6 +10,7 @@ from msgspec import structs
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
+from tactile_core.files import hdf5_writer
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs import pairs
 from tactile_core.jobs.engine import run as runs
@@ -226,7 +227,7 @@ def test_a_block_cut_short_is_made_again(scene, made, interrupted, monkeypatch):
 def test_a_disk_that_fills_while_merging_is_told(scene, tmp_path, monkeypatch):
     out = tmp_path / "pairs.h5"
     full = OSError(errno.ENOSPC, "No space left on device")
-    monkeypatch.setattr(pairs_writer.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
+    monkeypatch.setattr(hdf5_writer.Disk, "check", lambda disk: (_ for _ in ()).throw(full))
     with pytest.raises(TactileError, match="No space left"):
         make_pairs(scene, 5, 7, out)
     assert not out.exists()
