@@ -25,12 +25,12 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the pages' commands first: one page may take a minute, in which other workers do the short tests.
+    """Run files that take all the memory they can get first, which is quicker while this process has freed little.
 
-    Then files that take all the memory they can get, which is quicker while this process has freed little.
+    Then the pages' commands: one page may take half a minute, in which other workers do the short tests.
     """
     greedy = "test_hdf5_bombs.py", "test_bombs.py"
-    items.sort(key=lambda item: (not item.name.startswith("test_commands_work"), item.path.name not in greedy))
+    items.sort(key=lambda item: (item.path.name not in greedy, not item.name.startswith("test_commands_work")))
 
 
 @pytest.fixture(scope="session")

@@ -245,5 +245,5 @@ def test_what_to_open_after_a_conversion_is_told_once(tactile, slide_csv, tmp_pa
 def test_each_warning_is_one_line(tactile, slide_csv, tmp_path):
     status, _, err = tactile("convert", slide_csv("two\nlines"), "--out", tmp_path / "out", "--keep", "")
     assert status == 0
-    assert err
+    assert "out_of_range" in err
     assert all(line.startswith(("tactile: warning: two lines: ", "tactile: next: ")) for line in err.splitlines())

@@ -21,6 +21,7 @@ from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.training import step_errors
 from tactile_core.training.step_errors import error_columns, translation_metrics, true_displacement
 from tactile_core.translation.gel_place import contact_patch
+from tactile_core.translation.networks import WEIGHTS_FOLDER
 
 
 @pytest.fixture(scope="module")
@@ -157,9 +158,8 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
     shutil.copy("docs/translation.md", tmp_path / "card.md")
     # prime as well; targets are met on the whole set alone
     monkeypatch.setattr(evaluate_translation, "QUICK_PRESSES", 29)
-    status = evaluate_translation.main(
-        ["--quick", "--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")]
-    )
+    written = ["--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")]
+    status = evaluate_translation.main(["--quick", "--weights", str(WEIGHTS_FOLDER), *written])
     rows = json.loads((tmp_path / "rows.json").read_text())
     missed = [row["name"] for row in rows if row["ok"] is False and row["unit"] not in COSTS]
     assert status == int(bool(missed))
