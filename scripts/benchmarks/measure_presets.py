@@ -4,8 +4,8 @@
     python scripts/benchmarks/measure_presets.py --fields 4            on fewer fields, which the file says; 10 else
     python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
 
-Errors are grey levels rms over the picture, its channels and the fields, before rounding: `_direct` from converged
-direct light, the others from the full model of a matte coating: 64 pictures from 512 points an LED, four bounces
+Errors are grey levels rms over the picture, its channels and the fields, before rounding: ``_error_direct`` from
+converged direct light, others from the full model of a matte coating: 64 pictures from 512 points an LED, four bounces
 gathered over horizons, the window. It shares no code with our integrator and has next to no noise; Mitsuba's own path
 integrator, the preset `reference`, is held against it too.
 Times are CPU time on one core, so that other programs do not count. Prints a table; exits 1 when an error row misses

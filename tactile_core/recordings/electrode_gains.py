@@ -51,7 +51,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     stiffness_error: float | None = None
 
     def rest(self) -> Rest | None:
-        """Return the unit's rest in the form that `prepare` takes; None where it is unknown."""
+        """Return the unit's rest as ``PrepareOptions.rest`` takes it; None where it is unknown."""
         if self.rest_counts is None:
             return None
         return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * len(self.gain)), self.rest_pdc)

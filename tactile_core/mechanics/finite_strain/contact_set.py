@@ -149,7 +149,7 @@ class ContactSet:
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
 
     def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
-        """Return the share of a step at which friction balances the rest along it; 1 where the whole step will do.
+        """Return the share of a step after which friction balances all other forces along it; 1 if the whole will do.
 
         move : (k, 3) m, of the nodes, in the frames of ``begin``; force : N m, of all other forces times the step, at
         its start; stiffness : N m, what the whole step adds to them and to friction as linearised by ``gripping``.
