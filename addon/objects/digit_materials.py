@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 
 from ...tactile_core.sensors.calibration import DIFFUSE, Coating
+from .node_group import Nodes
 from .surfaces import new_material
 
 LIT = "Lit by LEDs"  # attribute of a gel's points, 1: only these have an outer side with LEDs below it
@@ -41,18 +42,15 @@ def keep_leds_inside(material: bpy.types.Material) -> None:
 
     Light goes through the whole body, so that the gel's outer side has no shadow from it either.
     """
-    nodes = material.node_tree.nodes
-    lit, own, turn = (nodes.new(f"ShaderNode{kind}") for kind in ("Attribute", "TexCoord", "VectorTransform"))
-    lit.attribute_name = LIT
-    turn.vector_type, turn.convert_from, turn.convert_to = "NORMAL", "OBJECT", "WORLD"
-    outer = math(material, "SUBTRACT", 1.0, nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"])
-    up = math(
-        material, "SCALE", (0.0, 0.0, 1.0), math(material, "MULTIPLY", lit.outputs["Fac"], outer), kind="VectorMath"
-    )
-    tilted = math(material, "ADD", own.outputs["Normal"], up, kind="VectorMath")
-    material.node_tree.links.new(tilted, turn.inputs[0])
-    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
-    material.node_tree.links.new(turn.outputs[0], shader.inputs["Normal"])
+    nodes = Nodes(material.node_tree)
+    lit = nodes.add("ShaderNodeAttribute", attribute_name=LIT).outputs["Fac"]
+    own = nodes.add("ShaderNodeTexCoord").outputs["Normal"]
+    outer = nodes.math("SUBTRACT", 1.0, nodes.add("ShaderNodeNewGeometry").outputs["Backfacing"])
+    tilted = nodes.vector("ADD", own, nodes.vector("SCALE", (0.0, 0.0, 1.0), nodes.math("MULTIPLY", lit, outer)))
+    to_world = {"vector_type": "NORMAL", "convert_from": "OBJECT", "convert_to": "WORLD"}
+    turned = nodes.output("ShaderNodeVectorTransform", tilted, **to_world)
+    shader = next(node for node in nodes.tree.nodes if node.type == "BSDF_PRINCIPLED")
+    nodes.tree.links.new(turned, shader.inputs["Normal"])
 
 
 def set_coating(material: bpy.types.Material, coating: Coating) -> None:
@@ -77,16 +75,12 @@ def acrylic() -> bpy.types.Material:
     if found is not None:
         return found
     material, shader = _new("DIGIT acrylic", (0.7, 0.8, 0.85, 0.25))
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    clear, gloss, both = (nodes.new(f"ShaderNode{kind}") for kind in ("BsdfTransparent", "BsdfGlossy", "AddShader"))
-    fresnel = nodes.new("ShaderNodeFresnel")
-    fresnel.inputs["IOR"].default_value = 1.49  # of acrylic
-    gloss.inputs["Roughness"].default_value = 0.05
-    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
-    nodes.remove(shader)
-    links.new(toward_camera(material, fresnel.outputs[0]), gloss.inputs["Color"])
-    links.new(clear.outputs[0], both.inputs[0]), links.new(gloss.outputs[0], both.inputs[1])
-    links.new(both.outputs[0], output.inputs["Surface"])
+    nodes = Nodes(material.node_tree)
+    nodes.tree.nodes.remove(shader)
+    fresnel = nodes.output("ShaderNodeFresnel", 1.49)  # refractive index of acrylic
+    gloss = nodes.output("ShaderNodeBsdfGlossy", toward_camera(nodes, fresnel), 0.05)  # colour, roughness
+    both = nodes.output("ShaderNodeAddShader", nodes.output("ShaderNodeBsdfTransparent"), gloss)
+    nodes.tree.links.new(both, surface_of(material))
     if hasattr(material, "surface_render_method"):
         material.surface_render_method = "BLENDED"
     return material
@@ -100,30 +94,23 @@ def of_body(name: str, colour: list[float], roughness: float, metallic: float = 
         return found
     material, shader = _new(label, (*colour, 1.0))
     shader.inputs["Roughness"].default_value, shader.inputs["Metallic"].default_value = roughness, metallic
-    own = material.node_tree.nodes.new("ShaderNodeRGB").outputs[0]
+    nodes = Nodes(material.node_tree)
+    own = nodes.output("ShaderNodeRGB")
     own.default_value = (*colour, 1.0)
-    ray = toward_camera(material, 1.0)
-    material.node_tree.links.new(math(material, "SCALE", own, ray, kind="VectorMath"), shader.inputs["Base Color"])
-    material.node_tree.links.new(toward_camera(material, 0.5), shader.inputs["Specular IOR Level"])
+    seen = nodes.vector("SCALE", own, toward_camera(nodes, 1.0))
+    nodes.tree.links.new(seen, shader.inputs["Base Color"])
+    nodes.tree.links.new(toward_camera(nodes, 0.5), shader.inputs["Specular IOR Level"])
     return material
 
 
-def toward_camera(material: bpy.types.Material, value: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
+def toward_camera(nodes: Nodes, value: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
     """Return a node's output: ``value`` for rays that come from a camera, 0 for all others."""
-    ray = material.node_tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"]
-    return math(material, "MULTIPLY", ray, value)
+    return nodes.math("MULTIPLY", nodes.add("ShaderNodeLightPath").outputs["Is Camera Ray"], value)
 
 
-def math(material: bpy.types.Material, operation: str, *values: object, kind: str = "Math") -> bpy.types.NodeSocket:
-    """Add a math node and return its output; values : its inputs; kind : ``VectorMath`` for one of vectors"""
-    node = material.node_tree.nodes.new(f"ShaderNode{kind}")
-    node.operation = operation
-    for socket, value in zip([socket for socket in node.inputs if socket.enabled], values, strict=False):
-        if isinstance(value, bpy.types.NodeSocket):
-            material.node_tree.links.new(value, socket)
-        else:
-            socket.default_value = value
-    return node.outputs[0]
+def surface_of(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """Return the material's output, which takes the shader of its surface."""
+    return next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
 
 
 def _new(name: str, shown: tuple[float, ...]) -> tuple[bpy.types.Material, bpy.types.Node]:

@@ -56,14 +56,14 @@ def _group(
     columns, rows = image.size
     nodes = NodeGroup(label)
     own = column is None
-    index = nodes.add("GeometryNodeInputIndex").outputs[0] if own else nodes.attribute(column, "INT")
+    index = nodes.output("GeometryNodeInputIndex") if own else nodes.attribute(column, "INT")
     frame = nodes.add("GeometryNodeInputSceneTime").outputs["Frame"]
     # Pixel centres: (value + 0.5) / columns across; images are stored from the bottom, frames from the top.
     u = nodes.math("DIVIDE", nodes.math("ADD", index, 0.5), columns)
     row = nodes.math("ROUND", nodes.math("DIVIDE", nodes.math("SUBTRACT", frame, first), step))
     row = nodes.math("MINIMUM", nodes.math("MAXIMUM", row, 0.0), rows - 1)
     v = nodes.math("MULTIPLY_ADD", row, -1.0 / rows, 1.0 - 0.5 / rows)
-    place = nodes.add("ShaderNodeCombineXYZ", u, v).outputs[0]
+    place = nodes.output("ShaderNodeCombineXYZ", u, v)
     look = nodes.add("GeometryNodeImageTexture", image, place, interpolation="Closest", extension="EXTEND")
     geometry = nodes.tree.nodes.new("NodeGroupInput").outputs[0]
     return nodes.end(nodes.store(geometry, name, look.outputs["Color"], "FLOAT"))

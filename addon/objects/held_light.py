@@ -16,6 +16,7 @@ from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import COLOURS
 from ...tactile_core.sensors.unrolling import node_normals
 from . import digit_materials
+from .node_group import Nodes
 
 NODE = "Held light"  # the sum of the LEDs' parts, in the material
 _DARKEST = 1e-3  # of an albedo or a radiance that is divided by
@@ -78,34 +79,27 @@ def add_nodes(material: bpy.types.Material) -> None:
     Its inner side reflects no light onto itself either: the held light has all that the gel reflects so at rest, a
     part of a level, and Blender's gel, whose dome (the public mesh's) is three times as high, would add more.
     """
-    nodes, links, math = material.node_tree.nodes, material.node_tree.links, digit_materials.math
-    for left in [node for node in nodes if node.name.startswith(NODE)]:
-        nodes.remove(left)
-    albedo = nodes[digit_materials.ALBEDO].outputs[0]
-    colour = nodes.new("ShaderNodeSeparateColor")
-    links.new(albedo, colour.inputs[0])
+    nodes = Nodes(material.node_tree)
+    for left in [node for node in nodes.tree.nodes if node.name.startswith(NODE)]:
+        nodes.tree.nodes.remove(left)
+    albedo = nodes.tree.nodes[digit_materials.ALBEDO].outputs[0]
+    colour = nodes.add("ShaderNodeSeparateColor", albedo)
     total = None
-    for k, name in enumerate(COLOURS):
-        held, power = nodes.new("ShaderNodeAttribute"), nodes.new("ShaderNodeValue")
-        held.attribute_name, power.name, power.label = attribute(name), attribute(name), attribute(name)
-        share = math(material, "MULTIPLY", power.outputs[0], colour.outputs[k])
-        part = math(material, "SCALE", held.outputs["Vector"], share, kind="VectorMath")
-        total = part if total is None else math(material, "ADD", total, part, kind="VectorMath")
-    inner = nodes.new("ShaderNodeNewGeometry").outputs["Backfacing"]
-    seen = digit_materials.toward_camera(material, inner)
-    glow, both = nodes.new("ShaderNodeEmission"), nodes.new("ShaderNodeAddShader")
-    glow.name = glow.label = NODE
-    links.new(total, glow.inputs["Color"])
-    links.new(math(material, "DIVIDE", seen, LARGEST_LEVEL), glow.inputs["Strength"])
-    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
-    for link in output.inputs["Surface"].links:
-        links.new(link.from_socket, both.inputs[0])
-    links.new(glow.outputs[0], both.inputs[1])
-    links.new(both.outputs[0], output.inputs["Surface"])
-    between = math(material, "SUBTRACT", inner, seen)
-    lit = math(material, "SCALE", albedo, math(material, "SUBTRACT", 1.0, between), kind="VectorMath")
+    for k, name in enumerate(map(attribute, COLOURS)):
+        held = nodes.add("ShaderNodeAttribute", attribute_name=name).outputs["Vector"]
+        share = nodes.math("MULTIPLY", nodes.output("ShaderNodeValue", name=name, label=name), colour.outputs[k])
+        part = nodes.vector("SCALE", held, share)
+        total = part if total is None else nodes.vector("ADD", total, part)
+    inner = nodes.add("ShaderNodeNewGeometry").outputs["Backfacing"]
+    seen = digit_materials.toward_camera(nodes, inner)
+    glow = nodes.output("ShaderNodeEmission", total, nodes.math("DIVIDE", seen, LARGEST_LEVEL), name=NODE, label=NODE)
+    surface = digit_materials.surface_of(material)
+    both = nodes.output("ShaderNodeAddShader", *[link.from_socket for link in surface.links], glow)
+    nodes.tree.links.new(both, surface)
+    between = nodes.math("SUBTRACT", inner, seen)
+    lit = nodes.vector("SCALE", albedo, nodes.math("SUBTRACT", 1.0, between))
     for link in [link for link in albedo.links if link.to_socket.name == "Base Color"]:
-        links.new(lit, link.to_socket)
+        nodes.tree.links.new(lit, link.to_socket)
 
 
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:

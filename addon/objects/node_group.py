@@ -1,18 +1,15 @@
-"""Build groups of geometry nodes."""
+"""Build trees of nodes: of materials, and groups of geometry nodes."""
 
 from __future__ import annotations
 
 import bpy
 
 
-class NodeGroup:
-    """A geometry-node group under construction."""
+class Nodes:
+    """Adds nodes to a tree."""
 
-    def __init__(self, label: str) -> None:
-        self.tree = bpy.data.node_groups.new(label, "GeometryNodeTree")
-        self.tree.is_modifier = True
-        for way in ("INPUT", "OUTPUT"):
-            self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    def __init__(self, tree: bpy.types.NodeTree) -> None:
+        self.tree = tree
 
     def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
         """Add a node; links : sockets or values of its enabled inputs, in order, None for those left alone."""
@@ -27,19 +24,36 @@ class NodeGroup:
         node.location = (190 * (len(self.tree.nodes) % 6), -220 * (len(self.tree.nodes) // 6))
         return node
 
+    def output(self, kind: str, *links: object, **settings: object) -> bpy.types.NodeSocket:
+        """Add a node and return its first enabled output; arguments as of `add`"""
+        return next(s for s in self.add(kind, *links, **settings).outputs if s.enabled)
+
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
         """Add a math node and return its output; links : as of `add`"""
-        return self.add("ShaderNodeMath", *links, operation=operation).outputs[0]
+        return self.output("ShaderNodeMath", *links, operation=operation)
+
+    def vector(self, operation: str, *links: object) -> bpy.types.NodeSocket:
+        """Add a node of vector math and return its output; links : as of `add`"""
+        return self.output("ShaderNodeVectorMath", *links, operation=operation)
+
+
+class NodeGroup(Nodes):
+    """A geometry-node group under construction."""
+
+    def __init__(self, label: str) -> None:
+        super().__init__(bpy.data.node_groups.new(label, "GeometryNodeTree"))
+        self.tree.is_modifier = True
+        for way in ("INPUT", "OUTPUT"):
+            self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
 
     def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
         """Add a node that reads a named attribute of the mesh; return its output."""
-        node = self.add("GeometryNodeInputNamedAttribute", name, data_type=kind)
-        return next(s for s in node.outputs if s.enabled and s.name == "Attribute")
+        return self.output("GeometryNodeInputNamedAttribute", name, data_type=kind)
 
     def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
         """Add a node that stores ``value`` as a named attribute of a geometry's points; return that geometry."""
-        return self.add("GeometryNodeStoreNamedAttribute", geometry, None, name, value, data_type=kind,
-                        domain="POINT").outputs[0]  # fmt: skip
+        stored = geometry, None, name, value
+        return self.output("GeometryNodeStoreNamedAttribute", *stored, data_type=kind, domain="POINT")
 
     def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
         """Add an input of the group that users change in the modifier; text : what it is; least : its lower limit"""

@@ -87,21 +87,18 @@ def _facing() -> bpy.types.NodeTree:
     nodes.input(_MIDDLE, "Vector", "Middle of the sensor")
     nodes.input(_HALF, "Vector", "Half its size")
     given = nodes.tree.nodes.new("NodeGroupInput")
-    camera = nodes.add("GeometryNodeInputActiveCamera").outputs[0]
+    camera = nodes.output("GeometryNodeInputActiveCamera")
     seen = nodes.add("GeometryNodeObjectInfo", camera, transform_space="RELATIVE")
-    away = nodes.add("ShaderNodeVectorMath", seen.outputs["Location"], given.outputs[_MIDDLE], operation="DISTANCE")
-    half = nodes.add("ShaderNodeVectorMath", given.outputs[_HALF], operation="LENGTH").outputs["Value"]
+    away = nodes.vector("DISTANCE", seen.outputs["Location"], given.outputs[_MIDDLE])
+    half = nodes.vector("LENGTH", given.outputs[_HALF])
     near = nodes.math("MULTIPLY", half, _NEAR)
-    there = nodes.add("FunctionNodeCompare", away.outputs["Value"], near, operation="GREATER_THAN").outputs[0]
-    turn = nodes.add("GeometryNodeSwitch", there, _NO_CAMERA, seen.outputs["Rotation"], input_type="ROTATION").outputs[
-        0
-    ]
-    down = nodes.add("FunctionNodeRotateVector", (0.0, -1.0, 0.0), turn).outputs[0]
-    reach = nodes.add("ShaderNodeVectorMath", down, operation="ABSOLUTE").outputs[0]
-    reach = nodes.add("ShaderNodeVectorMath", reach, given.outputs[_HALF], operation="DOT_PRODUCT").outputs["Value"]
-    below = nodes.add("ShaderNodeVectorMath", down, operation="SCALE")
-    nodes.tree.links.new(reach, below.inputs["Scale"])
-    place = nodes.add("ShaderNodeVectorMath", given.outputs[_MIDDLE], below.outputs[0], operation="ADD").outputs[0]
+    there = nodes.output("FunctionNodeCompare", away, near, operation="GREATER_THAN")
+    turn = nodes.output("GeometryNodeSwitch", there, _NO_CAMERA, seen.outputs["Rotation"], input_type="ROTATION")
+    down = nodes.output("FunctionNodeRotateVector", (0.0, -1.0, 0.0), turn)
+    reach = nodes.vector("ABSOLUTE", down)
+    reach = nodes.vector("DOT_PRODUCT", reach, given.outputs[_HALF])
+    below = nodes.vector("SCALE", down, reach)
+    place = nodes.vector("ADD", given.outputs[_MIDDLE], below)
     placed = nodes.add("GeometryNodeTransform", given.outputs["Geometry"])
     nodes.tree.links.new(place, placed.inputs["Translation"])
     nodes.tree.links.new(turn, placed.inputs["Rotation"])

@@ -121,9 +121,9 @@ def _surface(style: str) -> bpy.types.NodeTree:
     if style == "DISPLACEMENT":
         nodes.input(ERROR, "Float", "Expected error, in the object's units: colours fade below it", 0.0, 0.0)
     given = nodes.tree.nodes.new("NodeGroupInput")
-    here = nodes.add("GeometryNodeInputPosition").outputs[0]
+    here = nodes.output("GeometryNodeInputPosition")
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
-    moved = nodes.add("ShaderNodeVectorMath", here, rest, operation="SUBTRACT").outputs[0]
+    moved = nodes.vector("SUBTRACT", here, rest)
     kept = nodes.store(given.outputs["Geometry"], DISPLACEMENT, moved, "FLOAT_VECTOR")
     again = nodes.attribute(DISPLACEMENT, "FLOAT_VECTOR")
     ramp = nodes.add("ShaderNodeValToRGB", _SHARE[style](nodes, given.outputs[LARGEST], again))
@@ -135,15 +135,12 @@ def _surface(style: str) -> bpy.types.NodeTree:
         colour = _above_error(nodes, colour, again, given.outputs[ERROR])
     shown = nodes.store(kept, COLOUR, colour, "FLOAT_COLOR")
     more = nodes.math("SUBTRACT", given.outputs[EXAGGERATION], 1.0)
-    extra = nodes.add("ShaderNodeVectorMath", again, operation="SCALE")
-    nodes.tree.links.new(more, extra.inputs["Scale"])
-    placed = nodes.add("GeometryNodeSetPosition", shown)
-    nodes.tree.links.new(extra.outputs[0], placed.inputs["Offset"])
-    return _painted(nodes, placed.outputs[0])
+    extra = nodes.vector("SCALE", again, more)
+    return _painted(nodes, nodes.output("GeometryNodeSetPosition", shown, None, None, extra))
 
 
 def _moved(nodes: NodeGroup, largest: bpy.types.NodeSocket, moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    length = nodes.add("ShaderNodeVectorMath", moved, operation="LENGTH").outputs["Value"]
+    length = nodes.vector("LENGTH", moved)
     return nodes.math("DIVIDE", length, largest)
 
 
@@ -159,7 +156,7 @@ def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.
 
 def _near_electrodes(nodes: NodeGroup, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """The colour near an electrode, grey elsewhere; distances are in metres in any file."""
-    near = nodes.add("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0).outputs[0]
+    near = nodes.output("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0)
     return _over_grey(nodes, near, colour)
 
 
@@ -167,14 +164,13 @@ def _above_error(
     nodes: NodeGroup, colour: bpy.types.NodeSocket, moved: bpy.types.NodeSocket, error: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
     """The colour where a place has moved by the error or more, the greyer the less it has."""
-    length = nodes.add("ShaderNodeVectorMath", moved, operation="LENGTH").outputs["Value"]
+    length = nodes.vector("LENGTH", moved)
     share = nodes.math("DIVIDE", length, nodes.math("MAXIMUM", error, 1e-9))
     return _over_grey(nodes, nodes.math("MINIMUM", share, 1.0), colour)
 
 
 def _over_grey(nodes: NodeGroup, share: bpy.types.NodeSocket, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    mixed = nodes.add("ShaderNodeMix", share, (*STILL, 1.0), colour, data_type="RGBA")
-    return next(s for s in mixed.outputs if s.enabled)
+    return nodes.output("ShaderNodeMix", share, (*STILL, 1.0), colour, data_type="RGBA")
 
 
 _SHARE: dict[str, Callable] = {"DISPLACEMENT": _moved, "CONTACT_PATCH": _touched, "ELECTRODES": _changed}
@@ -198,13 +194,12 @@ def _arrow(style: str) -> bpy.types.NodeTree:
     given = nodes.tree.nodes.new("NodeGroupInput")
     seen = nodes.add("GeometryNodeObjectInfo", given.outputs[SENSOR], transform_space="RELATIVE")
     force = given.outputs[FORCE]
-    newtons = nodes.add("ShaderNodeVectorMath", force, operation="LENGTH").outputs["Value"]
+    newtons = nodes.vector("LENGTH", force)
     length = nodes.math("MULTIPLY", newtons, given.outputs[LENGTH])
-    back = nodes.add("ShaderNodeVectorMath", force, operation="SCALE")
-    back.inputs["Scale"].default_value = -1.0
+    back = nodes.vector("SCALE", force, -1.0)
     turn = nodes.tree.nodes.new("FunctionNodeAlignRotationToVector")
     turn.axis = "Z"
-    nodes.tree.links.new(back.outputs[0], turn.inputs["Vector"])
+    nodes.tree.links.new(back, turn.inputs["Vector"])
     placed = nodes.add("GeometryNodeTransform", given.outputs["Geometry"])
     for name, socket in (("Translation", _mean_dent(nodes, seen.outputs["Geometry"])), ("Rotation", turn.outputs[0]),
                          ("Scale", length)):  # fmt: skip
@@ -214,21 +209,18 @@ def _arrow(style: str) -> bpy.types.NodeTree:
 
 def _mean_dent(nodes: NodeGroup, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Mean of the nodes' places, weighted by the square of how far each has moved."""
-    here = nodes.add("GeometryNodeInputPosition").outputs[0]
+    here = nodes.output("GeometryNodeInputPosition")
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
-    moved = nodes.add("ShaderNodeVectorMath", here, rest, operation="SUBTRACT").outputs[0]
-    weight = nodes.add("ShaderNodeVectorMath", moved, moved, operation="DOT_PRODUCT").outputs["Value"]
-    weighed = nodes.add("ShaderNodeVectorMath", here, operation="SCALE")
-    nodes.tree.links.new(weight, weighed.inputs["Scale"])
+    moved = nodes.vector("SUBTRACT", here, rest)
+    weight = nodes.vector("DOT_PRODUCT", moved, moved)
+    weighed = nodes.vector("SCALE", here, weight)
     sums = []
-    for kind, value in (("FLOAT_VECTOR", weighed.outputs[0]), ("FLOAT", weight)):
+    for kind, value in (("FLOAT_VECTOR", weighed), ("FLOAT", weight)):
         node = nodes.add("GeometryNodeAttributeStatistic", sensor, None, value, data_type=kind, domain="POINT")
         sums.append(next(s for s in node.outputs if s.enabled and s.name == "Sum"))
     # Blender divides by zero to zero: nothing has moved, and there is no arrow.
     share = nodes.math("DIVIDE", 1.0, sums[1])
-    mean = nodes.add("ShaderNodeVectorMath", sums[0], operation="SCALE")
-    nodes.tree.links.new(share, mean.inputs["Scale"])
-    return mean.outputs[0]
+    return nodes.vector("SCALE", sums[0], share)
 
 
 _BUILD = {"DISPLACEMENT": _surface, "CONTACT_PATCH": _surface, "ELECTRODES": _surface, "FORCE_ARROW": _arrow}

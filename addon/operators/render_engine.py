@@ -6,7 +6,6 @@ import traceback
 
 import bpy
 import numpy as np
-from bpy.app.handlers import persistent
 
 from ...tactile_core.errors import TactileError
 from ..objects import digit_unit
@@ -126,12 +125,6 @@ def _panels() -> list[type]:
     return found
 
 
-@persistent
-def _end_workers(*_: object) -> None:
-    """Another file is opened: nothing draws for this one any more."""
-    tracer_process.close_all()
-
-
 def _end_idle_workers() -> float:
     """Called by a timer; returns the seconds to the next call."""
     tracer_process.close_idle()
@@ -146,12 +139,10 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take back what `register` did, and end all workers."""
+    """Take back what `register` did."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     bpy.app.timers.unregister(_end_idle_workers)
-    tracer_process.close_all()
 
 
 CLASSES = (TactileRenderEngine,)
-HANDLERS = ((bpy.app.handlers.load_pre, _end_workers),)

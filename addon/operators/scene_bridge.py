@@ -72,7 +72,8 @@ def authored(context: bpy.types.Context) -> Authored:
     meshes: dict[str, bytes] = {}
     specs = [_spec(thing, sensor, context, meshes)]
     # Other indenters of the file stand in the scene as well, in the order they were added.
-    specs += [_spec(other, sensor, context, meshes) for other in _others(scene, thing)]
+    others = [other for other in scene.objects if other.tactile.role == "INDENTER" and other != thing]
+    specs += [_spec(other, sensor, context, meshes) for other in others]
     kept = document.pop("recording", None) or {}
     by_height = thing.tactile.press_by == "HEIGHT"
     frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
@@ -101,10 +102,6 @@ def _scene(kind: type, document: dict, specs: list, recording: dict) -> Any:
         return msgspec.convert(whole, kind)
     except msgspec.ValidationError as error:
         raise TactileError("Tactile scene", str(error), "what a scene file may hold") from error
-
-
-def _others(scene: bpy.types.Scene, thing: bpy.types.Object) -> list[bpy.types.Object]:
-    return [other for other in scene.objects if other.tactile.role == "INDENTER" and other != thing]
 
 
 def _spec(thing, sensor, context, meshes: dict[str, bytes]) -> Any:  # noqa: ANN001

@@ -8,10 +8,12 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from ..objects import axes, curves, mesh_cache
+from ..objects import axes, curves, indenter_objects, mesh_cache
 from ..settings import properties
 from . import set_style
+from .scene_bridge import motion_of, sensor_of
 
 STANDING = "{} simulated"
 MOVED = "moved "  # before a sensor's name, in a worker's result
@@ -79,9 +81,6 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
 
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
     """A solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires."""
-    from ..objects import indenter_objects
-    from .scene_bridge import motion_of, sensor_of
-
     sensor = sensor_of(context)
     name = STANDING.format(thing.name)
     twin = context.scene.objects.get(name)
@@ -91,7 +90,8 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     twin.tactile.role = "TWIN"
     twin.parent, twin.rotation_mode, thing.hide_render = sensor, "QUATERNION", True
     # A few thin lines and a body that is seen through: twin and dent stay in view.
-    thing.display_type, thing.display_bounds_type = "BOUNDS", _BOUNDS.get(_kind(thing), "BOX")
+    kind = json.loads(thing.tactile.spec or "{}").get("kind")
+    thing.display_type, thing.display_bounds_type = "BOUNDS", _BOUNDS.get(kind, "BOX")
     twin.color, twin.show_transparent = (*thing.color[:3], 0.4), True
     relative = indenter_objects.world_axes(thing, sensor)
     foot = indenter_objects.foot_of(thing, relative, context.evaluated_depsgraph_get())
@@ -101,8 +101,6 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     # Columns of the pose are the body's axes in the sensor's frame; Blender's axes are that frame turned.
     turns = axes.to_blender(result.turn[sample].swapaxes(1, 2), 1.0).swapaxes(1, 2)
     own = relative / size
-    from mathutils import Matrix
-
     quaternions = []
     for turn in turns:
         found = Matrix((turn @ own).tolist()).to_quaternion()
@@ -117,7 +115,3 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
         places[lifted] = (axes.to_blender(keyed, sensor.tactile.per_metre) - foot)[lifted]
     curves.write_curves(twin, "location", frames, places)
     curves.write_curves(twin, "rotation_quaternion", frames, np.array([q[:] for q in quaternions]))
-
-
-def _kind(thing: bpy.types.Object) -> str:
-    return json.loads(thing.tactile.spec)["kind"] if thing.tactile.spec else ""

@@ -47,12 +47,9 @@ def _touch(sensor: str, spec: str, x: float, z: float, tilt: float) -> tuple[np.
 
     from ...tactile_core.simulation.indenter_specs import IndenterSpec
 
-    pose = _pose(sensor, msgspec.convert(json.loads(spec), IndenterSpec).build(), x, z, tilt)
+    indenter = msgspec.convert(json.loads(spec), IndenterSpec).build()
+    pose = pose_at(sensor, indenter, Placement(x, z, tilt))
     return pose.apex, pose.direction
-
-
-def _pose(sensor: str, indenter: Any, x: float, z: float, tilt: float) -> Any:
-    return pose_at(sensor, indenter, Placement(x, z, tilt))
 
 
 class TACTILE_OT_snap_to_gel(TactileOperator):
@@ -83,7 +80,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
         depsgraph = context.evaluated_depsgraph_get()
         place = _place(thing, sensor, depsgraph)
         name, built = properties.sensor_name(sensor), self._built(thing, sensor, depsgraph)
-        pose = _pose(name, built, place[0], place[2], thing.tactile.tilt)
+        pose = pose_at(name, built, Placement(place[0], place[2], thing.tactile.tilt))
         moved = pose.apex + 1e-3 * self.depth * pose.direction - place
         world = sensor.matrix_world.to_3x3() @ Vector(axes.to_blender(moved, sensor.tactile.per_metre))
         matrix = thing.matrix_world.copy()
