@@ -77,10 +77,8 @@ def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[
 
 
 def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
-    """Write a movement's displacements to a file of the caches' folder; return the movement with that file.
-
-    One in a file is returned as it is. per_metre : Blender units in a metre; name : begins the file's name
-    """
+    """Return a movement in a file of the caches' folder, which is written unless it is in a file already.
+    per_metre : Blender units in a metre; name : begins the file's name"""
     if moved.file is not None:
         return moved
     token = hashlib.sha256(moved.displacement.tobytes()).hexdigest()[:8]

@@ -110,9 +110,7 @@ def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[F
 
 def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
     """Measure ``count`` random contacts, each reached in ``steps`` even steps of depth, from 2 on the first not timed.
-
-    Returns times of the steps, and the contacts at the ends, None where none is found.
-    """
+    Returns times of the steps, and the contacts at the ends, None where none is found."""
     times: Times = []
     last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):

@@ -120,10 +120,8 @@ def working_variants() -> list[str]:
 
 
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
-    """Yield every preset's error on heights (H, W) m, against converged direct light and the full model ``truth``.
-
-    baseline : of the rows, the background alone
-    """
+    """Yield every preset's error on heights (H, W) m, from converged direct light and the full model ``truth``.
+    Baseline: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
     of, levels, spread = (
         f"{len(heights)} fields",

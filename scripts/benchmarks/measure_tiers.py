@@ -103,9 +103,7 @@ def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], 
 
 def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomContact) -> dict[str, np.ndarray]:
     """A random contact in one tier, from its file, or solved and kept there; {} where the tier finds none.
-
-    Arrays by name: number, share of the thickness, displacement (n, 3) m, force N, seconds.
-    """
+    Arrays by name: number, share of the thickness, displacement (n, 3) m, force N, seconds."""
     path = work / f"{sensor}_{tier}_{SEED}_{number:03d}.npz"
     if tier == "fast" or not path.exists():
         try:

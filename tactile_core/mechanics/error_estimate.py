@@ -40,9 +40,7 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
     """Enlarge a depth's errors (shape m, force relative) for an indenter of least radius ``radius`` m.
-
-    nodes : number that touch; at 0 the errors are ``depth`` m and 1
-    """
+    nodes : number that touch; at 0 the errors are ``depth`` m and 1"""
     if not nodes:
         return _of_nothing(depth)
     sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))

@@ -84,10 +84,8 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
 def paired(
     sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
 ) -> Iterator[Sample]:
-    """Solve a press in the fast tier at the full tier's depths; yield a sample of each contact that both tiers hold.
-
-    number : of the press; full : its contacts, as ``full_press`` returns them
-    """
+    """Solve press ``number`` in the fast tier at the depths of ``full_press``'s contacts, ``full``; yield a sample of
+    each contact that both tiers hold."""
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None

@@ -52,10 +52,7 @@ def miss(press: int, share: float, found: np.ndarray, force: float, true: np.nda
 
 
 def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
-    """Yield the fast tier's errors at the depths of contacts that the full tier solved with friction, if it converges.
-
-    pairs : those contacts, of presses of the scene
-    """
+    """Yield the fast tier's errors, where it converges, at depths of a scene's ``pairs`` solved by the full tier."""
     for press in np.unique(pairs.press):
         rows = np.flatnonzero(pairs.press == press)
         indenter = scene.indenters[int(pairs.indenter[rows[0]])].build()

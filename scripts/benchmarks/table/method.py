@@ -42,10 +42,8 @@ class Method:
 
 
 def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
-    """Least CPU ms a frame of calls of ``work``, each of some frames, after a first that may compile: others slow it.
-
-    least_seconds : CPU s to go on for; most : calls, and three at least
-    """
+    """Least CPU ms a frame of calls of ``work``, each of some frames, after a first that may compile.
+    least_seconds : CPU s to go on for; most : calls, and three at least"""
     work()
     took, began = [], time.process_time()
     while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):

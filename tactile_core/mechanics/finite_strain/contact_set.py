@@ -232,10 +232,8 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release nodes in tension, add those that penetrate; true if there are none and gaps are below tolerance, m.
-
-        at : (n, 3) m, the mesh's nodes
-        """
+        """Release nodes in tension, add those that penetrate; at (n, 3) m: the mesh's nodes. Returns true if there are
+        none and gaps are below the tolerance, m."""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])
