@@ -46,12 +46,13 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
         raise DamagedError(str(error)) from error
 
 
-def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> None:
-    """Write named arrays as they come, each whole or not at all, and their hashes last.
+def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> dict[str, np.ndarray]:
+    """Write named arrays as they come, each whole or not at all, and their hashes last; return them as `load` does.
     room : space needed, in words, such as "350 MB". Raises TactileError for a folder that cannot be written."""
     with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
         hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays}
         atomic.write_json(folder / HASHES, hashes)
+    return {name: _mapped(folder / f"{name}.npy") for name in hashes}
 
 
 def claim(folder: Path, room: str) -> None:
@@ -77,5 +78,9 @@ def _checked(file: Path, stated: str) -> np.ndarray:
         found = hashlib.file_digest(opened, "sha256").hexdigest()
     if found != stated:
         raise DamagedError(f"{file.name} has changed since it was built")
+    return _mapped(file)
+
+
+def _mapped(file: Path) -> np.ndarray:
     # A plain view: numpy's memory map class costs a microsecond at every slice.
     return np.load(file, mmap_mode="r", allow_pickle=False).view(np.ndarray)

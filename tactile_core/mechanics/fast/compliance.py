@@ -176,10 +176,8 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
         halves = unpack(compact_file(solid.name), folder.name)
         if halves is None:
             log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
-            array_cache.store(folder, build(solid).items(), _ROOM)
-        else:
-            array_cache.store(folder, _assembled(solid, *halves), _ROOM)
-    return array_cache.load(folder, ARRAYS)
+            halves = condensed(solid)
+        return array_cache.store(folder, _assembled(solid, *halves), _ROOM)
 
 
 def compact_file(sensor: str) -> pathlib.Path:
