@@ -175,10 +175,11 @@ def test_lying_photographs_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("coarse_fits")
-def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
-    start, out = tmp_path / "start.toml", tmp_path / "unit.toml"
-    write_calibration(start, other_unit())
-    untouched = str(folder.parent / "untouched.png")
+def test_verb_fits_tries_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    start, out, small = tmp_path / "start.toml", tmp_path / "unit.toml", other_unit().at_size(30, 40)
+    write_calibration(start, small)
+    folder = write_photographs(tmp_path / "presses", small, PLACES[:4])
+    untouched = str(tmp_path / "untouched.png")
     common = [str(folder), "--background", untouched, "--only", "press_0.png,press_3.png"]
     words = ["calibrate", *common, "--quick", "--ball-diameter", "6", "--start", str(start), "--out", str(out)]
     assert main(words) == 0
@@ -186,7 +187,7 @@ def test_verb_fits_tries_and_writes(folder: Path, tmp_path: Path, capsys: pytest
     assert "roi_psnr" in said.out and str(out) in said.out and "tell too little of" in said.err
     assert all(f"press_{number}.png: used; " in said.err for number in (0, 3))
     assert f"next: look at {tmp_path / 'unit.png'}" in said.err and "the background alone" in said.err
-    assert Image.open(tmp_path / "unit.png").size[0] > 3 * SHAPE[0]
+    assert Image.open(tmp_path / "unit.png").size[0] > 3 * small.camera.shape[1]
     assert load_calibration(out).unit == "unit"
     rows, sheet = tmp_path / "rows.json", tmp_path / "trial.png"
     words = ["calibrate", "--test", str(out), *common, "--json", str(rows), "--sheet", str(sheet)]
