@@ -81,6 +81,15 @@ def test_silence_stays_silent(shipped, translation):
         assert not values[still & untouched].any()
 
 
+def test_a_frame_does_not_depend_on_its_neighbours(translator, signals, translation):
+    few = [100, 80, 200]
+    part = {name: getattr(signals, name)[few] for name in ("change", "electrodes", "quiet", "flags", "pdc")}
+    alone = translator(dataclasses.replace(signals, **part))
+    # networks.py states bit equality where the BLAS does not split work otherwise, and 1e-5 relative everywhere
+    scale = np.abs(translation.displacement_digit).max()
+    np.testing.assert_allclose(alone.displacement_digit, translation.displacement_digit[few], atol=1e-5 * scale)
+
+
 def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped, signals, translation):
     assert np.median(translation.confidence[touched(shipped)]) > 0.8
     assert not (translation.flags[touched(shipped)] & Flag.OUT_OF_RANGE).any()
