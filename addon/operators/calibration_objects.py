@@ -11,14 +11,16 @@ from ..settings import properties, render_settings
 from ..settings.reports import TactileOperator
 
 
-class _OnGel:
+class OnGel:
+    """Operators that need a gel"""
+
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there is a gel."""
         return properties.can(cls, lambda: properties.needed_gel(context.scene))
 
 
-class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
+class TACTILE_OT_reset_to_calibration(OnGel, TactileOperator):
     """Put LEDs, coating and camera back to the calibration; their keyframes and drivers are removed"""
 
     bl_idname = "tactile.reset_to_calibration"
@@ -32,7 +34,7 @@ class TACTILE_OT_reset_to_calibration(_OnGel, TactileOperator):
         digit_body.reset(gel, render_settings.calibration_of(context.scene, properties.sensor_name(gel)))
 
 
-class TACTILE_OT_save_as_calibration(_OnGel, TactileOperator, ExportHelper):
+class TACTILE_OT_save_as_calibration(OnGel, TactileOperator, ExportHelper):
     """Write LEDs, coating and camera as they are on this frame as a calibration file, for every `tactile` command"""
 
     bl_idname = "tactile.save_as_calibration"

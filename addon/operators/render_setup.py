@@ -13,6 +13,7 @@ from ..objects import digit_body, digit_materials, digit_unit
 from ..settings import properties, render_settings, reports
 from ..settings.reports import TactileOperator
 from . import pictures
+from .calibration_objects import OnGel
 from .render_engine import ID
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
@@ -61,16 +62,11 @@ def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
         pictures.prepare(context.scene, context.evaluated_depsgraph_get())
 
 
-class TACTILE_OT_set_up_render(TactileOperator):
+class TACTILE_OT_set_up_render(OnGel, TactileOperator):
     """Render what a gel's camera sees: engine, its size in pixels, colours as it gives them, a camera in the gel"""
 
     bl_idname = "tactile.set_up_render"
     bl_label = "Set Up Render"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a gel."""
-        return properties.can(cls, lambda: properties.needed_gel(context.scene))
 
     def work(self, context: bpy.types.Context) -> None:
         """See ``TactileOperator``."""
