@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tactile_core.geometry.lattice import Lattice, grid_faces
-from tactile_core.mechanics.fast.compliance import Compliance, Solid, build
+from tactile_core.mechanics.fast.compliance import Compliance, Solid, assembled, condensed
 from tactile_core.mechanics.solids.elasticity import cell_stiffness
 from tactile_core.mechanics.solids.hex_mesh import HexMesh, hex_cells
 from tactile_core.sensors import Material
@@ -25,7 +25,8 @@ def slab_compliance(x: np.ndarray, z: np.ndarray, y: np.ndarray, material: Mater
     """Its compliance, touchable within ``reach`` m of the middle."""
     mesh, lattice = slab_mesh(x, z, y)
     touchable = np.flatnonzero(np.hypot(lattice.rest[:, 0], lattice.rest[:, 2]) < reach)
-    return Compliance("slab", lattice, touchable, **build(Solid("slab", lattice, touchable, mesh, material)))
+    solid = Solid("slab", lattice, touchable, mesh, material)
+    return Compliance("slab", lattice, touchable, **dict(assembled(solid, *condensed(solid))))
 
 
 def assemble(mesh: HexMesh, material: Material):

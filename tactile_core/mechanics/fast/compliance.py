@@ -177,17 +177,12 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
         if halves is None:
             log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)
             halves = condensed(solid)
-        return array_cache.store(folder, _assembled(solid, *halves), _ROOM)
+        return array_cache.store(folder, assembled(solid, *halves), _ROOM)
 
 
 def compact_file(sensor: str) -> pathlib.Path:
     """Path of a sensor's condensed halves, where they ship; `scripts/benchmarks/make/make_compliance.py` makes them."""
     return shipped(f"compliance/{sensor}.h5")
-
-
-def build(solid: Solid) -> dict[str, np.ndarray]:
-    """Compute the ``ARRAYS`` of a ``Compliance``, by name, from a solid that is even in z. Raises as ``condensed``."""
-    return dict(_assembled(solid, *condensed(solid)))
 
 
 def condensed(solid: Solid) -> tuple[Half, Half]:
@@ -224,7 +219,7 @@ def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
 
 
-def _assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
+def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
     """Put the halves of a solid together, and the fluid into it; yields the ``ARRAYS``, so that none need stay."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap

@@ -25,7 +25,7 @@ def test_what_ships_was_made_from_the_sensor_that_ships(sensor):
 
 def test_a_sensor_that_ships_is_not_built(monkeypatch, tmp_path):
     monkeypatch.setenv("TACTILE_CACHE", str(tmp_path))
-    monkeypatch.setattr(compliance, "build", lambda *given: pytest.fail("matrices were built"))
+    monkeypatch.setattr(compliance, "condensed", lambda *given: pytest.fail("matrices were built"))
     first, second = (compliance._cached(compliance.solid_of("digit")) for _ in range(2))
     np.testing.assert_array_equal(first.move, second.move)
 

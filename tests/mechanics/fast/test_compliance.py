@@ -31,7 +31,7 @@ def tiny(tmp_path, monkeypatch):
 
 def test_second_load_reads_the_first_ones_files(tiny, tmp_path, monkeypatch):
     first = np.array(tiny().move)
-    monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("built again"))
+    monkeypatch.setattr(compliance, "condensed", lambda *arguments: pytest.fail("built again"))
     np.testing.assert_array_equal(tiny().move, first)
 
 
@@ -66,14 +66,14 @@ def test_a_damaged_file_is_built_again_and_told(tiny, tmp_path, caplog, spoil, n
 def test_an_entry_without_hashes_is_not_trusted(tiny, tmp_path, monkeypatch):
     tiny()
     next((tmp_path / "cache").glob(f"*/{array_cache.HASHES}")).unlink()
-    monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("built again"))
+    monkeypatch.setattr(compliance, "condensed", lambda *arguments: pytest.fail("built again"))
     with pytest.raises(pytest.fail.Exception):
         tiny()
 
 
 def test_two_that_ask_at_once_build_once(tiny, monkeypatch):
     """Two threads: their locks are of two open files, as two processes' are."""
-    built, real = [], compliance.build
+    built, real = [], compliance.condensed
 
     def slow(*arguments):
         built.append(1)
@@ -84,7 +84,7 @@ def test_two_that_ask_at_once_build_once(tiny, monkeypatch):
 
     waiting, real_wait = [], lock._wait
     monkeypatch.setattr(lock, "_wait", lambda descriptor: (waiting.append(1) if built else None, real_wait(descriptor)))
-    monkeypatch.setattr(compliance, "build", slow)
+    monkeypatch.setattr(compliance, "condensed", slow)
     second = threading.Thread(target=tiny)
     tiny()
     second.join()
@@ -93,7 +93,7 @@ def test_two_that_ask_at_once_build_once(tiny, monkeypatch):
 
 def test_a_cache_that_cannot_be_written_is_told_before_the_work(tiny, tmp_path, monkeypatch):
     (tmp_path / "cache").write_text("a file in the way")
-    monkeypatch.setattr(compliance, "build", lambda *arguments: pytest.fail("worked first"))
+    monkeypatch.setattr(compliance, "condensed", lambda *arguments: pytest.fail("worked first"))
     with pytest.raises(TactileError, match="TACTILE_CACHE"):
         tiny()
 
