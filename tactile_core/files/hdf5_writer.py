@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,16 +48,23 @@ class Disk(io.FileIO):
 
 
 @contextmanager
-def new_hdf5(path: Path, room: int = 0) -> Iterator[tuple[h5py.File, Disk]]:
+def new_hdf5(path: Path, attributes: Mapping[str, Any], room: int = 0) -> Iterator[tuple[h5py.File, Disk]]:
     """Yield a new file, and its disk to `check` between its parts; the end of the block closes it.
-    room : bytes before the HDF5 part, 0, 512 or a doubling of it. Raises the disk's OSError, also where HDF5 fails by
-    it first."""
+    attributes : of its root; room : bytes before the HDF5 part, 0, 512 or a doubling of it
+    Raises what the block raises; but the disk's OSError where HDF5 fails by it first."""
     import h5py
 
     with Disk(path) as disk:
         try:
-            with h5py.File(disk, "w", userblock_size=room) as file:
+            file = h5py.File(disk, "w", userblock_size=room)
+            try:
+                file.attrs.update(attributes)
                 yield file, disk
+            except BaseException:
+                with suppress(Exception):  # the error on its way out says more
+                    file.close()
+                raise
+            file.close()
         except Exception:  # raised again, unless the disk knows better: HDF5 gives many types to one cause
             disk.check()
             raise

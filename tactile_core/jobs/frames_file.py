@@ -136,12 +136,11 @@ class FramesFile:
             pictures, too, and a large array has one chunk a frame"""
         self._about = arrays_of(keep, shard=bool(room))
         self._count, self._framed, self._pair = count, bool(room), pair
-        self._attributes, self._opened = attributes, new_hdf5(path, room)
+        about = {"format": FORMAT, "tactile_core": __version__, **attributes}
+        self._opened = new_hdf5(path, {name: netcdf_value(value) for name, value in about.items()}, room)
 
     def __enter__(self) -> FramesFile:
         self._file, self._disk = self._opened.__enter__()
-        about = {"format": FORMAT, "tactile_core": __version__, **self._attributes}
-        self._file.attrs.update({name: netcdf_value(value) for name, value in about.items()})
         return self
 
     def __exit__(self, *error: Any) -> None:

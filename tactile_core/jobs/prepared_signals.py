@@ -78,7 +78,7 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
 
 
 def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
-    with new_hdf5(file, checksummed.ROOM) as (out, _):
+    with new_hdf5(file, {}, checksummed.ROOM) as (out, _):
         writer = _Writer(out)
         for recording, signals, repeated in _signals(path, job):
             writer.append(recording, signals, repeated)

@@ -42,8 +42,8 @@ def reverse(
     held = read_displacement(path, translator.target)
     rows = select(frames, len(held.numbers))
     writable = atomic.writing(out, "a file in a writable folder", "Name another --out")
-    with writable, atomic.new_file(out) as unfinished, new_hdf5(unfinished) as (file, disk):
-        file.attrs.update({"format": FORMAT, "sensor": translator.source, "weights": translator.sha256})
+    about = {"format": FORMAT, "sensor": translator.source, "weights": translator.sha256}
+    with writable, atomic.new_file(out) as unfinished, new_hdf5(unfinished, about) as (file, disk):
         for start in range(0, len(rows), CHUNK):
             some = rows[start : start + CHUNK]
             gel = np.stack(list(held.iterate_rows(some))).astype(np.float32)

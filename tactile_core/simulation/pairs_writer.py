@@ -102,14 +102,14 @@ class Made(NamedTuple):
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
     """Join blocks in order into an HDF5 file of the first ``count`` contacts. Raises TactileError where that fails."""
+    about = {
+        "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
+        "indenters": json.dumps(made.indenters),
+        **{f"{sensor}{NODES}": sensors.sensor_surface(sensor).sha256 for sensor in made.pair},
+        "polarity": FALLS, "electrodes": SHEET,
+    }  # fmt: skip
     try:
-        with atomic.new_file(out) as partial, new_hdf5(partial) as (file, disk):
-            file.attrs.update({
-                "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
-                "indenters": json.dumps(made.indenters),
-                **{f"{sensor}{NODES}": sensors.sensor_surface(sensor).sha256 for sensor in made.pair},
-                "polarity": FALLS, "electrodes": SHEET,
-            })  # fmt: skip
+        with atomic.new_file(out) as partial, new_hdf5(partial, about) as (file, disk):
             done, unit_of = 0, units(*made.pair, made.keep)
             for path in files:
                 block = array_pack.read(path)

@@ -18,8 +18,11 @@ from tactile_core.translation.answer import Answer
 COUNT = 2
 
 
-def drawn(path: Path, warnings: Sequence[str] = (), truth: bool = False, touched: bool = True, **about: Any) -> Path:
-    """Draw the sheet of a made-up recording; truth : with the true skin; about : of ``Recording``"""
+def drawn(
+    path: Path, warnings: Sequence[str] = (), truth: bool = False, touched: bool = True, shift: tuple = (0.0, 0.0),
+    **about: Any,
+) -> Path:  # fmt: skip
+    """Draw the sheet of a made-up recording; truth : with the true skin; shift : mm; about : of ``Recording``"""
     rng = np.random.default_rng(0)
     known = {"name": "touch", "time": np.arange(COUNT) / 100, "simulated": truth, "truth": None} | about
     skin = (len(known["time"]), len(sensors.biotac_surface().rest), 3)
@@ -32,7 +35,7 @@ def drawn(path: Path, warnings: Sequence[str] = (), truth: bool = False, touched
     rows = SimpleNamespace(
         recording=recording, signals=signals, at=lambda frames: frames, read=lambda frames: (None, signals)
     )
-    translator = SimpleNamespace(card={}, answer=Answer(), source="biotac")
+    translator = SimpleNamespace(card={}, answer=Answer(mount_shift_mm=shift), source="biotac")
     drawer = SimpleNamespace(camera=load_calibration().camera, target="digit", describe_gel=tuple)
     made = SimpleNamespace(folded=0, pictures=lambda arrays, rows: list(arrays["image"][rows]))
     report = ConversionReport(rows, frames, Tools(translator, drawer), made)
@@ -76,6 +79,15 @@ def test_own_matplotlib_settings_change_nothing(tmp_path: Path) -> None:
         second = drawn(tmp_path / "b.png")
         assert matplotlib.rcParams["font.size"] == 20
     assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_column_has_its_frame_s_time_and_its_place_on_the_finger(tmp_path: Path, monkeypatch) -> None:
+    times, centers = [], []
+    monkeypatch.setattr(SheetFigure, "headings", lambda self, seconds: times.extend(seconds))
+    monkeypatch.setattr(SheetFigure, "skin_row", lambda *given: centers.append(given[4]))
+    drawn(tmp_path / "a.png", shift=(-2.0, 0.5), time=np.arange(60) / 100)
+    assert np.diff(times).min() >= 0.6 / 12  # a frame each of parts of the recording: `choose_frames`
+    np.testing.assert_allclose(centers[0][:, 0], np.tile([-5e-3, 0.5e-3], (6, 1)))
 
 
 def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path) -> None:

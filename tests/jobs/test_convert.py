@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import os
 import shutil
@@ -161,6 +162,14 @@ def test_the_note_tells_what_is_reproducible_and_no_path(run, slide_csv, tmp_pat
     timings = json.loads((folder / "timings.json").read_text(encoding="utf-8"))
     stages = {"read", "prepare", "translate", "height_map", "shade", "png", "hdf5", "sheet", "all"}
     assert set(timings["ms_a_frame"]) == set(timings["cpu_ms_a_frame"]) == stages
+
+
+def test_the_note_names_the_calibration_that_was_given(slide_csv, tmp_path, tools, no_sheet):
+    unit = tmp_path / "unit.toml"
+    unit.write_bytes(b"# a unit's")
+    given = dataclasses.replace(tools, calibration=str(unit))
+    note = json.loads((converted(slide_csv(frames=5), tmp_path / "out", given) / "note.json").read_text())
+    assert note["calibration"] == {"file": "unit.toml", "sha256": hashlib.sha256(b"# a unit's").hexdigest()}
 
 
 def test_the_note_of_the_shipped_recording_takes_4_kb(run):
