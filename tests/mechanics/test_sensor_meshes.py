@@ -1,6 +1,7 @@
 """Sensors for other tools: the touchable side of a volume, and what a solved contact's file holds."""
 
 import base64
+import dataclasses
 import struct
 import xml.etree.ElementTree
 from types import SimpleNamespace
@@ -187,6 +188,10 @@ def test_a_solution_goes_along(sheared, tmp_path):
     np.testing.assert_array_equal(found["PointData", "displacement"], state.displacement.astype(np.float32))
     np.testing.assert_allclose(found["PointData", "force"], stress.nodal_force(solid, state), rtol=1e-5, atol=1e-9)
     assert found["CellData", "pressure"].max() == 0
+    along_z = dataclasses.replace(state, displacement=state.displacement[:, ::-1])
+    write_vtu(tmp_path / "z.vtu", solid.mesh, solid, along_z)
+    shears = arrays(tmp_path / "z.vtu")["PointData", "stress"][:, 3:]
+    np.testing.assert_allclose(shears, np.tile([0, shear * 0.3, 0], (len(shears), 1)), atol=1e-5 * shear)  # xy yz xz
 
 
 def test_the_same_mesh_gives_the_same_bytes(sheared, tmp_path):
