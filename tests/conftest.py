@@ -27,7 +27,7 @@ if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_I
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run files that take all the memory they can get first, which is quicker while this process has freed little.
 
-    Then the pages' commands: one page may take half a minute, in which other workers do the short tests.
+    Then the pages' commands: one page may take a minute and more, in which other workers do the short tests.
     """
     greedy = "test_hdf5_bombs.py", "test_bombs.py"
     items.sort(key=lambda item: (item.path.name not in greedy, not item.name.startswith("test_commands_work")))

@@ -220,7 +220,7 @@ def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
-    """Put the halves of a solid together, and the fluid into it; yields the ``ARRAYS``, so that none need stay."""
+    """Join the halves of a solid and add the fluid; yield each of ``ARRAYS`` with its name, so that none need stay."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
     kept, column, sign = kept_loads(solid)
