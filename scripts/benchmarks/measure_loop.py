@@ -43,7 +43,7 @@ from tactile_core.mechanics.error_estimate import measured  # noqa: E402
 from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
 from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
 from tactile_core.mechanics.fast.press import CorrectedPress, FastContact  # noqa: E402
-from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under  # noqa: E402  # noqa: E402
+from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under  # noqa: E402
 from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: E402
 from tactile_core.pictures.renderer import Renderer  # noqa: E402
 
@@ -153,14 +153,18 @@ def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):
         forces = []
         for taken, indenter in zip(times, pairs[number % len(pairs)], strict=True):
-            pose = pose_at("digit", indenter, contact.place)
+            try:
+                pose = pose_at("digit", indenter, contact.place)
+            except TactileError:  # another body than the place was drawn for may pass the sensor by
+                break
             thick = thickness_under("digit", indenter, pose)
             press = CorrectedPress(compliance_of("digit"), indenter, pose, DEPTH_LIMIT * thick, FRICTION)
             took, solved = timed(lambda p=press, d=contact.depth * thick: at_depth(p, d))
             if number >= WARM:
                 taken.append(took)
             forces.append(np.nan if solved is None else solved.axial_force)
-        apart.append(abs(forces[1] / forces[0] - 1))
+        if len(forces) == 2 and forces[0]:  # a light touch may fall between the surface's nodes
+            apart.append(abs(forces[1] / forces[0] - 1))
     yield "digit, alone, four bodies by formula", times[0], "see alone"
     yield "digit, alone, as meshes", times[1], f"{np.nanmedian(apart):.2%} of force from the formula (median)"
 
