@@ -134,10 +134,10 @@ def _changed(path: str) -> int:
 def load(
     path: str, asked: RecordingOptions, progress: Callable[[float], None], motion: str, per_metre: float
 ) -> Translated:
-    """Read, tare and translate. Raises TactileError for what cannot be read, or frames that are not there.
+    """Read, tare and translate a recording; repeats return the result kept.
 
-    motion : one of ``properties.MOTIONS``: mesh caches hold movements in files; "" does so above ``LONG`` frames
-    per_metre : units of these files in a metre
+    motion : one of ``properties.MOTIONS``; "" stores displacements in mesh caches (files) above ``LONG`` frames
+    per_metre : units a metre of such files. Raises TactileError for unreadable files and missing frames.
     """
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32

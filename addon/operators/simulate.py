@@ -40,7 +40,7 @@ class TACTILE_OT_simulate(JobOperator):
     stopped = "Simulation stopped; the scene is as it was"
 
     def begin(self, context: bpy.types.Context) -> None:
-        """See ``JobOperator``."""
+        """Write the authored scene and start its simulation as a job; see ``JobOperator``."""
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene import write_scene
 

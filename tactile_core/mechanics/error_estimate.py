@@ -1,6 +1,6 @@
-"""Estimate a contact's own error: that of its depth, or more if it is sharper or smaller than the measured contacts.
+"""Estimate a contact's error: the one measured at its depth, enlarged for a sharper or smaller contact.
 
-The table by depth (``expected_error``) was measured on indenters that the meshes resolve.
+The errors by depth (``expected_error``) were measured on indenters that the meshes resolve.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ _FEW = 20
 # ring of 2.8 nodes was 8.7 um and 1.6 % off, two balls of 3.9 nodes 5.0 um and 3.0 %, a wedge of 1.5
 # nodes 56 um and 4.5 %; 2 um covers them all.
 _ACROSS, _SHAPE, _FORCE = 8.0, 2e-6, 0.01
-# Where a surface lies more than so deep, m, in the indenter between nodes: of 44 such contacts of six indenters, with
-# friction and without, forces of 41 were off half the spacing's by less than that over the depth, and shapes of all by
-# less than 0.35 of it, rms. What stands above covered 16 of the forces.
+# Penetration between nodes, m, above which it bounds the errors: the force's by penetration over depth, the shape's by
+# 0.35 times it, rms. Against half the spacing, that held for 41 of 44 forces and all shapes (six indenters, with
+# friction and without); the bounds above for 16 of the forces.
 _HIDDEN, _HIDDEN_SHAPE, _HIDDEN_FORCE = 100e-6, 0.35, 1.0
 TABLE = shipped("mechanics_tiers.json")
 _UNKNOWN = {"bins": [{"depth_share_to": math.inf, "shape_95_um": math.nan, "force_95": math.nan}]}
@@ -39,8 +39,8 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Enlarge a depth's errors (shape m, force relative) for an indenter of least radius ``radius`` m.
-    nodes : number that touch; at 0 the errors are ``depth`` m and 1"""
+    """Enlarge a depth's errors (shape m, force relative) for an indenter of least radius of curvature ``radius`` m.
+    nodes : number that touch; where none does the errors are ``depth`` m and 1"""
     if not nodes:
         return _of_nothing(depth)
     sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))
@@ -50,8 +50,8 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
     """Enlarge a depth's errors, full or reference tier, where few nodes touch or the indenter cuts in between them.
 
-    nodes : number that touch; across : number across the contact, by the full tier's spacing
-    hidden : m, how deep the indenter lies under the surface between nodes
+    nodes : number that touch; across : nodes across the contact, at the full tier's spacing
+    hidden : m, the indenter's penetration between nodes
     """
     if not nodes:
         return _of_nothing(depth)
@@ -78,8 +78,8 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
     """Return the shape error, m rms, and relative force error that 95 of 100 contacts stay below at a depth.
     share : the depth, divided by the thickness
 
-    The fast tier's are from the full tier, whose own come on top; deeper than measured: those of the deepest bin.
-    NaN for a sensor whose errors nobody has measured.
+    The fast tier's errors are against the full tier, whose own add to them. Beyond the deepest measured bin its
+    values hold. NaN for a sensor whose errors nobody has measured.
     """
     if share <= 0:
         return 0.0, 0.0
@@ -89,13 +89,12 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
 
 
 def unsure_side(contact: Contact, normals: np.ndarray, radius: float) -> float:
-    """Estimate how far, m rms, a surface lies aside because a sharp indenter's normals are known at nodes alone.
+    """Estimate the sideways error of shape, m rms, under a sharp indenter, whose normals are known at nodes alone.
 
-    Round an edge normals turn by a radian for each radius of way. Touching nodes lie up to half a spacing beside the
-    places that would touch, and their forces lean by that: a wedge that meets nodes on one of its faces alone pushes a
-    fluid-filled skin aside as a whole. Of the contact's force aside, the doubtful part is the share that no node on
-    another face balances, and no more than normals that are off by half a spacing can make. The estimate is the
-    displacement under that part.
+    Round an edge normals turn by a radian for each radius of way. Nodes touch up to half a spacing beside the true
+    places, and their forces lean accordingly: a wedge that meets nodes on one of its faces alone pushes a fluid-filled
+    skin aside as a whole. Doubtful is the part of the sideways force that no node on another face balances, at most
+    what normals off by half a spacing can make. The estimate is the displacement under that part.
 
     normals : (n, 3), outward, of the resting surface; radius : m, of the indenter where it is sharpest
     """

@@ -1,4 +1,4 @@
-"""The search for the depth at which a contact bears a force."""
+"""Search the depth at which a contact bears a given force."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ import numpy as np
 from ..errors import TactileError
 from .placement import DEPTH_LIMIT
 
-# Relative, of the force asked for, in every tier: a twentieth of the error of the fast tier's, a tenth of the full
-# one's. A contact states the force that it has.
+# Relative to the force asked for, in every tier: 1/20 of the fast tier's error, 1/10 of the full tier's. A contact
+# states the force that it has.
 FORCE_TOLERANCE = 1e-3
 # N: a ball of 150 mm radius, nearly a plate, bears 289 N on the DIGIT's gel at the greatest depth and 41 N on the
 # BioTac's skin. A search for more would solve minutes of contacts of the whole gel on its way.
 MOST_FORCE = 500.0
 _STEPS = 30
-_LEAST_SHARE = 1e-3  # of the way between two depths, that a search goes
+_LEAST_SHARE = 1e-3  # of the interval between two depths: the smallest step of a search
 
 
 class UnreachableError(TactileError):
-    """A depth, or a force that needs one, beyond those that contacts are asked for."""
+    """A depth beyond the limit, or a force that no depth within it gives."""
 
 
 _Found = TypeVar("_Found", bound=Any)  # a contact at a ``depth``, m, under a ``force`` (3,) N
@@ -37,12 +37,12 @@ def touch_at_force(
     guess: float | None = None,
     slid_to: float | None = None,
 ) -> _Found:
-    """Find the contact at a force, N, along ``direction`` (3,), by secants of F^(2/3) over depth, and halving.
+    """Find the contact whose force along ``direction`` (3,) is ``force``, N, by secants of F^(2/3) and by bisection.
 
-    move : the contact at a depth, m, from one before; last : where the search begins; limit : greatest depth, m
-    guess : m, a depth near the one sought
-    slid_to : m, the depth of first touch where the indenter has slid since ``last``, whose depth then bounds nothing
-    Raises TactileError, which begins with ``where``, where no depth is found; UnreachableError beyond the limit.
+    move : solves the contact at a depth, m, going on from another one; last : the contact to begin from
+    limit : m, greatest depth; guess : m, a depth near the one sought
+    slid_to : m, depth of first touch here; given if the indenter has slid since ``last``
+    Raises TactileError, which begins with ``where``, if no depth is found; UnreachableError beyond the limit.
     """
     goal, before = _root(force), last
     low, high = (before.depth, _root(before.force @ direction)) if slid_to is None else (slid_to, 0.0), None
@@ -73,14 +73,14 @@ def unreachable(where: str, force: float, limit: float) -> UnreachableError:
 
 
 def _root(force: float) -> float:
-    """F^(2/3), which grows nearly straight with depth."""
+    """F^(2/3), which is nearly linear in depth (Hertz)."""
     return max(float(force), 0.0) ** (2 / 3)
 
 
 def _next_depth(
     low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
 ) -> float:
-    """The depth, m, to try next for a root of the force, between the (depth, root) below and above it, or beyond."""
+    """Return the depth, m, to try next for F^(2/3) = goal, from the (depth, F^(2/3)) known below and above it."""
     if high is None:
         slope = low[1] / low[0] if low[0] else 0.0
         return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)

@@ -16,8 +16,7 @@ _GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
 def node_areas(sensor: str) -> np.ndarray:
     """Return the area (n,) m2 of each resting surface node of a sensor: the integral of its shape function.
 
-    Surfaces are of quadratic faces, on which an even pressure loads corners, edges and middles as 1 : 4 : 16; divided
-    by these areas it is even again.
+    Faces are quadratic: an even pressure loads corners, edges and middles as 1 : 4 : 16; over these areas it is even.
     """
     mesh = solid_mesh(sensor)
     faces, areas = outer_faces(mesh), np.zeros(len(mesh.nodes))
@@ -37,7 +36,7 @@ def node_areas(sensor: str) -> np.ndarray:
 def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
     """Return the traction (n, 3) Pa on a resting surface with forces (k, 3) N on ``nodes`` (k,); zero elsewhere.
 
-    Times ``node_areas`` and added up it is the sum of the forces.
+    Its sum, weighted by ``node_areas``, is the sum of the forces.
     """
     areas = node_areas(sensor)
     found = np.zeros((len(areas), 3))

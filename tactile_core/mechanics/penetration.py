@@ -1,8 +1,8 @@
 """Check that a surface follows the body pressed into it, and does not let it through between its nodes.
 
-Contact is looked at in nodes. A body narrower than their spacing, or one from whose tip frictionless nodes have slid
-away, sinks in between them; nodes that slide round a wire pressed deeper than its radius come to lie on its back, and
-push it on. Every node is in equilibrium, and the answer is wrong.
+Contact is solved at nodes. A body narrower than their spacing, or one from whose tip frictionless nodes have slid away,
+sinks in between them; nodes that slide round a wire pressed deeper than its radius end up behind it and push it on.
+Every node is then in equilibrium, and the answer is wrong.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from ..geometry.cubic_spline import on_grid
 from ..geometry.indenters import Indenter, Pose
 from .placement import in_front
 
-# What lattices hide under the tip of a body that they resolve: in 2,154 random contacts of nine indenters on both
-# sensors, with friction and without, up to 97 um, and where it was more than 50 um a third of the depth at most.
+# Penetration between nodes under the tip of a body that the lattice resolves: in 2,154 random contacts of nine
+# indenters on both sensors, with and without friction, 97 um at most, and where above 50 um a third of the depth.
 _LEAST, _SHARE = 100e-6, 0.4  # m, and of the depth
-# m, in which springs between nodes do not push the body out: with 5 um a 14 mm ball 0.1 mm deep was pushed 8 % too hard
+# m, penetration that penalty points leave alone: with 5 um the force of a 14 mm ball 0.1 mm deep was 8 % too large
 SLACK = 20e-6
 BLUNT = 1.5e-3  # m: a tip this round hides 21 um between nodes half a millimetre apart, and no node slides off it
-_ON_BODY = 1e-6  # m: a ring's foremost point, the middle of its hole, is no part of it
+_ON_BODY = 1e-6  # m, from a body's foremost point to the body; a ring's, the middle of its hole, is farther
 # Cosine of normals and motion at nodes that carry force. Down to -0.27 where the reference tier agreed (rings 1.6 mm
 # deep), -0.8 and below where forces were a tenth of its, or pulled (270 random contacts, and paths of rings).
 BEHIND = -0.5
@@ -29,15 +29,15 @@ _BETWEEN = np.stack(np.meshgrid([-0.5, 0.0, 0.5], [-0.5, 0.0, 0.5], indexing="ij
 
 
 class PenetrationError(TactileError):
-    """A surface that has let a body through; a finer one may hold it."""
+    """A body has passed between a surface's nodes; a finer surface may hold it."""
 
 
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """Return the penetration, m, of a surface (rows, columns, 3) m into a near body, halfway between nodes.
+    """Return the largest penetration, m, of a body under a surface (rows, columns, 3) m at nodes and halfway between.
 
-    Raises PenetrationError where it is over 0.1 mm and over ``share`` of ``depth``, m, of the body.
+    Raises PenetrationError if it is over 0.1 mm and over ``share`` of the body's ``depth``, m.
     """
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
@@ -69,7 +69,7 @@ def check_follows(
     """Raise PenetrationError where a body, ``depth`` m deep, has passed in between a surface's nodes.
 
     grid : (rows, columns, 3) m, the nodes; closed : whether its last column joins the first
-    normals : (k, 3) of the body, at the nodes that carry force; behind : least allowed cosine of theirs and the motion
+    normals : (k, 3) of the body, at the nodes that carry force; behind : least allowed cosine between them and motion
     """
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
@@ -88,20 +88,19 @@ def _let_through(where: str, found: str) -> PenetrationError:
     return PenetrationError(where, found, "an indenter that they resolve", advice)
 
 
-# m, of edges below which the fast tier's errors are taken to grow as the width of the contact falls, by the root of the
-# radius (its form assumed). Shapes of 96 of 101 wedges and bumps of 0.2 to 1 mm were then off the full tier by no more
-# than stated, forces of 98; with 0.4 mm and without the root 81 and 91 were. Those of 0.1 mm, off 1.8 to 2.7 times the
-# table's, are covered too.
+# m, radius of an edge below which the fast tier's errors are taken to grow as 1 / sqrt(radius), as the contact narrows
+# (assumed form). Of 101 wedges and bumps of 0.2 to 1 mm, 96 shapes and 98 forces were then off the full tier by no more
+# than stated; with 0.4 mm and no growth 81 and 91. Those of 0.1 mm, off 1.8 to 2.7 times the table's, are covered too.
 RESOLVED_RADIUS = 1.5e-3
-# m, of the sharpest edges that are held out between a surface's nodes as well: round a wedge of 0.1 mm the gel found no
-# shape between its own, and took two minutes to say so; edges of 0.4 mm are held.
+# m, radius of the sharpest edges that get penalty points: with a wedge of 0.1 mm the gel's solve failed, after two
+# minutes; edges of 0.4 mm are held.
 BENDS = 0.2e-3
 _LEAST_RADIUS = 10e-6  # m, below which an edge acts like one of this radius
-_NEAR = 0.5e-3  # m, from the indenter: farther off it may be as sharp as it likes
+_NEAR = 0.5e-3  # m, from the indenter to points whose curvature counts
 
 
 def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
-    """Return an indenter's least radius of curvature, m, at its tip and near those points (n, 3) m outside it."""
+    """Return an indenter's least radius of curvature, m, at its tip and at those points (n, 3) m that are near it."""
     points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
     gap, _ = pose.distance(indenter, points)
     near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)

@@ -1,6 +1,6 @@
-"""Placement of an indenter, the same unrolled place and angle on both sensors; its way between poses, to first touch.
+"""Place an indenter at the same unrolled place and angle on both sensors; find first touch, and poses between poses.
 
-Depth is counted from first touch; in per cent it is of the thickness of the sensor there.
+Depth counts from first touch; in per cent it is of the sensor's thickness there.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from ..geometry.cubic_spline import on_grid
 from ..geometry.indenters import Indenter, Pose, pose_on
 from ..geometry.lattice import Lattice
 
-_ADVANCES = 60  # of a body by its smallest distance: more than any shape needs
+_ADVANCES = 60  # steps of a body by its smallest distance: more than any shape needs
 _TOUCHES = 1e-9  # m, smallest distance at which the body is taken to touch
-_CLOSE = 60e-6  # m: nodes this little farther than the first one may hide the true first place between them
+_CLOSE = 60e-6  # m: first touch may lie between nodes that are at most this much farther away than the first one
 _MOST_PLACES = 12
-_FINER = (4, 16, 64, 256)  # of a lattice spacing: 1.4 um at last, which hides less than 1 nm of a ball of 1 mm
+_FINER = (4, 16, 64, 256)  # parts of a lattice spacing: 1.4 um at last, between which a ball of 1 mm dips below 1 nm
 _AROUND = np.stack(np.meshgrid(np.arange(-4, 5), np.arange(-4, 5), indexing="ij")).reshape(2, -1)
 _MANY = 2**20  # more than a grid has columns: one number identifies a place (exactly, for they are sums of halves)
-_HIDDEN = 6e-6  # m, more than a quarter of a spacing hides: (0.045 mm)^2 / 2 over the smallest edge radius, 0.2 mm
+_HIDDEN = 6e-6  # m, more than dips between places a quarter spacing apart: (0.045 mm)^2 / (2 x 0.2 mm edge radius)
 _CLEAR = (1e-3, 12e-3)  # m, from where the motion starts: from the second no indenter reaches the sensor
 _FARTHEST = 30e-3  # m, past all of a sensor from wherever the motion starts
-_LEAST_RATE = 0.5  # of approach: where the body slides past a point its distance says little about the way to it
-_NEAREST = 16  # nodes with which the motion is tried first
+_LEAST_RATE = 0.5  # of approach: of a body that slides past a point the distance says little about the way to it
+_NEAREST = 16  # nodes tried first for touch
 _NARROW = 2e-3  # m, four spacings of the coarser lattice, the BioTac's: a body this thin may pass between nodes
-_BESIDE = 1e-3  # m, at most from the line that a body's foremost point moves on to the node nearest to it
-_FRONT = 4e-3  # m, what lies this much behind the front is the far side of the sensor
+_BESIDE = 1e-3  # m, largest distance of a node from the line on which a body's foremost point moves
+_FRONT = 4e-3  # m: nodes this far behind the first one are on the far side of the sensor
 _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
 _SAME = 1e-12  # m, sideways, of poses that differ in depth alone
 
@@ -62,9 +62,9 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Find how much farther, m, first touch is at the pose ``slid`` than at ``pose``, itself at first touch.
+    """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch.
 
-    Where the indenter has slid off the sensor: ``_FARTHEST``.
+    ``_FARTHEST`` if the indenter has slid off the sensor.
     """
     if same_line(pose, slid):
         return 0.0
@@ -101,9 +101,9 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 
 
 def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
-    """Find the first touch of an indenter that comes along a pose's direction, wherever on that line the pose lies.
+    """Find first touch of an indenter that comes along a pose's direction from outside, wherever on its line it stands.
 
-    Raises TactileError where it passes the sensor by.
+    Raises TactileError if it passes the sensor by.
     """
     before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
     return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
@@ -113,7 +113,7 @@ def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
     """Find where a body's foremost point meets a surface: row and column, real-valued, (1, 2), and point (1, 3) m.
 
     axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
-    None where no node lies near its way.
+    None if no node lies near the point's line.
     """
     foremost = pose.support(indenter, pose.direction)
     along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
@@ -132,7 +132,7 @@ def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
 
 
 def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of points (n, 3) m along (n,) and beside (n,) m a line."""
+    """Coordinates (n,) m of points (n, 3) m along a line, and their distances (n,) m from it."""
     arm = points - start
     along = arm @ direction
     return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)
@@ -180,9 +180,9 @@ def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, re
 
 
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
-    """Move until the first of the points (n, 3) m is touched; at most ``_FARTHEST``, where it slides past them all.
+    """Move until the first of the points (n, 3) m is touched, by ``_FARTHEST`` at most, if it slides past them all.
 
-    Toward a convex part Newton's steps never go through; where another part lets them, the distance leads back.
+    Newton's steps never overshoot a convex part; past another one, the negative distance leads back.
     """
     own, travel, left = pose.to_own(points), 0.0, _FARTHEST
     ahead = pose.own_direction  # in its frame points come the other way
@@ -221,9 +221,9 @@ class Placement:
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
-    """First touch on a sensor: on a gel at (x, z), on a skin at the place of its pad that rolls onto (x, z) of a gel.
+    """Pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z) of a gel.
 
-    The indenter leans as much off the dome's normal as off the skin's.
+    The indenter's tilt is from the surface normal there.
     """
     point, outward = sensors.surface_point(sensor, place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
@@ -236,7 +236,7 @@ def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = sensors.TARGET
 
 
 DEPTH_LIMIT = 0.6  # of the thickness: the deepest that contacts are asked for
-_DEEPEST = 2.4e-3  # m, 60 % of the gel: where the BioTac has no core below, its thickness says little
+_DEEPEST = 2.4e-3  # m, 60 % of the gel: bounds the depth where the BioTac has no core below
 _HARDLY_APART = 0.1e-3  # m: at first touch a node is mostly this near
 
 

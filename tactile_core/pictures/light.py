@@ -39,7 +39,7 @@ class Surface(NamedTuple):
 
     @classmethod
     def in_perspective(cls, view: Perspective, height: np.ndarray) -> Surface:
-        """Return the surface whose heights (H, W) m the pixels of a camera see."""
+        """Return the surface that a camera's pixels see, given its heights (H, W) m there; slopes are computed."""
         return cls(view.right, view.down, height, *slopes(height, view.camera), view.inverse)
 
 

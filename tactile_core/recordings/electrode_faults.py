@@ -15,19 +15,19 @@ from .repair import END, SHORT, fill, find_glitches, is_time_series
 from .signal_kind import FULL_SCALES, RAW_LEVEL, full_scale
 
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
-# counts that the others' median moves by meanwhile; units with less noise stand still in steady grips, as long as
-# nothing moves: by 4 and less in 36 such grips (PHAC, trials 01 to 03)
+# counts: a channel is dead if it stands still while half of all electrodes move by more. In 36 steady grips (PHAC,
+# trials 01 to 03), in which units of little noise stand still too, the median moved by 4 at most
 STEADY = 6.0
 NOISY = 0.3  # share of the samples that differ from the one before: 0.6 at 0.7 counts of noise (assumed: half of it)
 ALIKE = 0.75  # of the electrodes that read the same where a finger does not answer: a dead one may differ (assumed)
 FROZEN = 50  # frames, half a second, of noise that stops in all electrodes (assumed)
 SHOWN = 8  # bad places spelled out one by one in the warnings
 MOST_STALE = 0.45  # of the rows; with more, they were recorded faster than the finger answers (assumed)
-# Share of the samples at which a reading that rises falls, or the reverse: .15 and more in 3 real units, .39 simulated
-# with noise, below .02 without (assumed: between)
+# Share of the samples at which a reading turns from rising to falling or back, by noise: .15 and more in 3 real units,
+# .39 simulated with noise, below .02 without (assumed: between)
 TURNS = 0.08
 STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
-# Impedance at rest over a typical unit's, or below it, that no unit's film and fluid give: .9 to 3.3 are seen (assumed)
+# Largest ratio of an impedance at rest to a typical unit's, or the reverse: .9 to 3.3 are seen in units (assumed)
 STRANGE_REST = 8.0
 MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 

@@ -23,22 +23,20 @@ from .rest_level import Framewise
 
 AUTO = "auto"
 TOUCHING = 15.0  # counts, root of the sum of squares: ten times the noise; below, a change says nothing
-# Counts of PDC, 0.55 kPa, that pressure must swing by. Under a steady grip the electrodes' drift is larger than what
-# pressure shows it: of 36 real fingers (PHAC-2, trials 01 to 03) those that swing less are wrong in 4 of 19 cases,
-# those that swing more in none of 17.
+# Counts of PDC, 0.55 kPa: least swing of pressure that is used, since drift outweighs smaller ones in a steady grip. Of
+# 36 real fingers (PHAC-2, trials 01 to 03) 4 of 19 with less swing are judged wrong, none of 17 with more.
 SWING = 15.0
 FEWEST = 20  # frames; of fewer no slope is taken (assumed)
 MOST = 500  # frames looked at, evenly spread
-# By how much the likeness of the one sign must exceed the other's; or how much less of the change it must leave over,
-# as a share of what the other leaves: simulated contacts, with noise of 1.5 counts and gains 10 % apart, leave .41 of
-# it in the median, and 1 of 100 more than .7. A light touch that makes the skin bulge is like a firm one upside down,
-# by a likeness of .9; the right sign has .98, which separates them.
+# A sign is right if its likeness is larger by MARGIN, or its unexplained part is below LEFT of the other sign's. In
+# simulated contacts (noise 1.5 counts, gains 10 % apart) that ratio is .41 in the median, above .7 in 1 of 100. A light
+# touch that makes the skin bulge resembles an inverted firm one by .9; its right sign has .98, which LEFT tells apart.
 MARGIN, LEFT = 0.15, 0.7
-# Share of a drift that one conductivity leaves: .28, .17 and .11 of it on an idle finger after 100, 150 and 220 s; of
-# twelve real grips (PHAC, trial 04), soft ones too, it leaves .36 and more.
+# Largest share of a drift that a change of conductivity leaves unexplained: .28, .17 and .11 on an idle finger after
+# 100, 150 and 220 s; of twelve real grips (PHAC, trial 04), soft ones too, .36 and more.
 DRIFT_LEFT = 0.3
-LIKE = 0.6  # likeness that is one: 95 of 100 random changes reach .62, changes with real pressure .66 to .87
-SCALE = 15.0  # counts, of the arcsinh that the networks see changes through
+LIKE = 0.6  # least likeness that decides: changes under real pressure reach .66 to .87 (95 of 100 random ones .62)
+SCALE = 15.0  # counts; networks see arcsinh(change / SCALE)
 
 
 class Basis(enum.Enum):
@@ -87,7 +85,7 @@ class Polarity:
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
-    """Choose the polarity by user, file or recording, in this order; one that the recording contradicts is not sure."""
+    """Choose the user's, else the file's, else the shown polarity; one that the recording contradicts is not sure."""
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
             against = shown.sure and shown.name != stated
@@ -149,7 +147,7 @@ def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
 
 
 def _as_drift(change: np.ndarray, electrodes: np.ndarray) -> bool:
-    """Return true if a change of the fluid's conductivity explains changes (n, 19) of counts but for `DRIFT_LEFT`."""
+    """Return true if a change of the fluid's conductivity explains all but `DRIFT_LEFT` of changes (n, 19) counts."""
     rest = np.median(electrodes - change, axis=0)
     drift = divider.of_films(1.1, rest) - rest
     drift /= np.linalg.norm(drift)

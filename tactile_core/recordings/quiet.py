@@ -16,11 +16,11 @@ WINDOW = 0.3  # s, the shortest part that is called quiet; 30 frames bring 1.5 c
 FEWEST = 8  # frames of a window, at slow rates
 # Counts of noise: 0.7-1.5 (docs/sources.md); a driver that sends steps of 4 to 10 counts has 3 to 5. More is movement.
 NOISE, NOISIEST = 1.5, 7.0
-# Spread within a window over the noise, with 4 deviations of its estimate from 30 samples; and the trend from its first
-# to its second half, 4 deviations of that difference.
+# Largest standard deviation within a calm window, over the noise: 4 standard errors of 30 samples above 1; and largest
+# difference between the means of its halves: 4 standard errors.
 CALM_STD, CALM_TREND = 1.6, 2.5 / 1.5
-# Windows by which noise is judged, and the share of them that is calm (assumed); frames between which noise is another,
-# as of a driver that repeats every reading once or twice.
+# Windows by which noise is judged, and the share of them taken for calm (assumed); frames between samples of it whose
+# noise is independent even where a driver repeats every reading once or twice.
 LOOKED_AT, CALMER, APART = 2000, 0.3, 3
 QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
@@ -29,10 +29,10 @@ RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the r
 LEVEL, LEVEL_RATE = 3.0, 0.1
 LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
 PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
-TRACKED = 60.0  # s; over longer times drift is followed, or it would come to be as large as a press (assumed)
+TRACKED = 60.0  # s; in longer recordings the level follows drift, which may exceed a press (assumed)
 TARED_LEVEL = 15.0  # counts that rest may have drifted from a tared file's own zero (assumed)
-TARED_PDC = 500.0  # counts; a lower median PDC has been tared too, so that its zero means no contact (assumed)
-STRETCH = 256  # windows that are compared with a level at once
+TARED_PDC = 500.0  # counts; a PDC of lower median was tared too: its zero means no contact (assumed)
+STRETCH = 256  # windows compared with a level at a time
 NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is preferred as rest
 
 
@@ -183,8 +183,8 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
 def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
-    """Mark windows (W,) bool whose means, sums (C, W) over n, lie near a level that follows them from the anchor on.
-    The level moves by at most ``rate`` a second: drift over an hour can exceed a press."""
+    """Mark windows (W,) bool with means, sums (C, W) over n, within ``level`` of a level that follows them.
+    It starts at the window ``anchor`` and moves by at most ``rate`` a second: drift over an hour can exceed a press."""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)
     near = level + rate * TRACKED
@@ -206,7 +206,7 @@ def _tracked(
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
-    """Choose one of the calm windows as surely at rest: among those of lowest PDC, the first near the recording's start
+    """Choose the calm window that is taken for rest: among those of lowest PDC, the first near the recording's start
     or the last near its end; of a recording that is not raw, the one nearest to zero."""
     if windows.pdc is not None:
         low = windows.pdc[calm]

@@ -11,9 +11,9 @@ RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Rupp
 # Larger values than this are counts; scaled ones are volts, shares or standard deviations (assumed).
 SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
-WHOLE = np.arange(-(2**15), 2**15)  # numbers that are counted one by one
+WHOLE = np.arange(-(2**15), 2**15)  # the histogram's numbers
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
-# Readings at the top of the range, of raw readings that are not counts of 12 bit (assumed: the usual exports).
+# Top of the range of raw readings in other units than 12-bit counts (assumed: the usual exports).
 FULL_SCALES = {
     1.0: "shares of the range", 3.3: "volts of 3.3 V", 5.0: "volts of 5 V", 100.0: "percent of the range",
     255.0: "counts of 8 bit", 1023.0: "counts of 10 bit", 65535.0: "counts of 16 bit",
@@ -54,7 +54,7 @@ def median(column: np.ndarray) -> float:
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
     """Return counts a unit, and the unit in words, of raw readings in another unit than counts; None for all others.
-    electrodes : (T, e) float, finite; such readings all rest above two thirds of the range and stay far from 0"""
+    electrodes : (T, e) float, finite; readings are raw if most electrodes rest high in the range and stay far from 0"""
     beyond, within = (((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX))
     if beyond > 1 - MOST_OF and within < MOST_OF:  # counts, seen without sorting them
         return None

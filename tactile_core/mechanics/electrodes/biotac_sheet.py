@@ -40,9 +40,9 @@ class BiotacSheet:
 
     fluid : what conducts; sheet : on the nodes that bound fluid, with the electrodes and the 4 of the excitation
     wet : (k,) the sheet's nodes in the inner skin's surface
-    sensing : (k,) which of ``sensing_points.sensing_nodes`` they are
+    sensing : (k,) the same nodes' indices among ``sensing_points.sensing_nodes``
     film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
-    unresolved : (e + 4,) ohm that the grid is too coarse for, of each electrode in a film of 1 m and 1 S/m
+    unresolved : (e + 4,) ohm that the grid leaves out at each electrode, in a film of 1 m and 1 S/m
     """
 
     fluid: FluidFilm
@@ -59,11 +59,11 @@ class BiotacSheet:
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m after changes (f,) m of the gaps at ``sensing_points.sensing_nodes``."""
+        """Thickness (k,) m at the sheet's nodes, from the changes (f,) m of the gaps at all f ``sensing_nodes``."""
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (e + 4,) ohm near each electrode in films (k,) m, which the grid is too coarse for."""
+        """Resistance (e + 4,) ohm that the coarse grid leaves out near each electrode, for films (k,) m."""
         return self.unresolved / (self.fluid.conductivity * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
@@ -72,7 +72,7 @@ class BiotacSheet:
         return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
     def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-        """Factors (e,) by which impedances have grown as resistances (e,) ohm grew from those ``at_rest``."""
+        """Ratio (e,) of each electrode's impedance to that at rest, from both resistances (e,) ohm."""
         return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 

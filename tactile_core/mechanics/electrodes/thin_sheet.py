@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-_DISC_SAMPLES = 16  # a triangle's edge is cut so often to find what part of it an electrode covers: 0.03 mm
+_DISC_SAMPLES = 16  # parts of a triangle's edge, 0.03 mm each, to measure what share of it an electrode covers
 
 
 class ThinSheet:
@@ -34,7 +34,7 @@ class ThinSheet:
         self._prepare_matrix()
 
     def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
-        """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant a column.
+        """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant per column.
 
         film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
         Only combinations of currents that sum to zero have a meaning: the current leaves at the first node.
@@ -60,7 +60,7 @@ class ThinSheet:
     def unresolved(self, refine: int) -> np.ndarray:
         """Return each electrode's error of resistance on this grid against a refined one, (k,) ohm at 1 m and 1 S/m.
 
-        Near an electrode the current spreads in a film of nearly one thickness h, so the miss is this over sigma h.
+        Near an electrode the film has nearly one thickness h: the error there is this value over sigma h.
         """
         film = np.ones(len(self.given[0]))
         miss = ThinSheet(*self.given, refine).potentials(film) - self.potentials(film)
@@ -85,8 +85,8 @@ class ThinSheet:
 def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
     """Return the resistances (sensing,) ohm between each of the first electrodes and all others, joined by a wire.
 
-    potentials : (k, k), of ``ThinSheet.potentials``. The currents of the joined ones share out so that they are at one
-    potential: a bordered system with one unknown a joined electrode and their potential.
+    potentials : (k, k), of ``ThinSheet.potentials``. The joined electrodes are at one potential, and their currents
+    sum to the one electrode's: a linear system for these currents and that potential.
     """
     joined = len(potentials) - sensing
     system = np.zeros((joined + 1, joined + 1))

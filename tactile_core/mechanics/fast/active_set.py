@@ -33,7 +33,7 @@ class Work:
     left: float = np.inf
 
     def spend(self, unknowns: int, iterations: int) -> None:
-        """Take off ``left`` what a solver of ``unknowns`` has used in its iterations."""
+        """Subtract from ``left`` what a solver of that many unknowns has used in its iterations."""
         self.left -= float(unknowns) ** 3 * iterations
 
     def check(self) -> None:
@@ -64,7 +64,7 @@ def complement(
     *,
     factors: dict[bytes, np.ndarray] | None = None,
 ) -> Pressing:
-    """Find forces p >= 0 with gaps ``matrix p + gap - step along >= 0`` and one of the two zero at every node.
+    """Find forces p >= 0 with gaps g = matrix p + gap - step along >= 0 and p g = 0 at every node.
 
     matrix : (k, k) m/N; gap : (k,) m; active : (k,) bool, first guess
     along : (k,) or None; with it, ``step`` is free and ``along . p`` is ``force`` N, otherwise ``step`` is 0
@@ -103,7 +103,7 @@ def complement(
 
 
 def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
-    """Factor of the block of the ``active`` (k,) nodes, ``index`` (j,), and what solves it for ``right`` (j, ...)."""
+    """Cholesky factor of the block of ``active`` (k,) nodes, ``index`` (j,), and its solution of ``right`` (j, ...)."""
     from scipy.linalg import lapack
 
     known = factors.get(active.tobytes()) if factors is not None else None

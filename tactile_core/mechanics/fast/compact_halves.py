@@ -1,8 +1,8 @@
-"""Condensed solid in little room: its two halves in a basis of wavelets, rounded to whole steps.
+"""Compressed storage of a condensed solid: the matrices of its two halves in a wavelet basis, quantised.
 
-Points fall into a tree of clusters. Each cluster turns the motions of its points into a few combinations that are
-constant or linear over it, which go on to the next larger cluster, and into details, which forces far away hardly move
-(B. Alpert, SIAM J. Math. Anal. 24, 1993, 246-262). So nearly all entries between details round to zero and pack well.
+Points form a tree of clusters. Each cluster transforms the motions of its points into a few combinations, constant or
+linear over it, which go on to the next larger cluster, and details, which forces far away hardly move (B. Alpert,
+SIAM J. Math. Anal. 24, 1993, 246-262). Nearly all entries between details therefore round to zero and compress well.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     import h5py
 
 PARITIES = ("even", "odd")
-BLOCK = 64  # rows at a time, so many as a chunk of the file has
-TILE = 256  # rows and columns transposed at a time: as they fit in a processor's cache, seven times as quick
+BLOCK = 64  # rows at a time, those of one chunk of the file
+TILE = 256  # rows and columns transposed at a time: they fit in a processor's cache, which is seven times as quick
 
 
 class Segment(NamedTuple):
     """Unknowns ``first`` to ``last`` of a matrix, those of a point side by side, and the clusters of its points.
 
-    axes : unknowns a point; clusters : points (k,) and how their motions are turned (k, k), the smallest clusters first
+    axes : unknowns per point; clusters : points (k,) and the transform of their motions (k, k), smallest cluster first
     """
 
     first: int
@@ -51,7 +51,7 @@ class Basis(NamedTuple):
 
 
 def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> None:
-    """Turn the rows (n, c) of an array into the basis, or back from it, in place."""
+    """Transform the rows (n, c) of an array into the wavelet basis, or back, in place."""
     for first, last, axes, clusters in segments:
         of_points = values[first:last].reshape((last - first) // axes, -1)
         for points, turned in reversed(clusters) if back else clusters:
@@ -59,7 +59,7 @@ def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> 
 
 
 def unpack(path: Path, made_from: str) -> tuple[Half, Half] | None:
-    """Read the even and the odd half from a shipped file; None where it was made from another solid, or is none."""
+    """Read the even and the odd half from a shipped file; None if there is none, or it is of another solid."""
     if not path.is_file():
         return None
     import h5py
@@ -87,7 +87,7 @@ def _read_basis(file: h5py.File) -> Basis:
 
 
 def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
-    """Matrix (rows, n) float32 from its whole steps (n, rows), of which the symmetric part holds its upper triangle."""
+    """Matrix (rows, n) float32 from its quantised form (n, rows), whose symmetric part has its upper triangle only."""
     rows, step = basis.rows, basis.step
     turned = np.empty(packed.shape, np.float32)
     for start in range(0, len(turned), BLOCK):

@@ -48,7 +48,7 @@ class Compliance:
     surface : the sensor's surface lattice, n nodes
     touchable : (m,) int, surface nodes that can carry contact force
     move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
-        touchable nodes with z >= 0, and mirrored that under the same force on its image (``answers``)
+        touchable nodes with z >= 0; mirrored, it is that under the mirrored force on the node's image (``answers``)
     watch : (3 m, w) float32, m/N; motion of the inner sensing points along their watch directions (BioTac only:
         first the electrode feet, then the inner skin under the pad and beside it; toward the core is negative)
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
@@ -75,7 +75,7 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Row (m,) of ``move`` for each touchable node; if that is its image's, (m,) bool; all mirror images (n,)."""
+        """Each touchable node's row (m,) of ``move``, whether it is its image's (m,) bool; all nodes' images (n,)."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
@@ -112,7 +112,7 @@ def solid_of(sensor: str) -> Solid:
 class Stored(NamedTuple):
     """Cache entry of a sensor's matrices: path, and bytes on disk, 0 before they are built.
 
-    surface, touchable, volume : how many nodes the surface has, can be touched, and the solid has
+    surface, touchable, volume : number of the surface's nodes, of the touchable ones, of the solid's
     """
 
     folder: pathlib.Path
@@ -213,7 +213,7 @@ def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sensing points (v,) with z >= 0; which of these each one is or mirrors (w,); -1 where it mirrors (w,)."""
+    """Return sensing points (v,) with z >= 0; for all w the own or the image's index among these, and sign 1 or -1."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)

@@ -1,4 +1,4 @@
-"""Entries of a sensor's large compliance among the nodes near an indenter, and the motion that forces on them make."""
+"""Parts of a sensor's compliance among the nodes near an indenter, and the motion that forces on these cause."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class ComplianceBlock:
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Return ``normal``'s matrix after nodes ``at`` (j,) turned; matrix : before; normals : (k, 3), after"""
+        """Update ``normal``'s matrix after the normals of nodes ``at`` (j,) have turned; normals : (k, 3), new ones"""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)

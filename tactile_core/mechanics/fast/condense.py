@@ -1,8 +1,8 @@
-"""A solid condensed to its surface: dense elimination of everything else, cell group by cell group.
+"""Condense a solid to its surface: eliminate all other unknowns, cell group by cell group (multifrontal method).
 
-The solid is even in z, so it falls apart into two halves of half the unknowns, moving evenly and oddly; the groups of
-cells form a tree, and each unknown inside goes where the last cell that holds it joins: the multifrontal method
-(I. Duff, J. Reid, ACM Trans. Math. Software 9, 1983, 302-325). Nearly all work is products of large dense matrices.
+The solid is symmetric in z, so its even and its odd motion are two problems of half the unknowns. The groups of cells
+form a tree; an inner unknown is eliminated once the last cell that holds it has joined (I. Duff, J. Reid, ACM Trans.
+Math. Software 9, 1983, 302-325). Nearly all work is products of large dense matrices.
 """
 
 from __future__ import annotations
@@ -30,8 +30,7 @@ class Half:
     """The even (or odd) motion of a solid, by the nodes (k,) with z >= 0 that are kept.
 
     answer : (3 r, 3 k) m/N, motion of the kept nodes under unit forces on touched ones; zero where nothing can move
-    under_loads : (3 k, w), their motion under the given loads; among : (w, w), work of the loads on one another's
-    motion"""
+    under_loads : (3 k, w), their motion under the unit loads; among : (w, w), work of each load on another's motion"""
 
     answer: np.ndarray
     under_loads: np.ndarray

@@ -25,13 +25,13 @@ from .frictionless import Frictionless, Try
 PENETRATION = 1e-6  # m, the target at any node
 _REACH = 0.8e-3  # m, nodes this far outside the indenter at the end of a solve may come to touch it
 _SPARE = 0.15e-3  # m, by which more nodes are followed than that, so that a deeper contact needs no others (assumed)
-_LARGE = 2.5  # times what is wanted: so many nodes followed cost more than a fresh start (assumed)
+_LARGE = 2.5  # times the nodes wanted: following more costs more than a fresh start (assumed)
 _TAKE_IN = 20e-6  # m: where some nodes go through the indenter, those this close to it are taken in with them
 _CORE_TAKE_IN = 0.15e-3  # m, likewise for inner skin over the core, where gaps vary more
 _CLOSED = 0.3e-6  # m: gaps closed to this need no further look
 _MOST_ROUNDS = 12  # of taking in nodes
 _DETOURS = (4, 9, 20)  # steps from the start to the goal, where one does not settle: other steps pass other edges
-_FAILS_AFTER = 5  # iterations, assumed, which a solver that ends without a contact does not count
+_FAILS_AFTER = 5  # iterations that a solve is taken to have cost which ended without a contact (assumed)
 _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest overlap are first taken to touch
 
 
@@ -80,7 +80,7 @@ class ContactProblem:
         return self._walk(pose, axial_force, start)
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError where the indenter has penetrated between the surface's nodes."""
+        """Raise PenetrationError if the indenter has penetrated between the surface's nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
         where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)

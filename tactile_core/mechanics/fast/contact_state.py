@@ -80,7 +80,7 @@ class Contact:
 
     @property
     def fluid_pressure(self) -> float:
-        """Pa, by which the fluid's has risen."""
+        """Rise of the fluid's pressure, Pa."""
         at_nodes = self.compliance.pressure.reshape(-1, 3)[self.nodes]
         at_core = self.compliance.inner_pressure[self.core_nodes]
         return float((self.nodal_force * at_nodes).sum() + self.core_force @ at_core)
@@ -109,7 +109,7 @@ def among(nodes: np.ndarray, others: np.ndarray) -> np.ndarray:
     return others[np.minimum(np.searchsorted(others, nodes), len(others) - 1)] == nodes
 
 
-# m, how far toward the second face of a concave crease its distance is measured: the least that finds it.
+# m, tried in turn: how far beside a concave crease a face's distance is measured, so that this face is the nearer one.
 _CREASE_PROBES = (10e-6, 40e-6, 120e-6, 400e-6)
 _MOST_LOOKS = 3  # for a node's second face: while it is still far from its place, only one may be seen (assumed)
 _SAME_FACE = 0.97  # cosine between the normal that was seen and the one found there
@@ -160,7 +160,7 @@ class Candidates:
         """Double nodes ``at`` (j,) that lie in a crease: they touch the face that they are at and the one they left.
 
         left, normals : (j, 3), a point of the face that each left, and the normal there; rest : (k, 3) m, of all nodes
-        At the crease itself both faces are equally near: each is probed a little beside it, where it is the nearer one.
+        At the crease both faces are equally near, so each face's distance is measured a little beside it (``probe``).
         """
         self.looks[at] += 1
         points = rest[at] + self.displacement[at]
@@ -180,7 +180,7 @@ class Candidates:
 
 
 def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """The places (j, 3) nearest to points of planes with normals ``first`` that lie in other planes as well."""
+    """Points (j, 3) m where planes meet, nearest to ``points`` of the first one; ``others`` lie in the second one."""
     across = second - np.einsum("ai,ai->a", second, first)[:, None] * first
     way = np.einsum("ai,ai->a", others - points, second) / np.einsum("ai,ai->a", across, second)
     return points + way[:, None] * across

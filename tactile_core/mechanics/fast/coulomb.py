@@ -56,7 +56,7 @@ class Points(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of nodes to where a step begins, (k, 3) m. slip : (k, 3) m, then, from the spots; gap : (k,) m, then."""
+    """Motion (k, 3) m of nodes to where a step begins; ``slip`` (k, 3) m from their spots and ``gap`` (k,) m there."""
 
     moves: np.ndarray
     slip: np.ndarray
@@ -209,7 +209,7 @@ def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001,
 def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
     """Sort points into touching and slipping ones after a step: see ``Sorted``.
 
-    turned : (k, 3), normals where nodes are now; stuck_again : (k,), how often each did, updated in place
+    turned : (k, 3), normals where nodes are now; stuck_again : (k,), times each went from slip to stick; updated
     """
     force, core, active, slips, normal, lean, gap, core_gap, off = points
     k, c = force.shape[0], core.shape[0]
@@ -269,9 +269,10 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 
 @Loop
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
-    """Let nodes slip that left the contact and touch again: sticking drew them off. Changes force, ``after``, ``left``.
+    """Let nodes that return to the contact slip instead of stick, since sticking is what pulled them off.
 
-    left : (k,) bool, nodes that have left so far. Returns the largest gap, m, of what touches now.
+    left : (k,) bool, nodes that have left so far. Updates it, the nodes' forces and ``after.slips`` in place.
+    Returns the largest gap, m, of the nodes that touch now.
     """
     force, _, active, _, normal, _, gap, _, off = points
     wrong = 0.0

@@ -23,8 +23,8 @@ from .contact import ContactProblem
 from .contact_state import Candidates, Contact, Loads
 from .frictionless import Frictionless, Try
 
-# Of a spring, over a surface node's by itself: of 14 rings 1 to 1.9 mm deep 13 settled with 10, all with 20, which left
-# them 34 to 70 um deep in between nodes.
+# Stiffness of a spring, over that of a surface node by itself: of 14 rings 1 to 1.9 mm deep 13 settled with 10, all
+# with 20, at a penetration of 34 to 70 um between nodes.
 _STIFFNESS = 20.0
 # m: nodes this close to the indenter touch it. Others carry what points push as well.
 _ON_BODY = 1e-6
@@ -37,7 +37,7 @@ _DETOUR = 9  # steps, where that does not settle
 
 
 class _Sprung(Frictionless):
-    """Contact with ``slack`` (k,) m, by which points may lie in the indenter before they push."""
+    """Contact whose points may lie in the indenter by ``slack`` (k,) m before they push."""
 
     most_curved = 10_000  # all of them: along wires every point feels the turn of its normal
     slack: np.ndarray
@@ -69,7 +69,7 @@ class EdgeContactProblem(ContactProblem):
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError where the body is in between nodes in spite of the points, or lies behind nodes."""
+        """Raise PenetrationError if the body is between nodes in spite of the points, or behind nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         gap, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable])
         normals = normals[np.abs(gap) < _ON_BODY]

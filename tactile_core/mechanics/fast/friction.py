@@ -18,19 +18,19 @@ from .frictionless import AXIAL_TOLERANCE, GAP_TOLERANCE, SIDEWAYS_TOLERANCE, Pa
 
 MAX_ITERATIONS = 24  # most contacts take 3 to 7; smaller steps help those that do not settle
 LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
-# Share of a contact's friction by which a node that has stuck again so often may pass its limit: at an edge a node may
-# slip backward as soon as it slips, and a detour for its sake takes ten times as long, and seldom leads nearer.
+# Share of a contact's friction by which a node that keeps changing between stick and slip may pass its limit: at an
+# edge it may slip backward as soon as it slips, and a detour for it takes ten times as long and seldom helps.
 WAVERING = 5e-3
-NEARLY_CLOSED = 5e-6  # m, assumed: with larger gaps Newton's step in turning normals leads astray at edges
+NEARLY_CLOSED = 5e-6  # m, largest gap with which Newton's step lets normals turn: it misleads at edges (assumed)
 FLAT = np.empty(0, int), np.empty((0, 3, 3))  # no node feels the curvature
-_MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # as without friction: nodes, and curvature x force x compliance
+_MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # most nodes, least curvature x force x compliance, as without friction
 
 
 class Friction:
     """Solves for the nodes of one block.
 
     rest : (k, 3) m; core_gap : (c,) m; spots : (k, 3) m, where nodes stick, in the indenter's frame
-    stiffness : that of the solve before, of whichever block, from which this one goes on
+    stiffness : inverse of the previous solve, of whatever block, which this one updates
     """
 
     def __init__(
@@ -117,9 +117,9 @@ class Friction:
         return force, core, step
 
     def _step_for(self, change: np.ndarray, force: np.ndarray, axial_force: float) -> float:
-        """Return how far, m, the indenter moves in a step. Raises UnsolvedError.
+        """Return the indenter's travel, m, in a step to an axial force. Raises UnsolvedError.
 
-        change : (3 k + c, 2) N, of forces at rest and for a metre of motion; force : (k, 3) N before it
+        change : (3 k + c, 2) N, of forces without motion, and per metre of it; force : (k, 3) N before the step
         """
         changed = change[: force.size].reshape(-1, 3, 2).sum(axis=0)
         carried, per_step = self.pose.direction @ changed
@@ -132,7 +132,7 @@ class Friction:
         return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
 
     def _spare(self, force: np.ndarray) -> float:
-        """Friction, N, that a wavering node may bear beyond its limit, of forces (k, 3) N."""
+        """Friction, N, beyond its limit that a node may bear which alternates between stick and slip."""
         axial = abs(float(force.sum(axis=0) @ self.pose.direction))
         return max(WAVERING * self.friction * axial, coulomb.FORCE_NOISE)
 

@@ -22,18 +22,19 @@ GAP_TOLERANCE = 0.2e-6  # m: 1/5 of the 1 um penetration that the target allows
 SIDEWAYS_TOLERANCE = 1e-4  # of the total force: what nodal forces may have across the normals where nodes end up
 AXIAL_TOLERANCE = 1e-7  # relative, of the force along the motion where one is asked for
 MAX_ITERATIONS = 60
-_FEELS_CURVATURE = 0.1  # least curvature x force x compliance of such a direction
-_FEELS_AT_ONCE, _LATER = 0.4, 5  # from the second iteration on only for more than this: plain iterations are cheaper
-# Assumed, tried on random contacts: what Newton's step divides by at least, and at most where a mode runs away.
+_FEELS_CURVATURE = 0.1  # least curvature x force x compliance of a tangent direction in the Newton step
+_FEELS_AT_ONCE, _LATER = 0.4, 5  # least such product before iteration 5: plain iterations are cheaper
+# Limits of the Newton step's divisor, the second for modes that leave equilibrium (assumed, tried on random contacts).
 _LEAST_STIFFNESS, _SLOPE_STIFFNESS = 0.02, 0.1
 _LARGEST_TURN = 0.3  # rad, of a normal in one Newton step
 _LARGEST_STEP = 0.25e-3  # m, of the depth in one iteration
 _CREASE_ANGLE = np.cos(np.radians(20.0))
 _CREASE_ITERATION = 6  # from which nodes that flip between two faces are taken to sit in the crease between them
-_STALE = 0.1  # rad: the compliance along the normals is made again when one has turned by more
-_FEW = 0.3  # of the nodes: their part of the compliance costs less to make than the whole
-_FREE_ITERATIONS = 4  # in which steps are taken whole, whatever they bring
-_HOPE, _WINDOW, _NEARER = 4, 6, 0.5  # iterations at least, those looked at, what they bring (assumed; random contacts)
+_STALE = 0.1  # rad, turn of a normal above which the compliance along the normals is updated
+_FEW = 0.3  # largest share of turned nodes whose part is updated; beyond it the whole costs less
+_FREE_ITERATIONS = 4  # first iterations, in which steps are taken whole
+# Assumed, tried on random contacts: iterations before a stall, those compared, and the decrease that is no stall.
+_HOPE, _WINDOW, _NEARER = 4, 6, 0.5
 _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
 
@@ -78,7 +79,7 @@ class Pace:
 
     @property
     def stalled(self) -> bool:
-        """Return true if the last iterations have hardly come nearer to the contact than those before them."""
+        """Return true if the last iterations have hardly reduced the error."""
         best = self._best
         return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
@@ -103,7 +104,7 @@ class Frictionless:
 
     rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
     faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
-    most_curved : tangent directions taken into the Newton step; more cost more time than they save iterations
+    most_curved : most tangent directions in the Newton step; more of them cost more time than they save
     """
 
     most_curved = 20
@@ -118,7 +119,7 @@ class Frictionless:
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
         """Return gaps (k,) m and normals (k, 3) for displacements (k, 3) m and a shift of the indenter, m, along its
-        motion; at a crease's second face measured a little toward it."""
+        motion; a crease's second face is measured at the point moved by ``probe``."""
         points = self.rest + displacement
         there = self.pose.moved(shift) if shift else self.pose
         if not self._probes:
@@ -159,7 +160,7 @@ class Frictionless:
         return state
 
     def _model(self, normal: np.ndarray, older: _Model | None) -> _Model:
-        """The model at new normals (k, 3), or the older one while they have hardly turned."""
+        """Return the model at normals (k, 3), or the older one if they have hardly turned."""
         if older is None:
             return _Model(normal, self.block.normal(normal), {})
         stale = np.flatnonzero(np.abs(normal - older.normal).max(axis=1) > _STALE)
@@ -172,7 +173,7 @@ class Frictionless:
         return _Model(mixed, self.block.turned(older.matrix, mixed, stale), {})
 
     def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
-        """Return the gaps without any forces; a model of older normals accounts for the change of forces alone."""
+        """Return the gaps at zero force; with a model of older normals they are exact only at the present forces."""
         if solved is None or model.normal is normal:
             return np.concatenate([gap - np.einsum("ai,ai->a", normal, place), self.core_gap])
         k = self.block.k
@@ -207,7 +208,7 @@ class Frictionless:
         return Try(displacement, force, core_force, state.shift + solved.step, solved.active)
 
     def _turn(self, matrix, normal, solved: Pressing, travel, place, shift, threshold):  # noqa: ANN001, ANN202
-        """Change of force (k, 3), (c,) N when normals follow their nodes; None where no node feels it.
+        """Newton's change of force (k, 3), (c,) N as normals turn with the nodes' motion; None if none turns enough.
 
         With t a principal direction of the indenter's surface at a node, weighted by sqrt(force x curvature), the
         turned force is p n + t y, y = t . travel: (1 - S) y = t . travel, S the compliance among the t with the gaps
@@ -264,7 +265,7 @@ class Frictionless:
 
 
 def _stiffness(mode: np.ndarray) -> np.ndarray:
-    """1 - mode, Newton's divisor; a mode above 1 runs away from equilibrium, and the step goes that way."""
+    """Newton's divisor 1 - mode, limited; a mode above 1 is unstable, and the step goes the way it leaves."""
     away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
     return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)
 

@@ -1,7 +1,8 @@
 """Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
 
-All motions but those of slipping nodes are known, and the stiffness of what touches (``contact_stiffness``) makes
-forces of them: the system to be solved has two unknowns a slipping node, however many stick. See ``coulomb``.
+Only the motions of slipping nodes are unknown; from motions the stiffness of the touching points
+(``contact_stiffness``) gives forces. So the system has two unknowns per slipping node, however many stick. See
+``coulomb``.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from .coulomb import LARGEST_TILT, LARGEST_TURN, Motion, Points, Slipping, known
 
 
 class Change(NamedTuple):
-    """Change of forces in a Newton step, r columns: at rest and, where the indenter may move, for a metre of that.
+    """Change of forces in a Newton step, r columns: without motion and, if the indenter may move, per metre of it.
 
-    forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, besides what turns with normals
+    forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, without the turn of normals
     moved : (q, 3, r) m, of curved nodes along the indenter; turns : (s, r) N, of friction across itself
     """
 
@@ -72,7 +73,7 @@ def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> 
 
 @Loop
 def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
-    """Find forces (s, 3, r) N of slipping nodes, but what turns with normals, and moves (q, 3, r) m of curved ones.
+    """Find forces (s, 3, r) N of slipping nodes, without the turn of normals, and moves (q, 3, r) m of curved ones.
 
     forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the moves returned are relative to the indenter
     """

@@ -1,4 +1,4 @@
-"""A press in the fast tier whose forces and shapes are the corrected ones."""
+"""A press in the fast tier, with corrected forces and shapes."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from .correction import Corrected, correct, force_factor
 from .edge_contact import EdgeContactProblem
 
 _FIRST_DEPTH = 30e-6  # m, where a search for a force starts
-_GROWTH = 1.6  # largest change of force in one step of a search, which a warm start follows safely
-_LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold it where the resting surface is not reached
+_GROWTH = 1.6  # largest factor of force in one step of a search, safe for a warm start
+_LEAST_DEPTH = 1e-6  # m, of a contact that has slid: friction may hold the surface where at rest it is not reached
 _SEARCH_STEPS = 24
 _POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that determines the power; its range (assumed)
 
 
 @dataclasses.dataclass(frozen=True)
 class FastContact:
-    """A contact of the linear model, and what its correction makes of it. Forces N, by the indenter on the sensor.
+    """A contact of the linear model with its correction. Forces N, by the indenter on the sensor.
 
-    linear : as solved; corrected : shape and factor; force : (3,); axial_force : along the motion
-    pressure : Pa, rise of the fluid's; depth : m, from first touch where the indenter has slid to
+    linear : as solved; corrected : shape and factor of force; force : (3,), axial_force : along the motion, corrected
+    pressure : Pa, rise of the fluid's; depth : m, from first touch at the place that the indenter has slid to
     """
 
     linear: Contact
@@ -60,7 +60,7 @@ class CorrectedPress:
         self.compliance, self.pose, self.limit = compliance, pose, limit
         self.problem = ContactProblem(compliance, indenter, pose, limit, friction, work)
         self.last: Contact | None = None
-        self._on_the_way: tuple[Contact, float] | None = None  # of a search, and the fall there
+        self._on_the_way: tuple[Contact, float] | None = None  # last contact of a search, and ``fall`` there
         self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
@@ -83,9 +83,9 @@ class CorrectedPress:
             return None
 
     def nearest(self) -> FastContact | None:
-        """Return the last contact within the limit that ``at_force`` found on its way; the next solve goes on from it.
+        """Return the last contact within the limit that the last ``at_force`` met; the next solve goes on from it.
 
-        None where it found none. Raises PenetrationError as ``at_depth`` does.
+        None if there is none. Raises PenetrationError as ``at_depth`` does.
         """
         if self._on_the_way is None:
             return None
@@ -93,9 +93,9 @@ class CorrectedPress:
         return self._with_correction(self.last, fall)
 
     def _guarded_if_needed(self, solve: Callable[[], _Found]) -> _Found:
-        """Solve; where frictionless nodes alone do not hold the indenter, solve again with points between them.
+        """Solve; if the indenter sinks in between frictionless nodes, solve again with points between them.
 
-        That solve begins at the start, and the points stay for all contacts that follow.
+        That solve starts from rest, and the points stay for all contacts that follow.
         """
         try:
             found = solve()
@@ -125,9 +125,9 @@ class CorrectedPress:
         return self._with_correction(contact, fall)
 
     def _at_force(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """A secant in the logarithms of the linear and the corrected force: one follows the other nearly as a power.
+        """Solve by secants in the logarithms of linear and corrected force, which is nearly a power of the other.
 
-        None beyond the limit; raises UnsolvedError where none is found.
+        None beyond the limit; raises UnsolvedError if none is found.
         """
         if isinstance(self.problem, EdgeContactProblem):
             return self._by_depths(force, pose, fall)
@@ -142,7 +142,7 @@ class CorrectedPress:
             found = linear, linear * force_factor(self.compliance, seen)
             close = found[1] > 0 and abs(found[1] / force - 1) < FORCE_TOLERANCE
             if seen.depth > self.limit and (close or found[1] < force):
-                if not self.problem.friction:  # what has penetrated bears less than it would
+                if not self.problem.friction:  # an indenter that has penetrated bears less force
                     self.problem.check_follows(contact)
                 return None
             if close:
@@ -156,10 +156,7 @@ class CorrectedPress:
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
     def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Search the contact among depths: faster where all points feel the turn of their normals.
-
-        Raises PenetrationError and UnsolvedError.
-        """
+        """Solve by searching over depth: faster with points between nodes. Raises PenetrationError, UnsolvedError."""
 
         def move(depth: float, before: FastContact) -> FastContact:
             """Return the corrected contact at a depth m from first touch, starting from the contact before."""
@@ -188,7 +185,7 @@ class CorrectedPress:
         return self._last_power
 
     def _find_first_contact(self, pose: Pose) -> Contact | None:
-        """The first contact that carries force; a coarse lattice may be missed by the shallowest depths."""
+        """Find a shallow contact that carries force: at the least depths an indenter may touch no node."""
         depth = _FIRST_DEPTH
         while depth <= self.limit:
             contact = self.problem.at_pose(pose.moved(depth))
@@ -198,7 +195,7 @@ class CorrectedPress:
         return None
 
     def _surface_drop(self, pose: Pose, *, touches: bool) -> float:
-        """Additional distance, m, to first touch at a pose, against the press's own."""
+        """Return how much deeper, m, first touch is at a pose than at the press's own."""
         if touches:
             return float((pose.apex - self.pose.apex) @ pose.direction)
         return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)
@@ -213,6 +210,6 @@ class CorrectedPress:
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:
-    """A contact with its depth measured from first touch where the indenter has slid to, as the correction knows it."""
+    """Return a contact with its depth counted from first touch at the place slid to, which the correction expects."""
     depth = max(contact.depth - fall, _LEAST_DEPTH)
     return contact if depth == contact.depth else contact.at_depth(depth)

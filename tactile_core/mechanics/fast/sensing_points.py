@@ -1,4 +1,4 @@
-"""Sensing points inside a solid whose surface is pressed: electrodes' feet, nodes over the core and beside it."""
+"""Sensing points of a skin's inner side: the feet over electrodes, nodes over the core, and nodes beside it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
 
 class SensingPoints(NamedTuple):
-    """Map from a displacement to the change of w gaps: a sparse matrix (3 n_nodes, w), and gaps at rest.
+    """Linear map from nodal displacements to changes of w gaps, sparse (3 n_nodes, w), and the gaps at rest.
 
     rows, columns : (k,) int; weights : (k,); gap : (w,) m
     """
@@ -41,7 +41,7 @@ class SensingPoints(NamedTuple):
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
-    """List the points: film ends over electrodes, each amid three nodes; inner nodes over the core, then beside it."""
+    """List the points: feet over electrodes, each in a triangle of nodes; inner nodes over the core, then beside it."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)
@@ -104,7 +104,7 @@ def _inner(sensor: str) -> np.ndarray:
 
 
 def _right_images(sensor: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mark nodes (n,) of the inner skin on the side z < 0, (n,) bool, and return the one of each pair with z >= 0."""
+    """Mark inner-skin nodes (n,) with z < 0, (n,) bool, and return each node (n,), or its mirror image for these."""
     rest = _inner(sensor)
     mirrored = rest[nodes, 2] < -ON_PLANE
     return mirrored, np.where(mirrored, mirror_nodes(rest)[nodes], nodes)
@@ -126,7 +126,7 @@ def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return which sensing point with z >= 0 each of ``count`` is or mirrors, (count,), and whether it mirrors it."""
+    """Return for each of ``count`` sensing points itself or its image with z >= 0, (count,), and if it is the image."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():

@@ -19,7 +19,7 @@ from ..solution import Sensor
 from .newton import FiniteStrainContact
 from .solved_contact import EXACT, ContactState, Tolerance
 
-# m of a load step: without friction one is enough from rest, unless it fails and is halved; friction follows a path.
+# m, load steps: without friction one step from rest will do, unless it fails and is halved; with friction a path.
 ONE_STEP, FRICTION_STEP = 5e-3, 0.25e-3
 # Gaps to 1/100 of the penetration that the target allows. A last step of 0.15 um left forces in balance to 1e-6.
 _FULL = Tolerance(10e-9, 1e-7, 0.15e-6)
@@ -49,7 +49,7 @@ class Body:
     ) -> FiniteStrainContact:
         """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most.
 
-        every_edge : keep out also edges that come between nodes so deep that the nodes at rest do not show them
+        every_edge : add penalty points also for edges near the nodes at first touch, not only at full depth
         """
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
@@ -64,7 +64,7 @@ class Body:
         )  # fmt: skip
 
     def _faces(self, indenter: Indenter, poses: tuple[Pose, ...], near: np.ndarray) -> np.ndarray | None:
-        """The faces (f, 9) between nodes ``near`` an indenter, where those slide off it and faces can bend round it."""
+        """Faces (f, 9) among nodes ``near`` an indenter so sharp that nodes slide off it; None for any other."""
         mesh = self.solid.mesh
         if not BENDS <= min(sharpest(indenter, pose, mesh.nodes[near]) for pose in poses) < BLUNT:
             return None

@@ -1,9 +1,9 @@
-"""The nodes that touch an obstacle: which, how hard, and how they rub.
+"""The nodes that touch an obstacle: which, with what normal force, and with what friction.
 
-Friction is Coulomb's with a stiff spring at each touching node, as elastoplasticity is solved: the spring pulls toward
-the node's anchor on the indenter until it is as strong as mu times the normal force, and then drags the anchor along
-(J. Simo, T. Laursen, Computers and Structures 42, 1992, 97-116). A node that sticks thus gives way by what its spring
-yields, at most mu times its normal force over ``grip``.
+Coulomb friction by return mapping, as in elastoplasticity: a stiff spring at each touching node pulls toward its anchor
+on the indenter, with mu times the normal force at most, and then drags the anchor along (J. Simo, T. Laursen, Computers
+and Structures 42, 1992, 97-116). A sticking node moves by its spring's stretch, at most mu times its normal force over
+``grip``.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class ContactSet:
     friction: float = 0.0
     grip: float = 0.0
     imbalance: float = 0.0
-    # Of the active nodes, as ``begin`` saw them: distance (k,) m, frames (k, 3, 3), pull (k, 3) N of springs that would
+    # Of the active nodes, at the last ``begin``: distance (k,) m, frames (k, 3, 3), pull (k, 3) N of springs that would
     # never slip, stiffness (k, 3, 3) N/m of friction.
     # Of all candidates: where (m, 3) m they stood in the indenter's frame when the load step began.
     _distance: np.ndarray = dataclasses.field(default_factory=lambda: np.empty(0), repr=False)
@@ -85,11 +85,11 @@ class ContactSet:
         grip: float = 0.0,
         first_share: float = 0.0,
     ) -> ContactSet:
-        """Return the start of the next load step: what touched goes on, what the moved obstacle has reached begins.
+        """Return the set that starts the next load step: nodes that touched, and those the moved obstacle overlaps.
 
-        at : (n, 3) m, the mesh's nodes now; before : where the obstacle stood until now.
-        Anchors of slipping nodes have been dragged to where their friction holds.
-        first_share : where nothing touched, only nodes begin that overlap by this share of the largest overlap.
+        at : (n, 3) m, the mesh's nodes now; before : the obstacle's pose until now
+        first_share : where nothing touched, only nodes enter that overlap by this share of the largest overlap.
+        Anchors of slipping nodes are dragged to where friction holds them.
         """
         m = len(candidates)
         if obstacle is None or not m:
@@ -118,7 +118,7 @@ class ContactSet:
     def begin(self, at: np.ndarray) -> np.ndarray:
         """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first column.
 
-        One tangent lies across the axis that the normal has least of: on a plane of symmetry that is its own.
+        One tangent is perpendicular to the axis of the normal's smallest component, as mirror symmetry needs.
         """
         if not len(self.candidates):
             self._distance, self._frames = np.empty(0), np.empty((0, 3, 3))
@@ -149,11 +149,11 @@ class ContactSet:
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
 
     def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
-        """Return the share of a step after which friction balances all other forces along it; 1 if the whole will do.
+        """Line search: return the share of a step after which friction balances all other forces along it, at most 1.
 
-        move : (k, 3) m, of the nodes, in the frames of ``begin``; force : N m, of all other forces times the step, at
-        its start; stiffness : N m, what the whole step adds to them and to friction as linearised by ``gripping``.
-        Newton's steps overshoot where many nodes begin to slip.
+        Newton's steps overshoot where many nodes begin to slip. move : (k, 3) m, of the nodes, in ``begin``'s frames
+        force : N m, the work of all other forces over the step, at its start
+        stiffness : N m, what the whole step adds to it, and to friction as linearised by ``gripping``
         """
         if not self.friction:
             return 1.0
@@ -162,7 +162,7 @@ class ContactSet:
         stiffness -= float(np.einsum("ki,kij,kj->", along, self._gripping, along))
 
         def residual_force(share: float) -> float:
-            """Force N left along the step after a share of it: zero where the energy along it is least."""
+            """Derivative, N m, of the energy by the share of the step."""
             rubbing, _ = self._capped(self._trial - share * self.grip * along)
             return force + share * stiffness - float((along * rubbing).sum())
 
@@ -176,9 +176,9 @@ class ContactSet:
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:
-        """Return the change (k, 3, 3) N/m of the contact forces with the normals' turn: pressing times the Hessian.
+        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals: pressing times the Hessian.
 
-        Taken where the nodes will come to lie, on the obstacle: near a centre of curvature, deep in it, it is no guide.
+        It is taken on the obstacle's surface, where the nodes will lie: deep inside, the curvature misleads.
         """
         if not self.active.any():
             return np.empty((0, 3, 3))
@@ -187,10 +187,10 @@ class ContactSet:
         )
 
     def gripping(self, along: float) -> np.ndarray:
-        """Return the stiffness (k, 3, 3) N/m of friction: all of holding springs, slipping ones across their pull.
+        """Return friction's stiffness (k, 3, 3) N/m: that of sticking springs, and of slipping ones across the pull.
 
-        along : 0 for Newton's method; more of the secant's stiffness along the pull keeps nodes from swinging to and
-        fro between stick and slip.
+        along : share of the secant's stiffness along the pull of slipping springs: 0 is Newton's method, more keeps
+        nodes from alternating between stick and slip.
         """
         self._gripping = np.zeros((int(self.active.sum()), 3, 3))
         if not self.friction:
@@ -205,7 +205,9 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Hold normals, which close gaps, and fixed (k, 3) bool: return held (k, 3), steps m, in ``begin``'s frames."""
+        """Prescribe the normal steps, which close gaps, and zero for fixed (k, 3) bool axes.
+
+        Returns held (k, 3) bool and their steps (k, 3) m, in ``begin``'s frames."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True
@@ -220,7 +222,7 @@ class ContactSet:
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)
 
     def follow(self, reaction: np.ndarray) -> None:
-        """Adapt friction, if any node slips, to the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
+        """Update friction, if any node slips, to the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
@@ -232,8 +234,9 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release nodes in tension, add those that penetrate; at (n, 3) m: the mesh's nodes. Returns true if there are
-        none and gaps are below the tolerance, m."""
+        """Release nodes in tension, add those that penetrate; return true if none was and gaps are below the tolerance.
+
+        at : (n, 3) m, the mesh's nodes; tolerance : m"""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])
@@ -253,7 +256,7 @@ class ContactSet:
         return bool(settled)
 
 
-_OVERSHOT = 0.3  # of a step's driving force: what may be left against it (assumed)
+_OVERSHOT = 0.3  # share of a step's driving force that may be left against it at the step's end (assumed)
 _SHARE_STEP = 1 / 64
 
 

@@ -22,13 +22,13 @@ from .body import FRICTION_STEP, ONE_STEP, Body, graded_body
 from .newton import FiniteStrainContact
 from .solved_contact import ContactState, NoEquilibriumError
 
-# Of the full tier's spacing, where its own mesh finds no contact: 8 of 14 rings at random depths settled then, and five
-# of five deeper than their wire's radius that had not, or had gone through.
+# Spacing of the finer mesh, over the full tier's, used where that finds no contact: 8 of 14 rings at random depths
+# settled then, and five of five deeper than their wire's radius that had not, or had gone through.
 _FINER = 0.5
-# Of load steps without friction, on the tier's own mesh and on the finer one, before another way is shorter (assumed).
+# Failed load steps without friction, on the tier's own mesh and the finer one, after which another way is quicker
+# (assumed).
 _FEW_FAILURES = 4, 2
-_FAILURES = NoEquilibriumError, PenetrationError  # of a way, after which another is tried
-_SPARE = 1.1  # of the depths that the fast tier finds, for which the mesh is made where forces are asked for
+_FAILURES = NoEquilibriumError, PenetrationError  # after which another way is tried
 
 
 class LoadPath:
@@ -49,14 +49,14 @@ class LoadPath:
         self.thickness, self.limit = thickness, limit
         self.spacing = 1.0  # of the mesh's nodes, over the tier's own
         self.fading = False  # true while a step goes by friction that fades
-        self.patient = False  # true where short steps, every edge held out, are all that is left
-        self.way: list[Pose] = []  # what was solved, which friction remembers
+        self.patient = False  # true for the last resort: short steps, and penalty points at every edge
+        self.way: list[Pose] = []  # poses solved so far, which friction depends on
         self.made_for = max(depths, default=0.0)
-        self.deeper = 1.0  # how deep the last force was found, over the guess
+        self.deeper = 1.0  # depth at which the last force was found, over its guess
         self._make()
 
     def _make(self) -> None:
-        """The mesh, with nothing pressed yet."""
+        """Make the mesh and its contact problem, at rest."""
         self.body = graded_body(self.sensor, self.indenter, self.pose, self.made_for, self.tier, self.spacing)
         self.problem = self.body.contact(
             self.indenter, self.pose, self.made_for, self.friction, every_edge=self.patient
@@ -69,8 +69,8 @@ class LoadPath:
     def to(self, step: Step, guess: float) -> Solution:
         """Solve the next step, see ``solve_path``; guess : m, about the depth of a force.
 
-        What the full tier's mesh does not hold is solved on a finer one, from the start; what no mesh holds, without
-        friction, by friction that fades, and at last by short steps.
+        Where the full tier's mesh finds no contact, tries in turn: a finer mesh, from the start; then, without
+        friction only, friction that fades to 0, and short steps.
         """
         before = self.last
         try:

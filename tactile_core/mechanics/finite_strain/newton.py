@@ -24,28 +24,28 @@ from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
 from .solved_contact import EXACT, ContactState, NoEquilibriumError, NotConvergedError, Tolerance, guarded
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
-MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second where springs between nodes push: they slow the end (assumed)
-MOST_FAILURES = 8  # of load steps on one path: bounds its time (assumed; the longest path that was found had 8)
-_EASY = 8  # iterations, of a load step after which the next may be longer again (assumed)
-SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; halved below that, the path has ended
-# Of a node's own stiffness, of springs between nodes: stiff ones find their contact only from that of softer ones.
+MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second with penalty points: they slow the end (assumed)
+MOST_FAILURES = 8  # load steps that may fail on one path: bounds its time (assumed; one path with 8 was still found)
+_EASY = 8  # iterations at most of a load step after which the next may be longer again (assumed)
+SMALLEST_STEP = 1 / 16  # of a load step, or of the way where that is less; if that fails, the path has ended
+# Stiffness of penalty points, over a node's own: contacts with stiff ones are found only from those with softer ones.
 _SPRING, _STIFF = 10.0, 40.0
 _FRICTION_SWEEPS = 3  # solves with one factor, in which friction follows the normal forces
 _FAILURES = NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.linalg.LinAlgError  # of a load step
 
 
 class FiniteStrainContact:
-    """An indenter at a pose in front of a solid; follows a path of growing depth, or of poses.
+    """Contact of an indenter with a solid along a path of growing depth, or of poses.
 
     touchable : (m,) mesh nodes that the indenter may touch
     fixed : (3 n,) bool, degrees of freedom that do not move; None: those of the clamped nodes
     cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
     core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch
     friction : Coulomb's coefficient, between indenter and sensor
-    factor : where it is known already, the solver of the solid's pattern; tolerance : when iterations end
-    first_share : a press from rest begins with the nodes that overlap by more than this share of the most: a guess,
-        which the active set corrects
-    faces : (f, 9) quadratic faces of the surface that keep the indenter out between their nodes, see ``PenaltyPoints``
+    factor : solver for the solid's sparsity pattern, if there is one already; tolerance : when iterations end
+    first_share : the first active set of a press from rest is of nodes that overlap by this share of the largest
+        overlap
+    faces : (f, 9) quadratic faces of the surface that get penalty points where the contact fails, see ``PenaltyPoints``
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class FiniteStrainContact:
         self.friction, self.tolerance, self.first_share = friction, tolerance, first_share
         self.most_failures = MOST_FAILURES
         self._factor = DampedFactor(solid, factor or PatternFactor())
-        self._between = None if faces is None else PenaltyPoints(faces)
+        self._penalty = None if faces is None else PenaltyPoints(faces)
         if cavity:
             rows, columns, _ = cavity.hessian(solid.mesh.nodes)
             self._cavity_places = solid.pattern.find(rows, columns)
@@ -85,8 +85,8 @@ class FiniteStrainContact:
     def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
 
-        A step that fails is halved. Raises TactileError with the part of the way that was reached where a sixteenth of
-        a step fails, or where too many have failed.
+        A step that fails is halved. Raises TactileError, which names the part of the way reached, if a sixteenth of a
+        step fails, or too many have failed.
         """
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
@@ -105,9 +105,9 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve a contact without friction at another pose as ``move`` does, by a way with friction that then fades.
+        """Solve a contact without friction as ``move`` does, by continuation from one with friction, which fades to 0.
 
-        Friction keeps nodes from sliding off the indenter's edges on the way; what is found is in balance without it.
+        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without it.
         """
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
@@ -119,13 +119,15 @@ class FiniteStrainContact:
             raise NoEquilibriumError("finite-strain solver", found, "friction, or a smaller depth") from None
 
     def _rubbed(self, friction: float) -> FiniteStrainContact:
-        """Return this contact with friction, which needs no springs between nodes."""
+        """Return this contact with friction, which needs no penalty points."""
         rubbed = copy.copy(self)
-        rubbed.friction, rubbed._between = friction, None
+        rubbed.friction, rubbed._penalty = friction, None
         return rubbed
 
     def _follow(self, start: ContactState, pose: Pose, step: float) -> ContactState:
-        """Go straight to a pose, in load steps of at most a share ``step`` of the way; one that fails is halved."""
+        """Go straight to a pose, in load steps of at most a share ``step`` of the way.
+
+        A load step that fails is tried once more with penalty points, then halved."""
         touch, done, size, steps, failures = start, 0.0, step, 0, 0
         while done < 1 - 1e-9:
             goal = min(done + size, 1.0)
@@ -134,7 +136,7 @@ class FiniteStrainContact:
                 done, size = goal, min(step, 2 * size) if touch.iterations <= _EASY else size
             except _FAILURES:
                 steps += 1
-                if self._between and not touch.guarded:
+                if self._penalty and not touch.guarded:
                     touch = guarded(touch)
                     continue
                 size, failures = min(size, goal - done) / 2, failures + 1
@@ -147,7 +149,7 @@ class FiniteStrainContact:
         return dataclasses.replace(self._stiffened(touch), steps=steps)
 
     def _solve(self, pose: Pose, start: ContactState, spring: float = _SPRING) -> ContactState:
-        """Solve one load step, from a solved contact; spring : stiffness of those between nodes, over a node's own."""
+        """Solve one load step from a solved contact; spring : stiffness of penalty points, over a node's own."""
         state, fluid = start.state.copy(), start.fluid
         at = self._at(state)
         outer = start.outer.carried(
@@ -155,7 +157,7 @@ class FiniteStrainContact:
             _GRIP * self._factor.stiffness, self.first_share,
         )  # fmt: skip
         if (outer.normals @ pose.direction).min(initial=1.0) < BEHIND:
-            raise NotConvergedError  # it would come to lie before the nodes that it should push
+            raise NotConvergedError  # the indenter would pass the nodes that it should push
         inner = start.inner.carried(self.core, self.inner, at)
         self._factor.damping, imbalance, sizes = 0.0, 1.0, [0.0, 0.0]
         for iteration in range(1, (MAX_GUARDED if start.guarded else MAX_ITERATIONS) + 1):
@@ -175,7 +177,7 @@ class FiniteStrainContact:
                 return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
             sizes.append(float(np.abs(step).max()))
             if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
-                raise NotConvergedError  # to and fro between two faces of the indenter
+                raise NotConvergedError  # nodes alternate between two faces of the indenter
             self._factor.relax()
         raise NotConvergedError
 
@@ -188,20 +190,20 @@ class FiniteStrainContact:
         raise FloatingPointError("a cell would be turned inside out")
 
     def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
-        """Push of the indenter on the surface between nodes, where that is guarded."""
-        if not (start.guarded and outer.obstacle and self._between):
+        """Push of the indenter on the penalty points; none where the contact is not ``guarded``."""
+        if not (start.guarded and outer.obstacle and self._penalty):
             return NO_PUSH
-        return self._between.push(outer.obstacle, at, spring * self._factor.stiffness)
+        return self._penalty.push(outer.obstacle, at, spring * self._factor.stiffness)
 
     def _lets_through(self, touch: ContactState) -> bool:
         """Return true if the indenter has come in between nodes."""
         obstacle, at = touch.outer.obstacle, self._at(touch.state)
-        return bool(self._between and obstacle and self._between.deepest(obstacle, at) > LET_THROUGH)
+        return bool(self._penalty and obstacle and self._penalty.deepest(obstacle, at) > LET_THROUGH)
 
     def _stiffened(self, touch: ContactState) -> ContactState:
-        """A contact solved on with stiff springs between nodes; as it is where that fails, or where none are needed.
+        """Solve on with stiff penalty points; return the contact unchanged if it needs none, or if that fails.
 
-        Penetration that this leaves is found afterwards (``penetration``).
+        The penetration that remains is checked afterwards (``penetration``).
         """
         if not touch.guarded or not self._lets_through(touch):
             return touch
@@ -218,8 +220,8 @@ class FiniteStrainContact:
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
         """Solve for a Newton step.
 
-        Returns the steps of displacement (n, 3), of the fluid's pressure and the cells' (n_cells, 4), the imbalance
-        before them, and the share of the step that friction allows.
+        Returns the steps of displacement (n, 3) m and of the fluid's pressure Pa, the relative imbalance before them,
+        the cells' pressure step (n_cells, 4) Pa, and the share of the step that friction allows.
         """
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
@@ -282,8 +284,8 @@ class FiniteStrainContact:
         return step, reaction, rise
 
 
-_FADING = 0.78, 0.3, 0.1, 0.03  # friction that fades, after the fast tier's own (assumed: a third each time)
-_GRIP = 30.0  # of a node's own stiffness: springs of friction that yield some micrometres at most
+_FADING = 0.78, 0.3, 0.1, 0.03  # coefficients of friction that fades (assumed: from ``FRICTION``, a third each time)
+_GRIP = 30.0  # stiffness of friction's springs over a node's own: they yield some micrometres at most
 _SHARES, _SAME = (1.0, 0.5, 0.25, 0.125), 1e-6  # of a step; relative, of two steps that swing to and fro (assumed)
 _MOST_ALONG = 0.6  # of the secant's stiffness, for springs that slip while forces are far from balance (assumed)
 _KEPT_VOLUME = 0.3  # least share of its volume that a Gauss point keeps in one step

@@ -1,9 +1,8 @@
-"""Penalty points that keep an indenter out between the nodes of a surface, where it is sharper than they are dense.
+"""Penalty points, which keep a sharp indenter from penetrating between a surface's nodes.
 
-Nodes touch exactly (``contact_set``). Without friction they slide off edges, which would then cut in between them and
-find no equilibrium. Where a contact lets the indenter through, or is not found, points halfway between nodes push back,
-each by a stiff spring (a penalty: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). All other contacts
-are left to the nodes alone.
+Nodes touch exactly (``contact_set``), but without friction they slide off edges, which then cut in between them. Where
+a contact lets the indenter through, or is not found, points halfway between nodes push back, each by a stiff spring
+(penalty method: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). Other contacts use nodes alone.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from .contact_set import Obstacle
 
 # m: at the edges of nine contacts with balls of 7 and 14 mm quadratic faces hid up to 43 um, and 129 um once.
 LET_THROUGH = 50e-6
-# m: of points this deep at most the normals' turn is accounted for; deeper ones are on their way out (assumed).
+# m: the turn of normals is accounted for at points up to this deep; deeper ones are still moving out (assumed).
 _NEAR = 100e-6
 
 
@@ -37,8 +36,8 @@ _WEIGHTS = _weights()
 class Push:
     """Forces on k points between nodes.
 
-    nodes, weights : (k, 9), whose weighted mean a point is; force : (k, 3) N, of the obstacle
-    stiffness : (k, 3, 3) N/m, how the force falls as the point moves out
+    nodes, weights : (k, 9), a point is the nodes' weighted mean; force : (k, 3) N, by the obstacle
+    stiffness : (k, 3, 3) N/m, by which the force falls as the point moves out
     """
 
     nodes: np.ndarray

@@ -15,9 +15,9 @@ from .penalty_points import Push
 
 @dataclasses.dataclass
 class ContactState:
-    """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : what touches.
+    """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : nodes that touch.
 
-    pose : of the indenter; push : on the surface between nodes, once that is ``guarded``
+    pose : of the indenter; push : on the penalty points, once they are used (``guarded``)
     fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
     """
@@ -40,7 +40,7 @@ class ContactState:
 
 
 def guarded(touch: ContactState) -> ContactState:
-    """Return the same contact with a surface that keeps the indenter out between its nodes, to continue from."""
+    """Return the same contact with penalty points switched on, to continue from."""
     return dataclasses.replace(touch, guarded=True)
 
 
@@ -48,8 +48,8 @@ def guarded(touch: ContactState) -> ContactState:
 class Tolerance:
     """Criteria that end an iteration.
 
-    gap : m, of every touching node; balance : of the largest nodal force and of the fluid's volume, before the last
-        step; step : m, a last step so small that, Newton's method being quadratic, the balance after it is good
+    gap : m, of every touching node; balance : relative, of the largest nodal force and of the fluid's volume, before
+        the last step; step : m, a last step so small that the balance after it is good, by quadratic convergence
     """
 
     gap: float

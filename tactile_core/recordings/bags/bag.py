@@ -21,9 +21,9 @@ STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": 
 START_BYTES = 16  # bytes of a file from which its kind is known
 MARK = "metadata.yaml"  # of a folder that is a ROS 2 bag
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk; recorders make them of 1 to 16 MB (assumed enough)
-MAX_METADATA = 2**20  # bytes of YAML, of which four times as many take 30 s (assumed enough)
+MAX_METADATA = 2**20  # bytes of YAML (assumed enough; four times as many take 30 s to parse)
 PACKED = re.compile(rb"compression_mode:\s*[\"']?(file|message)", re.IGNORECASE)
-# Errors of the library about whole files that it does not read, as are KeyErrors, of formats that it does not know.
+# Errors of the library about undamaged files that it does not read; its KeyErrors are about unknown formats.
 UNDAMAGED = re.compile(r"not supported|[Uu]nsupported|not ros2|not indexed|not in timestamp order|are missing")
 
 

@@ -17,8 +17,8 @@ from .bag import Bag, Topic, refused
 from .ros_messages import Decoder
 from .ros_sensors import channels, in_message, not_read, sensors_in, stamp_of
 
-# Messages from which a hand's fingers with signals are recognised, at the bag's start and, for drivers that start late,
-# from its middle; more, where none has.
+# Messages read to find a hand's fingers with signals, from the bag's start and, for drivers that start late, from its
+# middle; more if none has signals.
 LOOKED_AT = 100
 
 

@@ -6,9 +6,9 @@ simulated contacts leave unexplained; how much less is left with two electrodes 
 for each electrode, if the fitted gains differ widely. A softer or otherwise filled skin moves the electrodes alike at
 another fluid pressure, which shows it where recorded (table: docs/accuracy.md).
 
-A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Units rest at
-different counts, but of five real ones a contact explains little of how: beside a free conductivity it leaves .53 to
-.84. Of eight hard grips it leaves .23 to .38; soft ones (.47 to .87) are not separable."""
+A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Of what a free
+conductivity leaves of a level's difference to a typical rest, one contact leaves .53 to .84 in five real units at rest,
+and .23 to .38 in eight hard grips; soft grips (.47 to .87) are not separable."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ from .gain_matching import match
 
 MOST = 2000  # frames looked at, evenly spread
 MOST_MATCHED = 200  # of them by which gains are fitted, which takes longer
-NEIGHBOURS = 8  # simulated contacts that a change is put together from
-RIDGE = 0.1  # of their unit vectors' products: neighbours are alike, and their differences must not grow without bound
-FEWEST = 13  # different contacts: one press and its noise are like up to a dozen, and fewer hardly show a wrong gain
-# Share of a change left over, LEFT + MORE / sqrt(different contacts), that 199 of 200 recordings of units with the
-# right law stay below: simulated contacts of even presses, gains 10 % apart, noise of 1.5 counts, by
-# `wrong_laws.py --fit`, commit d537259.
+NEIGHBOURS = 8  # simulated contacts that a change is fitted by
+RIDGE = 0.1  # of that fit, added to the products of their unit vectors, which are nearly alike
+FEWEST = 13  # different contacts: one press and its noise count as up to a dozen, and fewer hardly show a wrong gain
+# Unexplained share, LEFT + MORE / sqrt(different contacts), that 199 of 200 recordings of units with the right law stay
+# below: simulated contacts of even presses, gains 10 % apart, noise of 1.5 counts, by `wrong_laws.py --fit`, commit
+# d537259.
 LEFT, MORE = 0.1696, 0.3033
-# Likeness of contacts below which they are counted as apart; of fewer, neither gains nor exchanges say anything: within
-# one contact, what is unlike simulated ones is explained by both (up to .14 of it in single grips of real fingers).
+# Cosine of contacts below which they count as different, and the fewest by which gains and exchanges are judged: either
+# explains the unlikeness of one contact alone (up to .14 of it in single grips of real fingers).
 APART, FEWEST_APART = 0.95, 8
-# Shares of a change that must be explained by fitted gains, and by an exchange; and how far the gains are apart, root
-# mean square of their logarithms. Chosen likewise, on other contacts than those reported: from 20 on, 398 of 400
-# recordings of units as simulated stay below .003 by exchanges, and as many below one of the limits of gains.
+# Doubts need: GAINED of a change explained by fitted gains whose logarithms spread by SPREAD (rms), or EXCHANGED by an
+# exchange. Chosen likewise, on other contacts than those reported: with 20 and more, 398 of 400 simulated recordings
+# stay below .003 by exchanges, and as many below one of the limits of gains.
 GAINED, SPREAD, EXCHANGED = 0.02, 0.2, 0.015
-PRIOR = 2.0  # contacts' worth of belief in gain 1
-FITS = 2  # one after the other, since belief in gain 1 leaves each of them short
-TRIED = 4  # exchanges, ranked by the neighbours of changes as they are: the right one was among them in all of 597
-SIZE = 0.35  # logarithm of the ratio of a simulated contact's size to a change's, at most, where pressures are compared
-PRESSED = 30.0  # counts, size of changes whose pressure is judged: below it is as small as its drift
-FEWEST_PRESSED = 6  # such contacts: one scatters by .28 in the logarithm, six by .11 (simulated, even presses)
-# Measured over simulated pressure. Real skins lie at .7 to .8 of the simulated one's stiffness (descriptor of the
-# BioTac), half of their recordings between .58 and 1.05.
+PRIOR = 2.0  # contacts that a gain of 1 counts as
+FITS = 2  # in sequence, since the prior shrinks each of them
+TRIED = 4  # exchanges that look best by the unexchanged changes' neighbours: the right one was among them in all of 597
+SIZE = 0.35  # largest logarithm of the ratio of a simulated contact's size to a change's, for a comparison of pressures
+PRESSED = 30.0  # counts, least size of changes whose pressure is judged: that of smaller ones is no larger than drift
+FEWEST_PRESSED = 6  # such contacts: the logarithm scatters by .28 for one, .11 for six (simulated, even presses)
+# Limits of measured over simulated pressure. Real skins have .7 to .8 of the simulated one's stiffness (descriptor of
+# the BioTac); half of their recordings lie between .58 and 1.05.
 LEAST_PRESSURE, MOST_PRESSURE = 0.6, 2.0
-CONDUCTIVITIES = np.linspace(-1.5, 1.5, 151)  # tried for a level at rest: logarithms over a typical unit's
-MOST_LEFT = 0.45  # of what a conductivity leaves: between units at rest and hard grips, see above
-LEAST_APART = 100.0  # counts, root of the sum of squares: units differ by 106 to 434 beside their conductivity
+CONDUCTIVITIES = np.linspace(-1.5, 1.5, 151)  # logarithms over a typical unit's, tried for a level at rest
+MOST_LEFT = 0.45  # share that a contact leaves of what a conductivity does: between units at rest and hard grips
+LEAST_APART = 100.0  # counts, norm of a level's difference without conductivity: units differ by 106 to 434
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
@@ -196,9 +196,9 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
 
 
 def as_contact(level: np.ndarray, sensor: str) -> float | None:
-    """Return the share (0..1) of the difference between a level (e,) counts and a typical unit's rest that one contact
-    explains, the unit's conductivity being free. None where that is too little for a contact, and for a sensor without
-    simulated contacts."""
+    """Return the share (0..1) that one contact explains of a level (e,) counts, beside the conductivity that fits best.
+
+    It is of the level's difference to a typical unit's rest. None if too little for a contact, or without a model."""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None

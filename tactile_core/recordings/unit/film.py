@@ -20,31 +20,31 @@ from ..rest_level import Baseline, Changes, Framewise
 from .contact_law import FEWEST, FEWEST_PRESSED, pressure_ratio
 
 FRAMES = 600  # looked at, evenly spread
-WINDOW, MOST_WINDOWS = 5.0, 300  # s that say of the conductivity what one contact does, longer where they would be more
+WINDOW, MOST_WINDOWS = 5.0, 300  # s, frames within it count as one contact; longer windows keep their number below this
 LEAST, MOST = 0.2, 3.0  # thickness that a unit may have over a typical one's (assumed)
-THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # over a typical unit's, that are tried: .33 to 1.52
-# TYPICAL : number of the thickness 1. CLEARLY : nats by which another must be likelier. Without it made-up typical
-# units move; at 1 nat forces of made-up films of .5 are 87 % off, at .25 33 %, as those over fluids of .5, which rest
-# alike, then are. DRIFTS : the same of a drift (assumed).
+THICKNESSES = 1.15 ** np.arange(-8.0, 4.0)  # candidates, over a typical unit's: .33 to 1.52
+# TYPICAL : index of thickness 1. CLEARLY : nats by which another must be likelier; at 0 simulated typical units get
+# another. Forces of simulated films of .5 are 87 % off at 1 nat, 33 % at .25; so are then those of typical films over a
+# fluid of .5, which rest at the same counts. DRIFTS : nats by which a drift must be likelier than none (assumed).
 TYPICAL, CLEARLY, DRIFTS = 8, 0.25, 3.0
-CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # logarithms over that at rest, that are tried: 4 counts apart at rest
-# Standard deviations of the logarithms over units of thickness and conductivity: assumed, in sight of five units, whose
-# films are .4 (two) and 1 (three), and conductivities .5 to 1.1 of a typical one's.
+CONDUCTIVITIES = np.arange(-40, 41) * 0.008  # candidates, logarithms over that at rest: 4 counts apart at rest
+# Prior standard deviations over units of log thickness and log conductivity: assumed, in sight of five units of films
+# .4 (two) and 1 (three), and conductivities .5 to 1.1, over a typical one's.
 THICKNESS_SPREAD, CONDUCTIVITY_SPREAD = 0.5, 0.4
-# The same of the conductivity over that at rest: where rest is of the recording itself or of another, and after a
-# second (assumed: an idle finger drifted by .25 in 225 s, steadily).
+# Prior standard deviations of log conductivity over that at rest: at the start, if rest is from this recording or from
+# another, and its change in a second (assumed: an idle finger drifted by .25 in 225 s, steadily).
 AT_REST, SINCE_REST, A_SECOND = 0.003, 0.1, 0.003
 # A change below `DRIFT_LEFT` of the recording's largest drift is no contact, unless its cosine to a simulated one is
-# ALIKE: 99 % of an idle finger's are below .69, 95 % of simulated contacts of .2 N above .83 (chosen by these). Where
-# the conductivity moves by WARMED (a logarithm) and 99 of 100 changes are below IDLE times that share, none is one: .6
-# and 1.2 on the idle finger, moved by .16 and .23; 33 on a pressed one, moved by .06.
+# above ALIKE: 99 % of an idle finger's are below .69, 95 % of simulated contacts of .2 N above .83 (chosen by these).
+# If log conductivity moves by WARMED and 99 of 100 changes are below IDLE times that bound, the finger is idle: they
+# were .6 and 1.2 on an idle finger that moved by .16 and .23; 33 on a pressed one that moved by .06.
 ALIKE, IDLE, WARMED = 0.75, 1.5, 0.12
-# Root mean square of the logarithms of impedances by which a rest of another recording is off, beside the conductivity,
-# times thickness: 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa of
-# the fluid's pressure that are a contact all the same (assumed, some 12 counts of PDC and its drift).
+# Error of a rest from another recording: rms over electrodes of log impedance, less the mean (conductivity), times
+# thickness; 99 % of an idle finger's frames are below (its skin lay a little aside, for 222 s). PRESSED : Pa, rise of
+# pressure that is a contact all the same (assumed, some 12 counts of PDC and its drift).
 REST_OFF, PRESSED = 0.0131, 450.0
-# Share of a contact's length by which the most alike of the simulated ones tells one conductivity from another, and of
-# the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
+# MISFIT : distance to the nearest simulated contact that tells conductivities apart, over the change's length.
+# INDEPENDENT : share of the contacts that count as independent (assumed). NOISE : counts, of a frame's change.
 MISFIT, INDEPENDENT, NOISE = 0.15, 0.25, 2.0
 TOO_SMALL = "no change is larger than what the fluid's drift leaves: taken for no contact, light touches with it"
 UNSURE = (
@@ -52,7 +52,7 @@ UNSURE = (
     "force would be some {:.1f} times as large. `tactile adapt` tells them apart by PDC, and finds the scale of a force"
 )
 SKIN = 0.75, 0.35  # measured over simulated pressure of real skins (descriptor of the BioTac), and its spread (assumed)
-NO_SKIN = 8.0  # nats that no film brings a pressure below which is of another unit or sensor: four spreads
+NO_SKIN = 8.0  # nats, four spreads: if no film brings the pressure's doubt below, it is of another unit or sensor
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from ...sensors.descriptor import of_kind
 from ...sensors.fluid_sensor import Fluid
 
 PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
-# Of the readings, counts that were converted: how well they lie on the steps of one (1 is all), and how many they span.
+# For pressures converted from counts: how well readings lie on steps of one count (1: all do), and steps they span.
 ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
 AT_REST = 800.0, 3000.0  # counts between which untared PDC rests: 915 to 2,405 in three units (assumed: some room)
-NOISE, LEAST_NOISE = 4.0, 0.2  # counts, half of all neighbours differ by less, and by more: else averaged (assumed)
+NOISE, LEAST_NOISE = 4.0, 0.2  # counts, limits of the neighbours' median difference; below, averaged (assumed)
 MOST = 1.01 * COUNT_MAX
 
 

@@ -38,6 +38,6 @@ def test_a_rim_that_hides_under_the_resting_nodes_is_held_out_too():
     punch, depth = Cylinder(1.75e-3, 0.4e-3), 1.1554e-3
     pose = pose_at("digit", punch, Placement(-0.962e-3, -4.745e-3, tilt=0.1768, tilt_heading=3.6407))
     body = graded_body("digit", punch, pose, depth)
-    assert body.contact(punch, pose, depth, 0.0)._between is None
-    assert body.contact(punch, pose, depth, 0.0, every_edge=True)._between is not None
-    assert body.contact(punch, pose, depth, 0.5, every_edge=True)._between is None
+    assert body.contact(punch, pose, depth, 0.0)._penalty is None
+    assert body.contact(punch, pose, depth, 0.0, every_edge=True)._penalty is not None
+    assert body.contact(punch, pose, depth, 0.5, every_edge=True)._penalty is None
