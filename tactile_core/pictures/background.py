@@ -21,14 +21,14 @@ from .light import Surface, open_light
 from .perspective import slopes
 
 FORMATS = ("PNG", "JPEG", "BMP", "TIFF")  # of photographs; for others the library may start programs (EPS: Ghostscript)
-DARK = 1.0  # grey levels: what a darker place of the lights' own picture gives is no ratio
+DARK = 1.0  # grey levels, least modelled picture that the photograph is divided by
 MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 million
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Picture (H, W, 3) float32, grey levels, of the untouched gel. radiance : (H, W, 3) of its coating
+    """Picture (H, W, 3) float32, levels, of the untouched gel: the calibration's photograph, if there is one, times the
+    modelled effect of LEDs or albedo changed since; else the model's picture. radiance : (H, W, 3) of its coating
 
-    It is the calibration's photograph where there is one, scaled by the model where LEDs or albedo have changed since.
     Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
     if not unit.photograph:
         return by_led(unit, radiance).sum(-1)
@@ -60,7 +60,7 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Return the ambient light (3, H, W) float32, levels by LED's band, that heights (H, W) m add to height zero's."""
+    """Return the ambient light (3, H, W) float32, levels in each LED's band, that rises with seen heights (H, W) m."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 

@@ -1,7 +1,7 @@
-"""The camera's toe and shoulder: deep shadows and bright flanks keep a part of their light, and with it their hue.
+"""The camera's toe and shoulder: it compresses deep shadows and bright flanks, and is linear in between.
 
-By linear light a shadow would take more than the untouched gel shows there. Photographs never fall below a share of the
-picture at rest, and bright flanks approach white; between both ends the camera is linear (docs/calibration.md)."""
+In a linear model a shadow may take more light than the untouched gel shows. Photographs never fall below a share of the
+picture at rest, and bright flanks approach white (docs/calibration.md)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import numpy as np
 
 from ..sensors.calibration import LARGEST_LEVEL
 
-# Read off all 14 photographs of the unit that ships, five of them in no fit: what is left of the picture at rest where
-# the toe begins, and what never goes; the level where the shoulder begins (or at rest where the gel is brighter).
+# Shares of the picture at rest where the toe begins, and that always remain; level where the shoulder begins (at rest
+# if that is brighter). Read off all 14 photographs of the unit that ships, five of them in no fit.
 TOE, FLOOR, SHOULDER = 0.5, 0.2, 190.0
-LEAST = 1.0  # level, over which an end bends at least
+LEAST = 1.0  # level, least range of an end
 
 
 def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change (...), levels, that the camera shows for a change of linear light, and the slope between them.
-    rest : (...) levels of the untouched gel, which are shown unchanged"""
+    """Return the change (...), levels, that the camera shows for a ``change`` of linear light, and its derivative.
+
+    Toe: toe + fall (exp((change - toe) / fall) - 1); the shoulder likewise. rest : (...) levels of the untouched gel"""
     toe, fall, shoulder, rise = ends(rest)
     below, above = np.minimum(change - toe, 0), np.maximum(change - shoulder, 0)
     dark, bright = np.exp(below / fall), np.exp(-above / rise)

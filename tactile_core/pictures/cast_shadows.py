@@ -1,8 +1,7 @@
 """Soft shadows that the gel casts in the light of one small LED: a march toward the light in polar rows.
 
-The march works on the seen gel. The map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes lines to
-lines and the pinhole to infinity, so that the seen gel becomes a height field over the pixels, and its shadows are
-those of an LED moved by the same map."""
+The projective map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes lines to lines and the pinhole
+to infinity. It makes the seen gel a height field over the pixels, whose shadows are those of the LED under the map."""
 
 from __future__ import annotations
 
@@ -16,9 +15,9 @@ from ..sensors.camera import Camera, Led
 from .perspective import bilinear
 
 GRID_STEP = 0.1e-3  # m, of the polar grid along a ray, and across rays in the picture's middle
-FREE = 1.0  # sight from which on the whole LED is seen
+FREE = 1.0  # sight (see ``ShadowCaster.sight``) from which the whole LED is visible
 HIGHEST = 0.9  # share of the camera's height that an LED may have: at 1 the map takes it to infinity
-SMALLEST_SLOPE = 0.02  # of the light; flatter shadows are cut at 50 times their height, beyond the picture
+SMALLEST_SLOPE = 0.02  # of the light; shadows of flatter light are cut at 50 times their height, beyond the picture
 
 _TABLE_STEPS = 256
 
@@ -63,11 +62,11 @@ class ShadowCaster:
         self._shape, self.polar_shape = camera.shape, (rows, columns)
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return (rows, columns): LED radii by which the mapped line of sight rises at the LED per unit of its slope.
+        """Return (rows, columns), LED radii per unit slope: how far a mapped line of sight rises at the LED.
 
         A rise dw of the mapped line at the LED is a displacement (1 - h / H)^2 (-right / H, -down / H, 1) dw in space,
-        with the mapped LED's right and down; its part across the line counts. Points are taken at height zero, which
-        changes the angle by a few degrees."""
+        with the mapped LED's right and down, h and H the LED's and the apparent height; its part across the line
+        counts. The line starts at height zero, which changes its angle by a few degrees."""
         led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
         rise = (1 - led[2] * inverse) ** 2 * np.array([-self.foot[0] * inverse, -self.foot[1] * inverse, 1.0])
         to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..sensors.camera import Camera
 
-FINE = 2.5  # coarse pixels in a standard deviation: the sum of such Gaussians is even to 1e-8 of its size
-BLOCK = 80  # pixels whose weights are one product of matrices; half of all weights are zeros that it leaves out
+FINE = 2.5  # least coarse pixels in a standard deviation: a sum of such Gaussians is even to 1e-8 of its size
+BLOCK = 80  # pixels per product of matrices, which leaves out the half of all weights that are zero
 REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
 
 

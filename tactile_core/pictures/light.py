@@ -1,6 +1,5 @@
-"""Light of small LEDs on the seen gel: Lambert's cosine over the squared distance, and cast shadows. All pictures use
-it: the fast one and calibrations on the gel in perspective, Mitsuba's rays without LLVM and the untouched gel at points
-in space. Any number of LEDs."""
+"""Light of L small LEDs on the gel: Lambert's cosine over the squared distance, and cast shadows. The fast picture and
+calibrations use it on the gel in perspective; Mitsuba without LLVM, and the untouched gel, at points in space."""
 
 from __future__ import annotations
 
@@ -15,9 +14,9 @@ from ..sensors.camera import Camera, Led
 from .cast_shadows import ShadowCaster, bounding_box, disc_share
 from .perspective import Perspective, slopes
 
-# A shadow begins where the gel's tangent plane cuts the LED: at normal . (LED - point) < radius. With a margin for the
-# differences that slopes are made of.
-TANGENT, TANGENT_MARGIN = 1.1, 2  # of the radius, px
+# A shadow begins where the gel's tangent plane cuts the LED, normal . (LED - point) < TANGENT x radius, and up to
+# TANGENT_MARGIN px beside, as slopes are differences of neighbours.
+TANGENT, TANGENT_MARGIN = 1.1, 2
 
 Box = tuple[slice, slice]  # rows and columns of pixels
 
@@ -126,9 +125,9 @@ class Lamps:
 def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, mapped: np.ndarray, edge: Box) -> None:
     """Darken the light of LED k where gel of heights (H, W) m stands in its way.
 
-    Of its disc the part above the horizon shines. With l the vector to the LED and e the unit vector upward across it,
-    that part's centre is l + radius moment / share e; and normal . e = (tilt |l|^2 - above facing) / (|l| plan
-    distance).
+    The part of its disc above the horizon shines. With l the vector to the LED and e the unit vector upward across l,
+    that part's centre is l + (radius moment / share) e, and
+    normal . e = (tilt |l|^2 - above facing) / (|l| sqrt(|l|^2 - above^2)).
     mapped : (H, W) m, the field on which shadows are cast, see ``cast_shadows``; edge : box in which shadows may
         begin"""
     sight, box = caster.sight(mapped, edge)

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..sensors.calibration import Calibration
 
-FULL = 0.5  # of the largest rise, from which on all of it is seen; less in proportion (two photographs, see the page)
-FLOOR = 5e-6  # m: gel that is dented less touches nothing, as in ``translation.gel_place``
+FULL = 0.5  # share of the largest rise that shows all of the light; less does in proportion (two photographs, see page)
+FLOOR = 5e-6  # m, least rise of gel in contact, as in ``translation.gel_place``
 
 
 def contact_share(risen: np.ndarray) -> np.ndarray:

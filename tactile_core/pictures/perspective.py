@@ -10,10 +10,10 @@ from ..errors import TactileError
 from ..files.compiled import Loop, available
 from ..sensors.camera import Camera
 
-SETTLING_STEPS = 3  # of the view of the resting gel; each makes the error 1,000 times smaller over a dome
+SETTLING_STEPS = 3  # to view the resting gel; each makes the error 1,000 times smaller over a dome
 HIGHEST_GEL = 0.9  # share of the camera's height
-STEEPEST = 0.05  # of 1 + slope . q / apparent height: below, the gel hides, or nearly hides, a part of itself
-MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above where it does: 2 mm / 64 / 2^14 is 2 nm
+STEEPEST = 0.05  # least 1 + slope . q / apparent height; below it the gel (nearly) hides a part of itself
+MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above in that case: 2 mm / 64 / 2^14 is 2 nm
 
 
 class Perspective:
@@ -43,8 +43,8 @@ class Perspective:
         self.start_nearest = _nearest(row, column, self.camera.width)
 
     def __call__(self, height: np.ndarray) -> np.ndarray:
-        """Return heights (H, W) float32, m, that the pixels see; height : (H, W) float32, m, under the pixels. Raises
-        TactileError where the gel reaches the camera."""
+        """Return the heights (H, W) float32, m, that pixels see of a map ``height`` (H, W) float32, m, over the plane's
+        pixels. Raises TactileError where the gel reaches the camera."""
         if height.max() >= HIGHEST_GEL * self.camera.apparent_height:
             found = f"{height.max() * 1e3:.1f} mm high"
             raise TactileError("height map", found, f"below the camera at {self.camera.apparent_height * 1e3:.1f} mm")
@@ -76,7 +76,7 @@ class Perspective:
         return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows and columns of the map, fractional and within it, at the pixels' positions times `near`."""
+        """Return rows and columns of the map, fractional, clipped to it, of the points q ``near`` seen by pixels q."""
         row, column = near * self.rows, near * self.columns
         row += self.middle[0]
         column += self.middle[1]

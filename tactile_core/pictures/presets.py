@@ -32,12 +32,12 @@ class Gather:
 class Preset:
     """Settings of a Mitsuba render.
 
-    points : number that stand for each LED, a pass; spacing : m between vertices of the gel's mesh
+    points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
     bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
     paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths a pixel; 0 for our own integrator
 
     Without LLVM, on a matte coating:
-    passes : pictures from other points and other places of each pixel, which are averaged; 1 takes each pixel's middle
+    passes : pictures to average, each from other points of the LEDs and the pixels; 1 takes each pixel's middle
     gather : resolution of the gel's own light; None leaves it out
     window : true bends rays at the window"""
 

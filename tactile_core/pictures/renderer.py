@@ -26,9 +26,9 @@ from .object_light import object_light
 from .perspective import Perspective
 from .presets import DEFAULT, FAST, preset_named
 
-# px at 240 wide: on real pictures noise correlates by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px, along and across; means of
-# four squares of 2 px, for which video keeps one colour, by 0.75, 0.5, 0.25, 0. CHANNELS : correlations of red, green
-# and blue on photographs of one DIGIT (of another -.22, -.22, .07), taken for all units (assumed).
+# GRAIN : px at 240 wide, over which noise is correlated: by 0.68, 0.42, 0.21, 0.0 over 1 to 4 px in real pictures, both
+# ways; by 0.75, 0.5, 0.25, 0 in means of four squares of 2 px, for each of which video keeps one colour. CHANNELS :
+# correlations of red, green and blue on photographs of one DIGIT (another: -.22, -.22, .07), assumed for all units.
 GRAIN = 4
 CHANNELS = (1.0, -0.44, 0.07), (-0.44, 1.0, -0.37), (0.07, -0.37, 1.0)
 

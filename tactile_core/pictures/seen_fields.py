@@ -8,7 +8,7 @@ from .height_map import of_unit
 from .perspective import lookup, map_lookup, slopes
 from .renderer import Renderer
 
-_STEPS, _STILL = 12, 1e-7  # of the search for where a seen point rests: at most so many, until none moves by so many m
+_STEPS, _STILL = 12, 1e-7  # most steps of the search for where a seen point rests; m, largest move that ends it
 
 
 def seen_fields(

@@ -25,7 +25,7 @@ from ..perspective import Perspective
 from ..presets import FAST, Preset, preset_named
 from .ball_print import deepest, print_on
 
-WORKING_WIDTH = 120  # px: fits look at pictures made smaller by whole factors down to this short side
+WORKING_WIDTH = 120  # px, least short side of the pictures for fits, which are reduced by whole factors
 
 
 class BallPictures(abc.ABC):
@@ -47,8 +47,8 @@ class BallPictures(abc.ABC):
         self._view = Perspective(self.camera, self.rest)
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (3, H, W) of each LED's light by a press, relative to its light on a coating that faces it.
-        ball : right, down, depth, radius, m"""
+        """Return the change (3, H, W) of each LED's light by a press, over its light on a coating that faces it; light
+        of the ball through the coating included. ball : right, down, depth, radius, m"""
         heights = self.heights(ball)
         seen = self._view(heights)
         light = self.spread(self._changed(heights, seen))
@@ -56,8 +56,8 @@ class BallPictures(abc.ABC):
 
     @abc.abstractmethod
     def _changed(self, heights: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Return the change (3, H, W) of each LED's light on heights (H, W) m; seen : (H, W) m, heights that the pixels
-        see. Light is not yet spread by the coating."""
+        """Return the change (3, H, W) of each LED's light on heights (H, W) m, before it spreads in the coating.
+        seen : (H, W) m, the heights that the pixels see"""
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
         """Return the gel's heights (H, W) float32, m, see ``print_on``; ball : (right, down, depth, radius), m"""
@@ -68,7 +68,7 @@ class BallPictures(abc.ABC):
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return the ambient light (3, H, W) by LED that seen heights (H, W) m add, over the LED's ``facing`` light."""
+        """Return ``raised_light`` (3, H, W) of seen heights (H, W) m, over each LED's light on a coating facing it."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -76,7 +76,7 @@ class BallPictures(abc.ABC):
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the grey levels (H, W, 3) that a ball as bright as a coating facing the LEDs adds from behind it."""
+        """Return the levels (H, W, 3) that a ball adds through the coating, if as bright as a coating facing LEDs."""
         share = contact_share(self._view(self.heights(ball)) - self._view.start)
         return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
 

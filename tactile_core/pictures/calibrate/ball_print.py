@@ -17,7 +17,7 @@ from ...geometry.cubic_spline import EvenSpline, bspline_weights
 
 TABLE = shipped("ball_print.npz")
 LAYER = 4.06e-3  # m, thickness of the layer that was pressed: the DIGIT's
-SPHERE_TO = 0.9  # of the radius: beyond, the ball's profile goes on as a cone, for the gap to it is no function there
+SPHERE_TO = 0.9  # of the radius: beyond, the profile continues as a cone, since the sphere's turns vertical
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,7 +32,7 @@ class _Table:
     coefficients: np.ndarray
 
     def rise(self, distance: np.ndarray, depth: float, radius: float) -> np.ndarray:
-        """Rise of the flat layer, m, at distances from the axis, m, under a ball of a radius, all lengths scaled."""
+        """Rise of the flat layer, m, at distances from the axis, m, under a ball of another radius, m; lengths scale."""
         scale = radius / self.radius
         distance, depth = distance / scale, depth / scale
         k = int(np.clip(np.searchsorted(self.depths, depth) - 1, 0, len(self.depths) - 2))

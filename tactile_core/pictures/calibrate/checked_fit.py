@@ -20,7 +20,7 @@ from .fit import Calibrated, calibrate, unexplained_share
 from .photographs import Photographs, Press, chosen
 from .press_fit import Sight, fit_ball
 
-# Transposed, then rows, columns reversed: what that does to a picture.
+# (transposed, then rows reversed, columns reversed): the effect on a picture.
 TURNS = {
     (False, False, False): "",
     (False, True, True): "turned by 180 degrees",
@@ -32,9 +32,9 @@ TURNS = {
     (True, True, True): "turned by 90 degrees clockwise and mirrored top to bottom",
 }
 COLOURS = "red and blue exchanged"
-LOOKED_AT = 4  # presses, the plainest, from which their orientation is found
-COARSE_SIDE = 60  # px: they are looked at made smaller by a whole factor, down to about this short side
-CLEARLY = 0.8  # of what one way leaves, that another may leave and be no better (assumed)
+LOOKED_AT = 4  # presses, those of the largest changes, by which orientation is judged
+COARSE_SIDE = 60  # px, about the short side of their pictures, which are reduced by a whole factor
+CLEARLY = 0.8  # a way is clearly better if its residual is below this share of another's (assumed)
 
 
 class Way(NamedTuple):
@@ -65,13 +65,13 @@ def check_orientation(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Raise TactileError for photographs that another orientation or order of colours explains clearly better; it names
-    what each of these ways leaves unexplained.
+    """Raise TactileError for photographs that another orientation or order of colours explains clearly better, with the
+    share that each leaves unexplained.
 
     ball_diameter : m; progress : called with (ways tried, in all)
-    Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Ways that
-    explain the presses about as well (as where lights stand opposite) are decided by the untouched gel, compared with
-    that of the start and of the unit that ships, since a start of round numbers hardly knows it."""
+    Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Among ways that
+    explain the presses about equally well (lights may stand opposite each other) the untouched gel decides, compared
+    with the start's and the shipped unit's, as a start of round numbers hardly predicts it."""
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
     height, width = photographs.shape
     factor = whole_factor(width, height, COARSE_SIDE)
@@ -136,7 +136,7 @@ def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int])
 
 FOLDS = 3  # of cross-validation
 WORTH = 0.8  # of the background's L1: a calibration that leaves more of a press is worth nothing (assumed)
-CHECKED, TRIED = 5, 75  # % of the work, of three folds and a fit, when photographs are checked and when folds are tried
+CHECKED, TRIED = 5, 75  # % of the work done when photographs are checked, and when the folds are; a last fit follows
 
 Progress = Callable[[int, int], None]
 

@@ -20,7 +20,7 @@ from .photographs import Photographs, Press
 from .press_fit import Ball, Sight, contact_radius, fit_ball, missing_light
 
 RADIUS_STARTS = (2 / 3, 1.5)  # of the ball's radius, from which it is searched
-BRIGHT = 0.07  # more light of the object than the unit's, as a share of the coating's own, that is flagged (assumed)
+BRIGHT = 0.07  # excess of the object's light over the unit's, as a share of the coating's, that is flagged (assumed)
 # name -> (unit, target, which way is better); targets of presses that were not fitted
 TARGETS = {
     "roi_l1": ("levels", 8.0, -1), "roi_psnr": ("dB", 26.0, 1),
@@ -35,8 +35,8 @@ class Evaluation:
 
     ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
     picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
-    through : light of the ball through the coating, by this photograph, as a share of the coating's own. ``through_*``
-        metrics draw with the median share of the set's other photographs, all others with the calibration's"""
+    through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; the
+        ``through_*`` metrics use the median share of the set's other photographs, all others the calibration's"""
 
     press: Press
     ball: Ball

@@ -21,13 +21,13 @@ from .press_fit import MODEL_ERROR, Sight, fit_ball, minimise
 from .residuals import GAIN_SPREAD, NAMES, OBJECT_LIGHT, SPREAD, UnitResiduals, parameters_of
 
 PLACING_STEPS, STEPS, FINISHING_STEPS = 6, 14, 8  # of the search
-# Light of the object from which the search starts, the better: a ridge lies between none and much.
+# Object's light from which the two searches start, of which the better is taken: a ridge lies between none and much.
 OBJECT_STARTS = (0.0, 0.15)
 TOLERANCE = 1e-3  # a step that gains less than 0.1 % of the cost is noise
-UNEXPLAINED = 0.5  # share of a photograph's squares that is left: more, and it does not show this ball
-IDENTIFIED = 0.5  # of the assumed spread of units; a number whose standard error is larger stays called unknown
-NEVER_IDENTIFIED = ("centre_x_mm", "centre_z_mm")  # what a press does not move: kept from the start
-# mm, at which a fit begins: at none, a little more does not change the picture, and no step would be taken.
+UNEXPLAINED = 0.5  # largest unexplained share of squares of a photograph that shows this ball
+IDENTIFIED = 0.5  # of the assumed spread of units: numbers of a larger standard error are reported as not determined
+NEVER_IDENTIFIED = ("centre_x_mm", "centre_z_mm")  # no press depends on them: kept from the start
+# mm, spread at which a fit begins: the picture's derivative by it is zero at none, so that no step would be taken.
 LEAST_SPREAD = 0.1
 MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
@@ -74,7 +74,7 @@ def calibrate(
     total = PLACING_STEPS + 3 * STEPS + finish * FINISHING_STEPS + 1
     search = _Search(working, photographs, ball_diameter / 2, lambda done: progress(done, total))
     every = np.ones(len(NAMES), bool)
-    # Light of the object from the first, lest ambient light that grows with height stand for it.
+    # The object's light is fitted from the start, or else ambient light that grows with height takes its place.
     lights = np.arange(len(NAMES)) >= OBJECT_LIGHT
     seen = np.array(NAMES) != "albedo"  # the fast picture has no bounce
     search.place()

@@ -20,7 +20,7 @@ DILATION = 9  # px, by which the region reaches beyond such pixels
 SMALLEST_PRESS = 300  # px at 240 x 320 changed by more than CHANGE; less is dust or drift, a light press has 2,000
 LARGEST_SHARE = 0.6  # of the picture changed: another lighting, not a press
 OVER_EXPOSED = 0.05  # share of the region with a channel at 255 from which on a press is flagged
-EXPOSURE = 0.1  # share by which the gel beside a press is brighter or darker, that is flagged; real sets differ by 0.06
+EXPOSURE = 0.1  # change of brightness of the gel beside a press that is flagged, a share; real sets differ by 0.06
 FEWEST_FOR_MEDIAN = 3  # photographs; of two, the median is their mean, which shows both presses
 NOISE_WINDOW = 41  # px at 240 wide, of the means that are no noise
 NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
@@ -224,7 +224,7 @@ def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: flo
 
 COARSE = 8  # px at 240 wide, over which means are taken first: drift has no finer structure
 ROUNDS = 20  # of reweighting; it settles in about ten
-SOFTNESS = 3.0  # grey levels: what lies farther from the drift than twice that hardly counts, as a press does (assumed)
+SOFTNESS = 3.0  # grey levels: changes that are twice as far from the drift, as a press's are, hardly count (assumed)
 
 
 def lighting_drift(change: np.ndarray) -> np.ndarray:

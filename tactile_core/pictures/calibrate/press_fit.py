@@ -45,15 +45,15 @@ def minimise(
     return x, cost
 
 
-DEPTHS = (0.5 / 2.2, 1.2 / 2.2)  # of the deepest print, from which a fit starts; the best end is taken
-PRINT = 3e-3  # m, about the width of a print, of a small ball its diameter (assumed)
+DEPTHS = (0.5 / 2.2, 1.2 / 2.2)  # over the deepest print's, from which fits start; the best result is taken
+PRINT = 3e-3  # m, about the width of a print; a smaller ball's is its diameter (assumed)
 SHALLOWEST = 0.03e-3  # m, of the table of prints
 SMALLEST_BALL, LARGEST_BALL = 0.25e-3, 8e-3  # m, radius
 MARGIN = 3  # working px round the region that count too: a print must not shade what the photograph shows untouched
 STEP = 10e-6  # m, of the differences that make the Jacobian
 STEPS, TOLERANCE = 25, 1e-5
-# Grey levels: what a pixel's misfit weighs against the assumed spread of units. Misfits of 5 to 9 levels are those of
-# the model, alike over whole parts of a print: thousands of pixels count as some fifty.
+# Grey levels, standard deviation of a pixel against the priors. The model's own misfits are 5 to 9 levels, alike over
+# whole parts of a print: so thousands of pixels count as some fifty.
 MODEL_ERROR = 80.0
 
 
@@ -91,7 +91,7 @@ class Sight:
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
-        """Return starts (right, down) m: the change's centre, and where it is largest over about a ball's print."""
+        """Return starts (right, down) m: the change's centre of mass, and where its mean over a print is largest."""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
@@ -153,7 +153,7 @@ class _PressProblem:
 
 
 CONTACT_SHARE = 0.8  # radius of the contact over sqrt(2 R depth), by the table of prints
-LIKELY = 0.1  # share of a coating's own light, how much comes through (assumed): holds it where few pixels tell
+LIKELY = 0.1  # prior deviation of the light that comes through, over the coating's own, for small prints (assumed)
 
 
 def contact_radius(depth: float, radius: float) -> float:

@@ -1,9 +1,8 @@
 """The sum of squares that a unit's calibration minimises: photographs of presses against their pictures.
 
-The unknowns are the unit's numbers and three numbers a press. The gain C is linear in light, so it is solved for at
-each step and eliminated (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by Gauss-Newton steps
-as the camera's toe and shoulder are not linear. Priors of units (assumed), one square each, determine numbers that few
-photographs do not."""
+The unknowns are the unit's numbers and three numbers per press. The gain C is solved for at each step and eliminated
+(variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by Gauss-Newton steps, since the camera's toe
+and shoulder are not linear. Gaussian priors of units (assumed) determine the numbers that few photographs do not."""
 
 from __future__ import annotations
 
@@ -35,7 +34,7 @@ OBJECT_LIGHT = NAMES.index("object_light")
 SPREAD = np.array([spread for _, spread, _ in PARAMETERS])
 STEP = np.array([step for _, _, step in PARAMETERS])
 FIRST_LED, PER_LED = len(CAMERA) + len(GEL) + len(COATING), len(LED)
-# Numbers that a picture tells in one step: those of the three LEDs, each in a band of its own, go together.
+# Groups of numbers varied together in a finite difference: the three LEDs' are seen in bands of their own.
 TOGETHER = (
     *((k,) for k in range(FIRST_LED)),
     *(tuple(range(FIRST_LED + k, len(NAMES), PER_LED)) for k in range(PER_LED)),

@@ -17,7 +17,7 @@ MOST_PIXELS = 4_000_000  # of a frame
 MOST_PRESSES, UNTOUCHED = 24, 8  # frames that are taken
 CHANGE = 12.0  # grey levels in some channel, of a small pixel that a press has changed (assumed)
 LEAST = 4  # small pixels that have changed: fewer are noise, or a ball that hardly touches (assumed)
-SHALLOW = 0.3  # of the deepest press's change: a weaker one is the edge of another (assumed)
+SHALLOW = 0.3  # of the deepest press's change; a weaker peak is part of another press (assumed)
 
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:

@@ -18,10 +18,10 @@ from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe
 from .variant import LLVM, activate
 from .window import camera_rays
 
-# Pixels off each pixel's middle, where else rays would meet vertices exactly and slip between triangles.
+# px, offset of rays from pixels' middles, where they would meet vertices exactly and slip between triangles.
 ASIDE = (0.013, 0.0071)
 DEPTH = 6  # of paths: light, four bounces on the way, the camera
-PATHS_A_PASS = 64  # a pixel: a square, as the sampler's strata want it
+PATHS_A_PASS = 64  # per pixel; a square number, as the stratified sampler needs
 
 
 class GelLight:
@@ -139,7 +139,7 @@ class GelLight:
         mi = activate(LLVM)
         import drjit as dr
 
-        # Of a new scope: the order of the code, and so whether it is compiled again, hangs less on what is still alive.
+        # In a new scope the generated code, and so whether it is compiled again, depends less on variables still alive.
         dr.detail.new_scope(dr.JitBackend.LLVM)
         hit = self._scene.ray_intersect(ray)
         place = mi.Point2f(hit.p.x * self._per_mm[0] + 0.5, hit.p.y * self._per_mm[1] + 0.5)

@@ -1,13 +1,12 @@
 """Our own integrator for Mitsuba's scenes: a few even points of each emitter, smoothed shadows, one coarse bounce.
 
-It asks the scene's emitters and materials, so all that shines or is painted takes part; Mitsuba's path integrator,
-given time, makes the same picture. A sphere's points are a ring that halves its solid angle: with Lambert's law and no
-occluder, their mean is exact. Nothing here is random.
+It uses the scene's own emitters and materials, so that Mitsuba's path integrator converges to the same picture. A
+sphere's points are a ring that halves its solid angle: with Lambert's law and no occluder, their mean is exact. Nothing
+here is random.
 
-Light that a glossy coating mirrors onto other gel is followed forward from the mirroring place: beside a print's rim,
-gel is lit by the highlights of the flank above it, which are so narrow that directions sampled from the lit place miss
-them. ``mirrored`` counts an LED's light near the mirror's direction (half vectors within the lobe), ``bounced`` all
-else: each path once."""
+Light that a glossy coating mirrors onto other gel is followed forward from the mirroring place: beside a print's rim
+the highlights of the flank above are so narrow that directions sampled from the lit place miss them. ``mirrored``
+counts light near the mirror's direction (half vectors within the lobe), ``bounced`` all other: each path once."""
 
 from __future__ import annotations
 
@@ -19,7 +18,7 @@ import numpy as np
 from ...sensors.calibration import DIFFUSE, PRINCIPLED, Coating
 
 RING = 0.5  # share of a sphere's solid angle inside the ring
-RINGS, SPOKES = 4, 4  # directions of light that arrives by a bounce: even in solid angle, as most of it comes in low
+RINGS, SPOKES = 4, 4  # directions of bounced light, even in solid angle, as most of it arrives at low elevations
 DIRECTIONS = RINGS * SPOKES
 
 
@@ -81,9 +80,9 @@ def bounced(
     return np.stack([np.array(each) for each in sums], -1) / DIRECTIONS
 
 
-NARROW = 0.2  # GGX's alpha: wider lobes are as wide as the bounce's directions lie apart
-REACH = 2.0  # of a lobe, in alpha, as the tangent of the half vector's angle: 80 % of its facets
-STEEPEST = 0.05  # least share of a pixel's surface that faces the camera
+NARROW = 0.2  # largest GGX alpha of a narrow lobe: ``bounced``'s directions resolve wider ones
+REACH = 2.0  # tangent of the half vector's angle at a lobe's end, over alpha: 80 % of its facets
+STEEPEST = 0.05  # least cosine between a pixel's surface and the camera
 
 
 def narrow_lobe(coating: Coating) -> tuple[float, float] | None:

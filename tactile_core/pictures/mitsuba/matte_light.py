@@ -1,9 +1,8 @@
 """Radiance of the gel without LLVM: Mitsuba traces rays one by one, to points that stand for each light.
 
-Light that the white coating throws onto itself is gathered in numpy. The gel is a height field, so along each azimuth a
-place sees what rises above all that lies before it. Marching outward, every step that raises the horizon adds its
-radiance times the projected solid angle of the rise. None of that is random or needs Mitsuba; the tests compare it with
-Mitsuba's path tracer."""
+Interreflection is gathered in numpy. The gel is a height field: along each azimuth a place sees the gel that rises
+above its horizon. Marching outward, every step that raises the horizon adds its radiance times the projected solid
+angle of the rise. None of that is random or needs Mitsuba; the tests compare it with Mitsuba's path tracer."""
 
 from __future__ import annotations
 
@@ -141,7 +140,7 @@ def _across(led: Led, aside: np.ndarray, upward: np.ndarray) -> np.ndarray:
     return np.outer(aside, side) + np.outer(upward, np.cross(side, toward))
 
 
-REACH = 16e-3  # m: across a bowl every distance gives as much, so the whole picture and its rim count
+REACH = 16e-3  # m, the whole picture and its rim: in a bowl each distance contributes equally
 
 
 def interreflection(
