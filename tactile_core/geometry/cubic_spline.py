@@ -36,8 +36,7 @@ class EvenSpline:
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first (n,) of the four coefficients at each position (n,), and its place (n,), 0..1, in the
-        cell."""
+        """Return, for each position (n,), its first of four coefficients (n,) and its place (n,), 0..1, in the cell."""
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell
@@ -94,7 +93,7 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes (4, 4, n), as row * columns + column, and weights that give each place (2, n)."""
+    """Return the 4 x 4 nodes (4, 4, n), row * columns + column, whose weighted sum is each place (2, n); weights."""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)

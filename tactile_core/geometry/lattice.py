@@ -93,8 +93,8 @@ def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
 if TYPE_CHECKING:
     from .indenters import Indenter, Pose
 
-_SIDE = 6  # nodes: blocks of so many by so many cost least to look at, few blocks and few nodes in each
-_STEEPEST = 1.1  # of a distance: 1, but for smooth grids of it (assumed)
+_SIDE = 6  # nodes along a block's side: the quickest search
+_STEEPEST = 1.1  # largest slope of a distance: 1, and a little more for a mesh's spline (assumed)
 
 
 class LatticeBlocks:

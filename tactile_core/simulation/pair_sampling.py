@@ -22,19 +22,19 @@ from .pairs_file import quantise
 from .random_bodies import random_body
 from .scene import PairSpec, Scene
 
-_SLIDE_FROM, _SLIDE_TO = 2, 10  # steps of a path's force at which a slide may begin (assumed)
-_SLIDE_STEPS = 3  # contacts of a slide: sticking, partly and wholly slipping ones (assumed)
+_SLIDE_FROM, _SLIDE_TO = 2, 10  # index of the force at which a slide begins: from the first, below the second (assumed)
+_SLIDE_STEPS = 3  # contacts of a slide: sticking, partly slipping, wholly slipping (assumed)
 
 
 def press_rows(
     scene: Scene, seed: int, press: int, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
     """Return the contacts of a press, each as ``pair_row`` has it: force grows by the scene's ratio until a sensor
-    reaches its greatest depth, or finds no further contact.
+    reaches its greatest depth, or no contact is found.
 
-    Forces begin log-uniformly within one ratio, so over many presses they are log-uniform. A press that slides ends
-    with its slide, at the force it had reached, along the same path on both sensors. A scene with ``depth_steps`` pairs
-    contacts of the same depth in place of those of the same force.
+    The first force is log-uniform within one ratio, so that forces are log-uniform over many presses. A press that
+    slides ends with the slide, at constant force along the same path on both sensors. A scene with ``depth_steps``
+    pairs contacts of equal depth instead of equal force.
     pair : the sensors, source and target; keep : see ``pair_row``"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
@@ -153,6 +153,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if the contact, nodes (n,) bool of the source, extends beyond the part that rolls onto the gel."""
+    """Return true if the contact, nodes (n,) bool of the source, extends beyond the part that unrolls onto the gel."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

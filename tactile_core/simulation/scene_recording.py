@@ -81,7 +81,7 @@ def simulate_recording(
     indenter = next(i for i in scene.indenters if i.name == spec.indenter).build()
     time, place, force = motion(spec)
     frames: list[_Frame] = []
-    known: dict[tuple[float, ...], _Frame] = {}  # a press that comes again is not solved again
+    known: dict[tuple[float, ...], _Frame] = {}  # presses solved so far
     for t, (x, z), newtons in zip(time, place, force, strict=True):
         if (x, z, newtons) not in known:
             at = Placement(x, z, np.radians(spec.tilt_deg))

@@ -30,7 +30,7 @@ class Box(Indenter):
             raise TactileError("box, edge", f"{self.edge * 1e3:g} mm", "less than half of the smallest size")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact (a smaller box inflated by the edge radius), inside to the nearest face."""
+        """See ``Indenter.distance``; exact: that of a box smaller by the edge radius, less the radius."""
         return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:

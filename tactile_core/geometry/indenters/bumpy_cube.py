@@ -15,7 +15,7 @@ from .scene_form import SceneForm, Size
 from .several import Several, joined
 from .sphere import Sphere
 
-_CUBE, _BALL, _RIM, _SHAFT = range(4)  # what is nearest
+_CUBE, _BALL, _RIM, _SHAFT = range(4)  # the nearest part
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,8 +49,8 @@ class BumpyCube(Indenter):
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See ``Indenter.distance``; exact.
 
-        Inside the cube above a bump the nearest place is on the bump's cap or on the rim at its foot: both lie below,
-        unlike the surface of a whole ball.
+        Inside the cube above a bump the nearest surface is the bump's cap or the rim at its foot, both below; the
+        ball's upper part is no surface there.
         """
         _, distance, gradient, _ = self._nearest(points)
         return distance, gradient
@@ -93,7 +93,7 @@ class BumpyCube(Indenter):
 
     @functools.cached_property
     def _shaft(self) -> tuple[Indenter, Pose]:
-        """The cube without its lower face, which is far away."""
+        """The cube with its lower face moved far down."""
         apex = np.array([0.0, 0.0, self.bump_height - self.size])
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 

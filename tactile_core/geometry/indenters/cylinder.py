@@ -14,7 +14,7 @@ from . import extrusion
 from .indenter import NEAREST, SQUARE, Indenter, check_length, contiguous, sign_of
 from .scene_form import SceneForm, Size
 
-_ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # by its axis: those across; own ones in an extrusion's order
+_ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # axis -> axes across it; own axes from an extrusion's
 
 
 @dataclasses.dataclass(frozen=True)

@@ -11,7 +11,7 @@ from . import extrusion
 from .indenter import NEAREST, SQUARE, Indenter, check_length, sign_of
 from .scene_form import SceneForm, Size
 
-_ACROSS, _OWN = [1, 2], [2, 0, 1]  # extrusions answer in the order y, z, x
+_ACROSS, _OWN = [1, 2], [2, 0, 1]  # own axes across; own axes from an extrusion's, which are y, z, x
 _ANGLES = np.deg2rad([10, 170])  # a sharper wedge is a blade, a blunter one a plane
 
 
@@ -36,7 +36,7 @@ class Edge(Indenter):
             raise TactileError("edge, radius", f"{self.radius * 1e3:g} mm", "less than half of length and height")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact (a smaller wedge inflated by the radius), inside to the nearest face."""
+        """See ``Indenter.distance``; exact: that of a wedge smaller by the radius, less the radius."""
         distance, gradient = extrusion.distance(*self._prism(points), self.radius)
         return distance, gradient[:, _OWN]
 

@@ -1,7 +1,7 @@
-"""Signed distance of a flat outline drawn out along an axis and rounded: the body of cylinders and wedges.
+"""Signed distance of an outline extruded along an axis and rounded: the body of cylinders and wedges.
 
-Outside, the distance to a straight prism is the hypotenuse of the distances to its outline and to its span; inside,
-the nearer face counts. The edge radius then inflates the prism evenly.
+Of a straight prism, with distances d to its outline and e to its ends: hypot(max(d, 0), max(e, 0)) + min(max(d, e), 0).
+The edge radius, which inflates the prism, is then subtracted.
 """
 
 from __future__ import annotations

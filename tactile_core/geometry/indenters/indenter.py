@@ -12,9 +12,9 @@ import numpy as np
 
 from ...errors import TactileError
 
-# Where a direction meets a flat or a line of the body squarely, rounding must not choose an end of it.
+# Components of a unit vector below this count as zero, so that rounding does not choose an end of a flat or a line.
 SQUARE = 1e-9
-# m; nearer than this to a centre of curvature (deep inside a body) normals and curvatures are those at this distance.
+# m; nearer to a centre of curvature (deep inside a body) normals and curvatures are those at this distance.
 NEAREST = 1e-9
 
 Surface = tuple[np.ndarray, np.ndarray]  # nodes (n, 3) m in the body's frame, triangles (m, 3)
@@ -57,7 +57,7 @@ class Indenter(Protocol):
 
 
 def contiguous(points: np.ndarray) -> np.ndarray:
-    """Return points (n, 3) m as compiled loops take them."""
+    """Return points (n, 3) m as a contiguous float array, as compiled loops need."""
     return np.ascontiguousarray(points, float)
 
 

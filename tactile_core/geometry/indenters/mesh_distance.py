@@ -8,14 +8,14 @@ import numpy as np
 
 from ...files.compiled import Loop, available
 
-_LONGEST = 700_000  # cells, all triangles' longest edges together: some 1.6 million pieces of slender ones
-_TOGETHER = 20_000  # points that are looked up together where nothing is compiled
+_LONGEST = 700_000  # cells, most for the sum of all triangles' longest edges: some 1.6 million pieces of slender ones
+_TOGETHER = 20_000  # points looked up at a time without numba
 
 
 class NearTriangles:
     """Triangles (m, 3, 3), any unit, sorted into cubes of side ``cell`` by pieces no longer than that.
 
-    Of many long triangles the cubes are larger. middles : (k, 3), of the pieces
+    The cubes are larger for many long triangles. middles : (k, 3), of the pieces
     """
 
     def __init__(self, triangles: np.ndarray, cell: float) -> None:
@@ -56,7 +56,7 @@ class NearTriangles:
         return self._cell * np.sqrt(squares)
 
     def _by_tree(self, points: np.ndarray, bound: float) -> np.ndarray:
-        """See ``distance``: of whole arrays, with more and more near pieces until no other can be nearer."""
+        """See ``distance``; without numba: looks at ever more of the nearest pieces until no other can be nearer."""
         import scipy.spatial
         import trimesh
 
@@ -83,8 +83,8 @@ def _sides(corners: np.ndarray) -> np.ndarray:
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
     """Cut triangles until each edge is short; returns four-sided pieces (k, 4, 3) and their triangles (k,).
 
-    Two opposite edges are halved at a time, at first those beside a triangle's shortest: of a slender one, that makes
-    as many pieces as it is long, not its square.
+    Two opposite edges are halved at a time, first the two beside a triangle's shortest: the number of pieces of a
+    slender one then grows as its length, not its square.
     """
     order = (_sides(triangles).argmin(axis=1)[:, None] + [0, 1, 2, 2]) % 3  # the last edge but one has no length
     whole, owner, pieces, owners = np.take_along_axis(triangles, order[:, :, None], 1), np.arange(len(order)), [], []

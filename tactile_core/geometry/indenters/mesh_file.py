@@ -15,17 +15,17 @@ import numpy as np
 from ...errors import TactileError
 from ...files import outside
 
-FLAT = 1e-9  # of the cube of a mesh's size: a volume that is nothing but rounding (assumed)
+FLAT = 1e-9  # over the cube of a mesh's size, largest volume that is taken for rounding (assumed)
 SUFFIXES = (".stl", ".ply", ".obj", ".off")
 UPS = ("x", "y", "z", "-x", "-y", "-z")
 MAX_BYTES, MAX_FACES = 100_000_000, 200_000
-# What MAX_FACES triangles take with normals and texture; parsers make a hundred times as many bytes of a word.
+# Words of text, bytes of binary that MAX_FACES triangles take with normals and texture; parsing takes 100 times that.
 MAX_WORDS, MAX_BINARY = 20 * MAX_FACES, 32_000_000
 EXTENT_MM = (0.2, 100.0)  # an indenter for a fingertip; outside of it the unit is wrong (assumed)
 _UNITS = {"metres": 1.0, "inches": 0.0254, "centimetres": 1e-2, "millimetres": 1e-3, "micrometres": 1e-6}
 _ROUNDING = 1e-5  # of the largest coordinate: twice what six digits of text round off
-_LARGEST_GAP = 1e-4  # of the body, whose coordinates may be far from zero (assumed)
-_WELDED = 8  # nearest vertices that one is united with; chains of them reach further
+_LARGEST_GAP = 1e-4  # of the body's size, which bounds the above for coordinates far from zero (assumed)
+_WELDED = 8  # most vertices that one is united with directly; chains reach further
 _LOWEST_MM = 1e-4  # vertices this near to the lowest one belong to one flat
 
 

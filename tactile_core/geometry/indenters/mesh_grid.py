@@ -18,19 +18,18 @@ MAX_NODES = 8_000_000  # 32 MB kept, 200 to 650 MB more while it is built
 _STEP_UP = 1.1  # step in the search of a spacing
 REACH = 5e-3  # m above the lowest point: deeper than any dent of a gel or skin (assumed)
 _STEM = 4  # times the spacing, at least, beyond what may touch
-_SPARE = 6  # nodes more on every side while the spline is fitted: what it assumes at its ends fades by 0.27 a node
-_FINEST = 0.1e-3  # m: finer than the nodes of either sensor
+_SPARE = 6  # extra nodes on each side for the fit of the spline: the effect of its ends fades by 0.27 a node
+_FINEST = 0.1e-3  # m, finer than either sensor's spacing of nodes
 _CHECKED = 500  # points near the surface at which the error is measured
 _CHECKED_WITHIN_MM = 0.3  # how near
 _ROUNDING_MM = 1e-9
 _CELLS = 200  # along a body's diagonal, at most
-# Spacings from the surface up to which distances are exact. What a spline makes of errors farther off fades by 0.27 a
-# node: to half a percent at the surface. No whole number: flat faces lie whole spacings from nodes, where rounding
-# would decide.
+# Spacings from the surface up to which distances are exact. In the spline, errors beyond fade by 0.27 a node: to half a
+# percent at the surface. Not a whole number, since flat faces lie whole spacings from nodes and rounding would decide.
 _NEAR = 4.1
 _FAR = 12  # spacings (assumed)
-_ROWS = 500_000  # of columns, each of one triangle, looked at together: about 200 MB
-_GRAZES = 1e-6  # spacings beside a triangle at which a column is looked at: rounding
+_ROWS = 500_000  # pairs of a column and a triangle looked at together: about 200 MB
+_GRAZES = 1e-6  # spacings, tolerance for rounding within which a column is tested against a triangle
 _COARSER = 4  # times the spacing, of the grid that is interpolated beyond
 _FEWEST = 5  # nodes that a cubic spline takes
 # Columns stand this part of the spacing beside the nodes, so that none meets an edge or a vertex; tried in turn.
@@ -158,8 +157,8 @@ def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np
 def _coarse(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
     """Signed distance, mm, at every fourth node and those beyond the grid's end.
 
-    Off the surface it is that to the middle of the nearest piece; far off of the one that is nearest to the nearest
-    node that is less far: a search finds none quickly where many are equally near, as round the middle of a ball.
+    Near the surface it is exact; up to ``_FAR`` spacings that to the middle of the nearest piece; farther off that to
+    the piece of the nearest such node, as a search is slow where many pieces are equally near (the middle of a ball).
     """
     import scipy.ndimage
     import scipy.spatial

@@ -28,7 +28,7 @@ _FORMAT = 4  # raise when the meaning of the cached arrays changes
 _ROOM = "40 MB"
 _ARRAYS = ("coefficients", "origin", "hull", "error", "stem", "stem_place")  # the last two are empty for one grid
 _SPACING = (0.01e-3, 1e-3)  # m
-_FLATTEST = 0.5  # flatter than at any edge: deep inside, where opposite faces are equally near
+_FLATTEST = 0.5  # least slope that a curvature is divided by: the spline is flatter only deep inside, between faces
 _LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
 
 

@@ -1,4 +1,4 @@
-"""Describe a shape to scenes and menus in the shape's own file: its kind, its sizes in millimetres, its menu entry."""
+"""Describe a shape, in its own file, to scenes and menus: its kind, its sizes in millimetres, its menu entry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Size:
 
     field : its name there, which ends in its unit, ``_mm`` or ``_deg``; count : how many numbers it takes
     default : where a scene leaves it out; None: it must be given
-    slider : which of the Add menu's sizes sets it; none: a new object has the default
+    slider : name of the Add menu's size that sets it; empty: a new object has the default
     """
 
     field: str

@@ -19,8 +19,8 @@ class SplineGrid(Summary):
     """The spline sum_ijk c_ijk B(x - i) B(y - j) B(z - k), in units of ``spacing`` m from ``origin`` (3,) m.
 
     coefficients : (nx, ny, nz), 4 or more each way, in the unit of the values
-    It is defined in the box that leaves out the outermost nodes. Beyond it the distance to the box is added: continuous
-    and, for a body well inside of it, larger than zero, but its slope jumps at the box.
+    It is defined in the box without the outermost nodes. Beyond, the distance to the box is added: the value stays
+    continuous and, for a body well inside, positive; its slope jumps at the box.
     """
 
     origin: np.ndarray

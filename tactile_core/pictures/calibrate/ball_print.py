@@ -32,7 +32,7 @@ class _Table:
     coefficients: np.ndarray
 
     def rise(self, distance: np.ndarray, depth: float, radius: float) -> np.ndarray:
-        """Rise of the flat layer, m, at distances from the axis, m, under a ball of another radius, m; lengths scale."""
+        """Rise of the flat layer, m, at distances from the axis, m, under a ball of another radius, m: lengths scale"""
         scale = radius / self.radius
         distance, depth = distance / scale, depth / scale
         k = int(np.clip(np.searchsorted(self.depths, depth) - 1, 0, len(self.depths) - 2))
