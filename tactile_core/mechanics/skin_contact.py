@@ -1,13 +1,13 @@
-"""Find the contact that a displaced surface shows: the traction on it, and the body that is pressed into it.
+"""Find the contact behind a displaced surface: the traction on it, and the body that is pressed into it.
 
-In contact the displacement is given and the traction unknown; beside it the traction is zero. The sensor's linear
-compliance among the patch's nodes is inverted, with a soft layer on it that keeps noise of single nodes out; a patch
-does not pull, so nodes that would are let go.
+In the patch displacements are known and tractions are not; elsewhere the traction is zero. The sensor's linear
+compliance among the patch's nodes is inverted, regularised by a soft layer against noise of single nodes; nodes that
+would pull are released.
 
-The body is found by mechanics alone, with nothing learned: the node of a skin that is displaced most was touched first
-and sticks, so it has moved as the body has, which tells depth and lean. Each candidate body is pressed into the skin in
-the same way, moved until its load is centred where the skin's is, and the one whose dent is most similar is taken with
-its force. So it holds on parts of the pad that no network was trained on.
+The body is found by mechanics alone, so also on parts of the pad that no network was trained on. The node of a skin
+that is displaced most was touched first and sticks: it has moved as the body has, which gives depth and lean. Each
+candidate body is pressed into the skin in this way, and moved until its load is centred where the skin's is. The one
+with the most similar dent is taken, with its force.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from .placement import Placement
 from .solution import Solution
 from .solve import solve
 
-# Of the sensor's thickness over its modulus: the layer's give under a pressure. On gels solved at finite strain, nine
-# indenters, the sum missed the force by 6.0 % in the median, with 0.01 by 7.5 %, 0.03 by 12.9 %; on translated gels
-# of the shipped recording 0.0001 to 0.01 were alike to half a per cent.
+# The layer's compliance, m/Pa, over the sensor's thickness / modulus. On gels solved at finite strain, nine indenters,
+# the force was 6.0 % off in the median, with 0.01 7.5 %, 0.03 12.9 %; on translated gels of the shipped recording
+# 0.0001 to 0.01 agreed to half a per cent.
 _LAYER = 1e-3
 
 
@@ -60,7 +60,7 @@ def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) 
 def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.ndarray) -> np.ndarray:
     """Traction (k, 3) Pa of nodes with areas (k,) m2 that are displaced by (k, 3) m.
 
-    block : (3 k, 3 k) m/N. Weighted by the areas' roots it stays symmetric, and the layer is the same everywhere.
+    block : (3 k, 3 k) m/N. Scaled by the areas' square roots, the system is symmetric and the layer uniform.
     """
     material, thickness = sensors.describe(sensor).material, sensors.thickness(sensor)
     root = np.repeat(np.sqrt(areas), 3)
@@ -69,9 +69,9 @@ def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.
     return (np.linalg.solve(matrix, root * displacement.ravel()) / root).reshape(-1, 3)
 
 
-# m, of the ball: half of the smallest and twice of the largest rounding that networks are trained on (assumed).
+# m, least and largest radius of the ball: half the smallest, twice the largest that networks are trained on (assumed).
 RADII = 1.5e-3, 14e-3
-LEAST_NODES = 5  # of a patch, one more than a paraboloid needs; smaller ones take the usual radius
+LEAST_NODES = 5  # of a patch, one more than a paraboloid needs; smaller patches get the usual radius
 USUAL_RADIUS = 4e-3  # m, the median of translated patches of the test contacts
 LARGEST_TILT = 0.8  # rad, a little more than sticking friction holds: atan(0.78) is 0.66 (assumed)
 
@@ -87,7 +87,7 @@ class BodyContact:
     def on_gel(self, sensor: str = sensors.TARGET) -> Solution:
         """Solve the contact on a gel, in the fast tier.
 
-        Raises TactileError for a place off the gel, and for a force that the gel does not bear.
+        Raises TactileError for a place off the gel, and for a force beyond its greatest depth.
         """
         return solve(sensor, self.body, self.place, force=self.force)
 
@@ -117,15 +117,15 @@ def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
 
 
 SENSOR = sensors.SOURCE
-# Share of the deepest node's inward displacement, above which a node may be pressed: the skin is dented far beside the
-# few nodes in contact. And share of the largest pressure, from which on it is (median IoU with true patches 0.7; 0.4 is
-# alike). Chosen on a quarter of the test contacts.
+# A node may be in contact above this share of the deepest node's inward displacement, as skin is dented far beside the
+# few nodes in contact; it is from this share of the largest pressure on (median IoU with true patches 0.7, also with
+# 0.4). Chosen on a quarter of the test contacts.
 MAYBE, PRESSED = 0.4, 0.2
-# Share of the deepest node's inward displacement, above which dents are compared; of .4 to .85 the best on a sixth of
-# the test contacts. Farther off, the fast tier and the full one differ by more than two bodies do.
+# Share of the deepest node's inward displacement above which dents are compared; the best of .4 to .85 on a sixth of
+# the test contacts. Below it the fast and the full tier differ by more than two bodies do.
 COMPARED = 0.5
 LEAST_COMPARED = 5  # nodes
-MOVES = 2  # of each body toward the load's centre; then it lies within .07 mm in the median
+MOVES = 2  # of each body toward the load's centre: its own is then within .07 mm in the median
 
 
 @dataclass(frozen=True)
@@ -139,13 +139,13 @@ class _Dent:
 
     @property
     def motion(self) -> np.ndarray:
-        """Displacement (3,) m of the deepest node: that of the body since first touch."""
+        """Displacement (3,) m of the deepest node, which is the body's since first touch."""
         return self.displacement[self.inward.argmax()]
 
 
 @dataclass(frozen=True)
 class _Trial:
-    """A body pressed into the skin at (x, z) m, the dent that it makes, and how unlike the one sought that is."""
+    """A body pressed into the skin at (x, z) m, its dent, and how unlike the one sought that is, 0 to 1."""
 
     contact: BodyContact
     aim: np.ndarray
@@ -202,7 +202,7 @@ def _ball(dent: _Dent) -> Sphere:
 
 
 def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
-    """Press a body at ``aim`` (2,) m as the dent shows; None where it cannot be, or touches no node."""
+    """Press a body at ``aim`` (2,) m by the dent's motion; None if that is impossible, or touches no node."""
     place = leaning(float(aim[0]), float(aim[1]), dent.motion, roll_up(aim, SENSOR)[1])
     try:
         solution = solve(SENSOR, body, place, depth=float(np.linalg.norm(dent.motion)))
@@ -213,15 +213,15 @@ def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
 
 
 def _moved(dent: _Dent, trial: _Trial) -> _Trial:
-    """Move a trial by as much as its load is off; returns the likelier of the two."""
+    """Move a trial by the offset of its load's centre; returns the likelier of the two."""
     after = _trial(dent, trial.contact.body, trial.aim + dent.centre - trial.dent.centre)
     return trial if after is None or after.unlike > trial.unlike else after
 
 
 def _unlike(made: _Dent, sought: _Dent) -> float:
-    """Return how unlike in form two dents are around the deepest node of the one sought, 0 (alike) to 1.
+    """Return how unlike two dents are around the deepest node of the one sought, 0 (alike) to 1.
 
-    Their means are left out and their sizes evened: depth is known, and finite strain changes both.
+    Only their form counts, without mean and scale: depth is known, and finite strain changes both.
     """
     count = max(int((sought.inward > COMPARED * sought.inward.max()).sum()), LEAST_COMPARED)
     near = np.argsort(-sought.inward, kind="stable")[:count]

@@ -19,9 +19,9 @@ TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """A place on a path: ``depth`` m or ``force`` N along the motion, and how far the indenter has slid, m.
+    """A point of a path: ``depth`` m or ``force`` N along the motion, and ``slide`` (2,) m from the first touch.
 
-    slide : along the finger and across, in the indenter's own axes, from where it first touched
+    slide : along the finger and across it, in the indenter's own axes
     """
 
     depth: float | None = None
@@ -45,14 +45,14 @@ class Solution(Summary):
 
     tier : which solver made it; converged : whether it may be used; iterations : of its last step
     displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
-    thickness : m, of the sensor where it was first touched
+    thickness : m, of the sensor at the place of first touch
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
     centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
     penetration : m, largest depth of a node in the indenter or the core; slipping : share of touching nodes that slip
     core_nodes : number of inner-skin nodes that press on the core; load_steps : number since the solution before
     volume : the solid and its state, of the full and the reference tier
-    between : (m, 3) N, loads on the solid's nodes by which the indenter's force between nodes acts, if there is any
+    between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points), if any
     """
 
     tier: Tier
@@ -86,7 +86,7 @@ class Solution(Summary):
 
     @functools.cached_property
     def traction(self) -> np.ndarray:
-        """Traction (n, 3) Pa of the indenter on the surface; times ``node_areas`` and added up it is the force.
+        """Traction (n, 3) Pa of the indenter on the surface; its sum, weighted by ``node_areas``, is the force.
 
         Raises TactileError in the full and the reference tier, whose forces act on the nodes of their own meshes.
         """

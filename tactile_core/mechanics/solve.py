@@ -23,7 +23,7 @@ from .penetration import RESOLVED_RADIUS, sharpest
 from .placement import DEPTH_LIMIT, FRICTION, Placement, on_gel, pose_at, thickness_under
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 
-_LIGHTEST = 1e-6  # N, the weight of 0.1 mg: less is lost in rounding and the lattice's own roughness
+_LIGHTEST = 1e-6  # N, least force: smaller ones are lost in rounding and the lattice's roughness
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
 
 
@@ -70,7 +70,7 @@ def solve_path(
     friction: float = FRICTION,
     limit: float | None = None,
 ) -> Iterator[Solution]:
-    """Yield the solution of each step of a path; where nodes stick to the indenter goes on from the step before.
+    """Yield the solution of each step of a path; with friction each depends on the steps before.
 
     steps : taken one by one in the fast tier; all at once in the others, whose mesh is made for the deepest
     limit : m, the greatest depth (default: 60 % of the thickness there)
@@ -130,7 +130,7 @@ def _check(step: Step, limit: float) -> None:
 def _guessed_depths(
     sensor: Sensor, indenter: Indenter, pose: Pose, steps: list[Step], limit: float, friction: float
 ) -> list[float]:
-    """Return the steps' depths, m; for given forces, the depths at which the fast tier reaches them, else the limit."""
+    """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces, else the limit."""
     if not any(step.force for step in steps):
         return [step.depth or 0.0 for step in steps]
     fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)

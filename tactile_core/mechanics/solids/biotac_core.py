@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import TactileError
 from ...sensors import skin_of
 
-_ROUGHNESS = 10e-6  # m rms, the table's facets, which the spline smooths away (assumed: half of the skin's 20 um fit)
+_ROUGHNESS = 10e-6  # m rms, of the table, which the spline smooths away (assumed: half of the skin's 20 um fit)
 _HESSIAN_STEP = 1e-6  # m, of the differences of the exact gradient
 _POINT_STEP = (0.05e-3, np.radians(1.0))  # m and rad between points that stand for the core: at most 0.09 mm apart
 
@@ -23,7 +23,7 @@ class Core:
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
 
-        The gap is (r - R) / |grad (r - R)|: exact to first order, and with that normal where it is closed.
+        The gap is (r - R) / |grad (r - R)|, exact to first order, as is the normal where the gap is closed.
         Beyond the table's ends the last radius is held.
         """
         x, y, z = points.T

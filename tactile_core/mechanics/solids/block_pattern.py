@@ -1,4 +1,4 @@
-"""Pattern of the 3 x 3 blocks of a stiffness matrix: computed once for a mesh, filled in every iteration."""
+"""Sparsity pattern of a stiffness matrix in 3 x 3 blocks: computed once per mesh, filled in every iteration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class BlockPattern:
-    """Sums cell matrices into one block a pair of neighbouring nodes, and hands them on as a sparse matrix.
+    """Sums cell matrices into one block per pair of neighbouring nodes, and makes sparse matrices of the blocks.
 
     rows, columns : (n_blocks,) node of each block; diagonal : (n_nodes,) its block
     """
@@ -26,7 +26,7 @@ class BlockPattern:
         self.starts = np.searchsorted(self.rows, np.arange(n_nodes + 1)).astype(np.int32)
 
     def gather(self, stiffness: np.ndarray) -> np.ndarray:
-        """Gather the blocks (n_blocks, 3, 3) of cell matrices (n_cells, k, 3, 3, k) = (node, axis, axis, node)."""
+        """Sum cell matrices (n_cells, k, 3, 3, k), (node, axis, axis, node), to blocks (n_blocks, 3, 3)."""
         blocks = np.empty((len(self.rows), 3, 3))
         for i in range(3):
             for j in range(3):
@@ -56,7 +56,7 @@ class BlockPattern:
 
     @functools.cached_property
     def _upper(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Rows, columns and places in ``blocks`` of the free entries on and above the diagonal, row by row; starts."""
+        """Return rows, columns and places in ``blocks`` of the free entries on and above the diagonal; rows' starts."""
         place = np.full(3 * self.n_nodes, -1, np.int32)
         place[self.free] = np.arange(len(self.free))
         axis, shape = np.arange(3), (len(self.rows), 3, 3)
@@ -68,7 +68,7 @@ class BlockPattern:
         return rows[keep], columns[keep], keep, starts
 
     def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
-        """Assemble the free degrees of freedom's upper triangle, scipy CSR, with the identity's rows for ``held`` ones.
+        """Assemble the upper triangle of the free degrees of freedom, scipy CSR, identity rows for ``held`` ones.
 
         held : (n_free,) bool. The pattern is the same every time: a solver may keep its analysis.
         """

@@ -92,19 +92,19 @@ def determinants(f: np.ndarray) -> np.ndarray:
     return sum(a[..., k] * minor for k, minor in enumerate(minors))
 
 
-# Of the shear modulus, for the gel; the skin, which bends, does not need it, and would be 2 % stiffer. Measured on the
-# graded gel under a 7 mm ball against the mesh twice as fine: 0 and 5 give -0.3 and +0.1 % of force, 1.3 and 1.1 um
-# of shape at 0.6 mm.
+# Over the shear modulus, for the gel; the skin, which bends, does not need it, and would be 2 % stiffer. On the graded
+# gel under a 7 mm ball at 0.6 mm, against the mesh twice as fine, 0 and 5 give errors of -0.3 and +0.1 % of force, 1.3
+# and 1.1 um of shape.
 SHARE = 4.0
 
 
 @dataclasses.dataclass(frozen=True)
 class SplitBulkModulus:
-    """A law with ``at_points`` Pa of its bulk modulus at each point, which keeps coarse cells from buckling.
+    """A law with ``at_points`` Pa of its bulk modulus acting at each Gauss point, so that coarse cells do not buckle.
 
-    With the volume held by the cell's pressure alone, a Gauss point may give up half of its volume where the next one
-    gains it: under a sharp edge, or deep under a small ball, coarse cells then buckle. A small part of the modulus that
-    acts at each point forbids it. The sum is the material's own modulus, so the limit of fine meshes is the same.
+    If the cell's pressure alone held the volume, a Gauss point could lose half of its volume to the next one: under a
+    sharp edge, or deep under a small ball, coarse cells then buckle. Both parts add up to the material's own modulus,
+    so fine meshes have the same limit.
     """
 
     law: NeoHookean
@@ -153,8 +153,8 @@ class State:
 class FiniteStrainSolid:
     """Residual and tangent of a mesh of one material; see the module for the energy.
 
-    material : linear constants, for a neo-Hookean solid, or a law of its own
-    pattern : of the mesh's cells, where it is known already
+    material : linear constants, for a neo-Hookean solid, or a law
+    pattern : of the mesh's cells, if there is one already
     """
 
     def __init__(self, mesh: HexMesh, material: Material | Law, pattern: BlockPattern | None = None) -> None:
@@ -239,8 +239,8 @@ class FiniteStrainSolid:
 class Linearised:
     """A solid's equations at one state, cell by cell, pressure eliminated.
 
-    residual, condensed : (n_cells, 81) N, the second with the pressure's own residual carried over
-    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node); the last two arrays are ``pressure_step``'s
+    residual : (n_cells, 81) N; condensed : the same after elimination of the pressure, with its own residual
+    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node); the last two arrays are for ``pressure_step``
     """
 
     solid: FiniteStrainSolid

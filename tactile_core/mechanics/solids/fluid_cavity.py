@@ -10,10 +10,10 @@ from .elasticity import _POINT_WEIGHTS, _POINTS, quadratic
 
 
 class FluidCavity:
-    """Volume under a skin of quadratic cells by their own curved faces, with its exact first and second derivatives.
+    """Volume inside a skin of quadratic faces, with its exact first and second derivatives.
 
-    V = 1/3 of the integral of x . (dx/dxi x dx/deta) over the faces: trilinear in the nodes, and summed with
-    coefficients that are antisymmetric in them, since x_a . (x_b x x_c) is.
+    V = 1/3 of the integral of x . (dx/dxi x dx/deta) over the faces, trilinear in the nodes: a sum over nodes a, b, c
+    of antisymmetric coefficients times x_a . (x_b x x_c).
     """
 
     def __init__(self, faces: np.ndarray, n_nodes: int) -> None:

@@ -1,7 +1,7 @@
 """Solids refined where an indenter touches: the sensors' own lattices, with fewer lines away from the contact.
 
-The lines of a mesh are given by their places in the sensor's lattice (real-valued row and column numbers), so that its
-surface is the sensor's own. What is found on the lines is carried to the lattice by cubic splines along them.
+The mesh's lines lie at real-valued row and column numbers of the sensor's lattice, so that its surface is the sensor's
+own. Results are interpolated to the lattice by cubic splines along the lines.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .hex_mesh import SKIN_LAYERS, HexMesh, gel_solid, glued_skin, skin_solid
 from .sparse_cholesky import PatternFactor
 
 _WIDEST_GEL, _WIDEST_SKIN = 10.0, 6.0  # lattice lines, the widest cell; the skin bends everywhere
-_GROWTH = 1.5  # of a cell, with its distance from the fine part
+_GROWTH = 1.5  # ratio of a cell's size to the next one nearer to the fine part
 _KEPT = 6  # patterns kept, each with the analysis and the last factor of its matrix: about 100 MB
 
 
@@ -39,10 +39,10 @@ class Footprint:
 
 @dataclasses.dataclass(frozen=True)
 class GradedMesh:
-    """A graded solid, the pattern of its matrix with the solver that knows it, and its lines.
+    """A graded solid, its matrix's sparsity pattern and solver, and its lines.
 
     rows (i,), columns (j,) : places of the mesh's lines in the lattice
-    to_rows (rows, i), to_columns (columns, j) : from values at the mesh's lines to values at the lattice's lines
+    to_rows (rows, i), to_columns (columns, j) : interpolate from the mesh's lines to the lattice's
     """
 
     mesh: HexMesh
@@ -63,7 +63,7 @@ class GradedMesh:
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Carry flags (n_surface,) at the mesh's surface nodes to the lattice's (n,): true where most around are."""
+        """Interpolate flags (n_surface,) at the mesh's surface nodes linearly to the lattice's (n,), true above 1/2."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 
@@ -161,7 +161,7 @@ def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: floa
 
 
 def _divided(values: np.ndarray, parts: int) -> np.ndarray:
-    """Values with ``parts`` even intervals for each of theirs."""
+    """Subdivide each interval of sorted values into ``parts`` even ones."""
     return np.interp(np.arange(parts * (len(values) - 1) + 1) / parts, np.arange(len(values)), values)
 
 
@@ -205,7 +205,7 @@ _PATTERNS: dict[tuple, tuple[BlockPattern, PatternFactor]] = {}  # the latest us
 
 
 def _pattern(mesh: HexMesh, *kind: str | int) -> tuple[BlockPattern, PatternFactor]:
-    """Kept for meshes of one ``kind`` (sensor, rows, columns) with the same clamped nodes: their cells are the same."""
+    """Return pattern and solver of meshes of one ``kind`` (sensor, rows, columns) and clamped nodes: equal cells."""
     key = (*kind, len(mesh.nodes), mesh.clamped.tobytes())
     found = _PATTERNS.pop(key, None) or (BlockPattern(mesh.cells, mesh.clamped), PatternFactor())
     _PATTERNS[key] = found

@@ -1,8 +1,7 @@
 """Sparse Cholesky factors of stiffness matrices, by the fastest library that is installed.
 
-Many right-hand sides against one matrix: cholespy, else SciPy's SuperLU. One matrix after another on one pattern:
-MKL's PARDISO (pypardiso), which keeps the analysis, else the former: the factorisation alone was measured ten times
-faster with it.
+For many right-hand sides of one matrix: cholespy, else SciPy's SuperLU. For many matrices of one pattern: MKL's PARDISO
+(pypardiso), which keeps the symbolic analysis, else those. A factorisation was measured to be ten times faster with it.
 """
 
 from __future__ import annotations
@@ -62,7 +61,7 @@ def _superlu(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001
 
 
 class PatternFactor:
-    """Factors of symmetric positive definite matrices that share the places of their entries."""
+    """Factors of symmetric positive definite matrices of one sparsity pattern."""
 
     def __init__(self) -> None:
         self._pardiso = _pardiso()
@@ -127,7 +126,7 @@ def _pardiso():  # noqa: ANN202
     return solver
 
 
-# Assumed, of a node's own stiffness: the first damping tried, and the least worth keeping; most tries at one state.
+# First and least damping over a node's own stiffness; most tries at one state (assumed).
 _FIRST, _LEAST, _TRIES = 0.02, 5e-3, 6
 _MOST_BENDING = 0.3  # of a node's own stiffness (assumed)
 
@@ -135,10 +134,10 @@ _MOST_BENDING = 0.3  # of a node's own stiffness (assumed)
 class DampedFactor:
     """The solver of one solid's tangents, with as much damping as they need to be positive definite.
 
-    Where the solid is unstable (a node about to slide off a ridge) it is damped until it is not: Newton's iteration
-    then follows it down to the next equilibrium. Only the way there depends on it.
+    Where the solid is unstable (a node about to slide off a ridge) Newton's iteration then follows it to the next
+    equilibrium, which does not depend on the damping.
 
-    damping : of a node's own stiffness, in use now; stiffness : N/m, of the size of a node's own
+    damping : in use now, over ``stiffness``, a typical node's own, N/m
     """
 
     def __init__(self, solid: FiniteStrainSolid, factor: PatternFactor) -> None:
@@ -147,7 +146,7 @@ class DampedFactor:
         self.stiffness = float(solid.law.bulk * 0.05 * spacing)
 
     def relax(self) -> None:
-        """Try with less damping from now on."""
+        """Reduce the damping for the next matrix."""
         self.damping = self.damping / 4 if self.damping > _LEAST else 0.0
 
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
@@ -178,10 +177,9 @@ class DampedFactor:
 
 
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Return the curvature terms (k, 3, 3) N/m, no larger than a share of their nodes' own stiffness (k, 3, 3).
+    """Return the curvature terms (k, 3, 3) N/m, limited to a share of their nodes' own stiffness (k, 3, 3).
 
-    Where a node rides a ridge sharper than the mesh, the whole term would make the matrix indefinite; less of it costs
-    iterations, not exactness.
+    At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it costs iterations only.
     """
     size = np.abs(bending).max(axis=(1, 2))
     most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3

@@ -29,7 +29,7 @@ def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
 
 
 def nodal_force(solid: FiniteStrainSolid, state: State) -> np.ndarray:
-    """Return the force (n, 3) N that holds each node where it is: contact, fluid and reactions; zero at free nodes.
+    """Return the external force (n, 3) N on each node: contact, fluid and reactions; zero at free nodes.
 
     Raises what ``cauchy`` raises.
     """
@@ -46,9 +46,9 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
     """Return the values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the quadrature points.
 
-    In each cell the trilinear function nearest to them (least squares with the volumes as weights, local L2
-    projection); at a node the mean of its cells, by their volumes. A field that is linear in a cell's own coordinates
-    comes back exactly. To smooth a stress, hand over the tensor and take its von Mises stress afterwards.
+    In each cell a trilinear function is fitted (local L2 projection); a node has the mean over its cells, by volume. A
+    field that is linear in a cell's own coordinates is reproduced. For a smooth von Mises stress, smooth the tensor
+    first.
     """
     flat = values.reshape(*values.shape[:2], -1)
     points, _, _ = reference_gradients()
