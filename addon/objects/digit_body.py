@@ -12,12 +12,12 @@ from ...tactile_core.sensors.camera import Camera, Led
 from ..settings import properties
 from . import digit_materials, held_light, image_frame, sensor_bodies
 
-_INSIDE = 9e-3  # m below the gel's lowest point, under its window: what Cycles sees begins there
+_INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 
 
 def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
-    """Return the gel's parts that a scene shows; those that came with an appended gel are in none."""
+    """Return the gel's parts that some scene shows; parts that came along with an appended gel are in no scene."""
     return [thing for thing in gel.children_recursive if thing.users_scene]
 
 
@@ -81,10 +81,10 @@ def reset(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def _link_light(gel: bpy.types.Object) -> None:
-    """Let LEDs light the gel alone, through its body, by Blender's light linking; not those linked by hand.
+    """Let LEDs light the gel alone, through its body, by Blender's light linking; LEDs linked by hand stay.
 
-    They stand where the calibration sees them, some outside the housing, which would hide them; and gel and housing
-    throw no shadow, so that without it their light would fall on what stands around.
+    The calibration places some LEDs outside the housing, which must not hide them; and as gel and housing throw no
+    shadow, their light would else fall on what stands around.
     """
     leds = leds_of(gel).values()
     new = [led for led in leds if led.light_linking.receiver_collection is None]
@@ -105,7 +105,7 @@ def _link_light(gel: bpy.types.Object) -> None:
 
 
 def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:
-    """Add the light that gel and acrylic hold, which goes with the LEDs' power."""
+    """Add the light scattered in gel and acrylic (``held_light``), which follows the LEDs' power."""
     held_light.write(gel, unit)
     gel.visible_shadow = False  # its dome, higher than the calibrated gel's, would hide the LEDs from its edges
     material = coating_of(gel)

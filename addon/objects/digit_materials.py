@@ -1,7 +1,6 @@
 """Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with.
 
-Acrylic and housing reflect toward a camera alone: what they give the gel is part of the light held
-in it (``held_light``), as the calibration counts it.
+Acrylic and housing reflect toward a camera alone: what they reflect onto the gel is part of its ``held_light``.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from ...tactile_core.sensors.calibration import DIFFUSE, Coating
 from .node_group import Nodes
 from .surfaces import new_material
 
-LIT = "Lit by LEDs"  # attribute of a gel's points, 1: only these have an outer side with LEDs below it
+LIT = "Lit by LEDs"  # attribute of a gel's points, 1; other meshes with the material lack it
 ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
 _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
 
@@ -38,9 +37,9 @@ def new_coating(coating: Coating) -> bpy.types.Material:
 
 
 def keep_leds_inside(material: bpy.types.Material) -> None:
-    """Tilt the normals of a lit gel's outer side up, so that LEDs below its rim do not colour it; its inner side stays.
+    """Tilt the normals of a lit gel's outer side up, so that LEDs below its rim do not colour it.
 
-    Light goes through the whole body, so that the gel's outer side has no shadow from it either.
+    The body throws no shadow on that side. Normals of the inner side stay.
     """
     nodes = Nodes(material.node_tree)
     lit = nodes.add("ShaderNodeAttribute", attribute_name=LIT).outputs["Fac"]
@@ -70,7 +69,7 @@ def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
 
 
 def acrylic() -> bpy.types.Material:
-    """Make clear acrylic: it lets all light through, as the calibration has its losses; reflections come on top."""
+    """Make clear acrylic: it passes all light, as its losses are in the calibration, and adds reflections."""
     found = bpy.data.materials.get("DIGIT acrylic")
     if found is not None:
         return found

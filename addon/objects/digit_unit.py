@@ -16,9 +16,9 @@ from . import axes, digit_body, digit_materials, image_frame, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
-_STEP = 1e-7  # m: no movement that anybody meant
-_STRAIGHT = 1e-3  # of a turned camera's axes
-_OFF_BAND = 1e-6  # brightness, levels m^2: a hundred-thousandth of an LED's
+_STEP = 1e-7  # m, largest movement taken for rounding
+_STRAIGHT = 1e-3  # largest component of a turn of the camera's axes taken for none
+_OFF_BAND = 1e-6  # brightness, levels m^2, taken for none: a hundred-thousandth of an LED's
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +55,7 @@ def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.nd
 
 
 def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, ANN202
-    """The unit's LEDs; and, as lamps, what they shine in other bands than their own."""
+    """The unit's LEDs and, as lamps, their light in other bands than their own."""
     found, others = [], []
     things = digit_body.leds_of(gel)
     for k, led in enumerate(unit.leds):
@@ -102,7 +102,7 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
 
 
 def left_out(scene: bpy.types.Scene) -> list[str]:
-    """Say what pictures leave out or change of what a scene asks for: lamps that are no points, blur, views."""
+    """Say what pictures ignore or change of the scene: lamps that are no points, motion blur, view transforms."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     camera = scene.camera

@@ -1,6 +1,6 @@
-"""A mesh attribute of every frame, without a handler: an image looked up by geometry nodes.
+"""A mesh attribute that changes from frame to frame: geometry nodes look it up in an image.
 
-The image has a column a value and a row a frame; it is packed into the .blend, so that the attribute plays
+The image has a column per value and a row per frame; it is packed into the .blend, so that the attribute plays
 without the add-on.
 """
 
@@ -21,7 +21,7 @@ def add(
 ) -> None:
     """Give an object's mesh the attribute ``name``.
 
-    values : (T, k), bool or float; first, step : scene frame of the first row, and frames a row
+    values : (T, k), bool or float; first, step : scene frame of the first row, scene frames per row
     column : name of the int attribute that holds each node's column of ``values``; None: node i has column i
     """
     rows, columns = values.shape

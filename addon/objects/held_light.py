@@ -1,8 +1,8 @@
-"""Light held in gel and acrylic, for Cycles and EEVEE: what a DIGIT's picture at rest has over its lamps' own light.
+"""Light held in gel and acrylic, for Cycles and EEVEE: a DIGIT's picture at rest less its lamps' direct light.
 
-Three attributes of the gel's points hold it, one an LED, in levels of each channel at the calibration's power and an
-albedo of 1; the coating's material adds them to what the lamps give, as bright as the LEDs and the albedo are now. With
-the camera's response, which mixes the LEDs' colours, a lamp can be brighter than the picture: then it is negative.
+Three attributes of the gel's points hold it, one per LED, in levels of each channel at the calibration's power and an
+albedo of 1. The coating's material adds them to the lamps' light, scaled by the present power and albedo. As the
+camera's response mixes the LEDs' colours, a lamp can be brighter than the picture: the held light is then negative.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from . import digit_materials
 from .node_group import Nodes
 
 NODE = "Held light"  # the sum of the LEDs' parts, in the material
-_DARKEST = 1e-3  # of an albedo or a radiance that is divided by
+_DARKEST = 1e-3  # least albedo or radiance to divide by
 
 
 def attribute(colour: str) -> str:
@@ -74,10 +74,10 @@ def _lamp_light(unit: Calibration) -> np.ndarray:
 
 
 def add_nodes(material: bpy.types.Material) -> None:
-    """Let a coating glow by the attributes, on its inner side and toward a camera alone.
+    """Let a coating emit the held light, on its inner side and toward a camera alone.
 
-    Its inner side reflects no light onto itself either: the held light has all that the gel reflects so at rest, a
-    part of a level, and Blender's gel, whose dome (the public mesh's) is three times as high, would add more.
+    Its inner side then reflects no light onto itself: the held light includes that, a part of a level at rest, and
+    Blender's gel, whose dome (the public mesh's) is three times as high, would add more.
     """
     nodes = Nodes(material.node_tree)
     for left in [node for node in nodes.tree.nodes if node.name.startswith(NODE)]:
@@ -105,7 +105,7 @@ def add_nodes(material: bpy.types.Material) -> None:
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
     """Let each part follow its LED's power in its own colour; works without the add-on.
 
-    full : Blender's power, W, of each LED's lamp as bright as the calibration has it
+    full : Blender's power, W, of each LED's lamp in the calibration
     """
     for k, name in enumerate(COLOURS):
         socket = material.node_tree.nodes[attribute(name)].outputs[0]

@@ -27,7 +27,7 @@ _BLOCK = 64  # frames at a time
 class Motion:
     """Movement of a surface: displacements (T, n, 3) m, or the ``file`` that holds them.
 
-    dent : (T,) m, largest displacement of a node; patch : (T, n) bool, what is touched, of a gel
+    dent : (T,) m, largest displacement of a node; patch : (T, n) bool, nodes in contact, of a gel; None of a skin
     """
 
     dent: np.ndarray
@@ -90,7 +90,7 @@ def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
 
 
 def play(thing: bpy.types.Object, file: Path, first: float, step: float) -> None:
-    """Let an object play a file from the scene's frame ``first`` on; step : frames of the scene a frame of the file."""
+    """Let an object play a file from the scene's frame ``first`` on; step : scene frames per frame of the file"""
     modifier = thing.modifiers.get("Tactile") or thing.modifiers.new("Tactile", "MESH_CACHE")
     thing.modifiers.move(list(thing.modifiers).index(modifier), 0)  # what it moves is what the others show
     modifier.cache_format = "PC2"

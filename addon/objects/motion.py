@@ -9,7 +9,7 @@ from ...tactile_core.errors import TactileError
 from ..settings import properties
 from . import axes, curves, mesh_cache
 
-_APPLIED = 1e-4  # m that half of the nodes must be off: no dent is as wide (assumed)
+_APPLIED = 1e-4  # m, median shift of nodes that shows a mesh moved as a whole: no dent is as wide (assumed)
 
 
 def check_rest(*things: bpy.types.Object) -> None:

@@ -11,12 +11,12 @@ from . import style_nodes, styles, surfaces
 from .node_group import NodeGroup
 
 _LONG, _HIGH, _LETTERS = 18.0, 1.8, 2.3  # mm
-_EDGE, _LIFT = 1.0, 0.3  # mm of the card round what stands on it, and under it: views tell .05 apart from near alone
+_EDGE, _LIFT = 1.0, 0.3  # mm, the card's margin, and its distance below its content: views resolve .05 only from near
 _GAP = 1.5  # mm between sensor and card, as the camera sees them
 _INK, _CARD = (0.95, 0.95, 0.95), (0.03, 0.03, 0.035)
 _MIDDLE, _HALF = "Middle", "Half"
-_NEAR = 3.0  # times half a sensor's diagonal: a camera this near is the sensor's own, or a new file's hidden one
-# Without a camera to look by: the turn of a new file's view.
+_NEAR = 3.0  # times half a sensor's diagonal: a nearer camera is the sensor's own, or a new file's hidden one
+# Rotation of a new file's view, used without a camera.
 _NO_CAMERA = Quaternion((0.7124, 0.4411, 0.2874, 0.4641)).normalized().to_euler()
 _Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # corners (n, 2) mm, triangles (m, 3), colours (n, 3)
 

@@ -30,7 +30,7 @@ RAMPS = {
 ARROW = (0.95, 0.15, 0.55)
 NAMES = {"DISPLACEMENT": "Tactile Displacement", "CONTACT_PATCH": "Tactile Contact Patch",
          "ELECTRODES": "Tactile Electrodes", "FORCE_ARROW": "Tactile Force Arrow"}  # fmt: skip
-_EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, where its colour begins and ends to fade
+_EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, between which its colour fades
 
 
 def group(style: str) -> bpy.types.NodeTree:
@@ -163,7 +163,7 @@ def _near_electrodes(nodes: NodeGroup, colour: bpy.types.NodeSocket) -> bpy.type
 def _above_error(
     nodes: NodeGroup, colour: bpy.types.NodeSocket, moved: bpy.types.NodeSocket, error: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
-    """The colour where a place has moved by the error or more, the greyer the less it has."""
+    """The colour where displacement reaches the error; greyer the smaller it is."""
     length = nodes.vector("LENGTH", moved)
     share = nodes.math("DIVIDE", length, nodes.math("MAXIMUM", error, 1e-9))
     return _over_grey(nodes, nodes.math("MINIMUM", share, 1.0), colour)

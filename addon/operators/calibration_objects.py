@@ -27,7 +27,7 @@ class TACTILE_OT_reset_to_calibration(OnGel, TactileOperator):
     bl_label = "Reset to Calibration"
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         gel = properties.gel_of(context.scene, context.object)
         properties.check_own(gel)
         gel.tactile.object_reflectance = 0.0
@@ -45,7 +45,7 @@ class TACTILE_OT_save_as_calibration(OnGel, TactileOperator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         gel = properties.gel_of(context.scene, context.object)
         base = render_settings.calibration_of(context.scene, properties.sensor_name(gel))
         shown = digit_unit.shown_unit(gel, context.evaluated_depsgraph_get(), base)

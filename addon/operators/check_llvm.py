@@ -16,7 +16,7 @@ class TACTILE_OT_check_llvm(TactileOperator):
     bl_options = {"REGISTER"}  # noqa: RUF012 (no part of the file)
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("mitsuba")
         close_all()  # workers that draw keep the library they began with
         with JobFolder() as folder:

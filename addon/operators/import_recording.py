@@ -74,7 +74,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     )
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``: of several files the good ones are imported, and each bad one is reported."""
+        """Import the files; of several, the good ones are imported, and each bad one is reported."""
         done, paths, timed = 0, self._paths(), False
         for path in paths:
             try:
@@ -133,7 +133,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         return int(frames[-1])
 
     def _keep_scene(self, scene: bpy.types.Scene) -> str:
-        """Leave units and frame rate of a scene that holds something already, unless asked for; what was kept."""
+        """Keep units and frame rate of a scene that is not empty, unless asked to set them; returns what was kept."""
         if self._in_millimetres(scene):
             axes.use_millimetres(scene)
         if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:

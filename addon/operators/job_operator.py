@@ -9,7 +9,7 @@ import bpy
 from ..process.jobs import Job, JobFolder
 from ..settings.reports import Refused, TactileOperator, reported
 
-_STEP = 0.1  # s between two looks at the worker
+_STEP = 0.1  # s between polls of the worker
 
 
 class JobOperator(TactileOperator):
@@ -21,7 +21,7 @@ class JobOperator(TactileOperator):
     _timer: bpy.types.Timer | None = None
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Set ``_folder`` and ``_job``, or neither with nothing to wait for; raises TactileError."""
+        """Start the job, setting ``_folder`` and ``_job``; neither if nothing is to be waited for. Raises TactileError."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context) -> None:

@@ -103,7 +103,7 @@ class TACTILE_OT_live_picture(TactileOperator):
         return is_on() or properties.can(cls, lambda: properties.needed_gel(context.scene))
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         global _live
         if is_on():
             switch_off()

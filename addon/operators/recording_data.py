@@ -38,7 +38,7 @@ _MOVED = "displacement_biotac", "displacement_digit"  # of skin and gel
 class Translated:
     """A recording, the numbers (T,) of its translated frames, their signals and translation, and the networks used.
 
-    skin, gel : their movements; where files hold them, the translation has no displacements: (T, 0, 3)
+    skin, gel : their movements; if files hold these, the translation's displacements are empty, (T, 0, 3)
     """
 
     translator: Translator
@@ -50,12 +50,12 @@ class Translated:
     gel: Motion
 
     def fits(self, motion: str) -> bool:
-        """Return true if the movements are where ``in_files`` wants them: in files that exist, or in memory."""
+        """Return true if the movements are stored as ``in_files`` asks: in files that still exist, or in memory."""
         files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the values (T,) or (T, k) of the skin's custom properties by name; the force in Blender's axes."""
+        """Return the skin's custom properties by name, (T,) or (T, k); forces are in Blender's axes."""
         translation = self.translation
         values = {
             "electrodes": self.signals.change,
@@ -124,7 +124,7 @@ def _absolute(path: str) -> str:
 
 
 def _changed(path: str) -> int:
-    """Return when a file was changed, ns; 0 where that is not known: its reader says what is wrong."""
+    """Return when a file was changed, ns; 0 if it cannot be read, which its reader then reports."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError:
@@ -216,9 +216,9 @@ def _in_memory(pair: tuple[str, str], parts: Iterator[Translation]) -> tuple[Tra
 def _in_files(
     pair: tuple[str, str], parts: Iterator[Translation], frames: int, name: str, key: tuple
 ) -> tuple[Translation, Motion, Motion]:
-    """Join a translation without its displacements, which go into files as they come; ``_in_memory`` else.
+    """Join a translation and write its displacements into files part by part; returns the movements of skin and gel.
 
-    name, key : of the recording and all that the files depend on, by which they are named: none replaces another
+    name : of the recording; key : all that the files depend on; both make the files' names, so that none is replaced
     """
     token, folder = hashlib.sha256(repr(key[:-1]).encode()).hexdigest()[:8], kept_files.folder(kept_files.CACHE)
     files = [folder / f"{bpy.path.clean_name(f'{name} {sensor} {token}')}.pc2" for sensor in pair]

@@ -69,7 +69,7 @@ class TACTILE_OT_set_up_render(OnGel, TactileOperator):
     bl_label = "Set Up Render"
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         scene = context.scene
         gel = properties.needed_gel(scene, context.object)
         properties.check_own(gel)

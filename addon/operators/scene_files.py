@@ -32,7 +32,7 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("msgspec")
         from ...tactile_core.simulation.scene import load_scene
 
@@ -103,7 +103,7 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
         return super().invoke(context, event)
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("msgspec")
         from ...tactile_core.simulation.scene import write_scene
 
@@ -131,7 +131,7 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
     filter_glob: bpy.props.StringProperty(default="*.xml", options={"HIDDEN"})
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("OpenEXR")
         gel = properties.needed_gel(context.scene, context.object)
         shown, moved = pictures.shown_state(gel, context.evaluated_depsgraph_get())

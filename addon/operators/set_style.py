@@ -39,7 +39,7 @@ class TACTILE_OT_set_style(TactileOperator):
     )  # fmt: skip
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         sensors = _sensors(context)
         if self.style == "ELECTRODES" and not any(map(_counts, sensors)):
             raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
@@ -135,7 +135,7 @@ class TACTILE_OT_force_arrow(TactileOperator):
     )
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         sensors = [thing for thing in _sensors(context) if "force" in thing]
         if not sensors:
             raise TactileError("Tactile", "no force", "a recording or a simulation", "Import, translate or simulate")

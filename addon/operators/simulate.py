@@ -61,7 +61,7 @@ class TACTILE_OT_simulate(JobOperator):
                         first_frame=context.scene.frame_start, rate=scene_bridge.rate_of(context.scene))  # fmt: skip
 
     def finish(self, context: bpy.types.Context) -> None:
-        """See ``JobOperator``."""
+        """Bake the simulation into the scene; see ``JobOperator``."""
         thing = context.scene.objects.get(self._thing)
         if thing is None:
             raise TactileError(self._thing, "no longer in the scene", "the indenter that was simulated")

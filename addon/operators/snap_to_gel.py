@@ -73,7 +73,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
         return any(properties.of_role(scene, role) for role in ("DIGIT", "BIOTAC"))
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("msgspec")
         thing, sensor = indenter_of(context), sensor_of(context)
         properties.check_own(thing)

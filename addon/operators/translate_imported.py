@@ -38,7 +38,7 @@ class TACTILE_OT_translate(JobOperator):
         return True
 
     def begin(self, context: bpy.types.Context) -> None:
-        """See ``JobOperator``: a job is started only for a gel that no networks lead to, whose contacts are solved."""
+        """Translate; start a job only for a gel that no networks lead to, whose contacts are solved."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin)
@@ -67,7 +67,7 @@ class TACTILE_OT_translate(JobOperator):
             self._job = Job("solve_gel", self._folder.path, gel=self._target, found_on=own)
 
     def finish(self, context: bpy.types.Context) -> None:
-        """See ``JobOperator``."""
+        """Add the gel, or animate the one that is there, with the translation; see ``JobOperator``."""
         if self._job is not None:
             with np.load(self._folder.path / "gel.npz") as stored:
                 self._moved = mesh_cache.in_memory(stored["displacement"], self._target)

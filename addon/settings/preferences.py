@@ -38,7 +38,7 @@ class TACTILE_OT_clear_cache(TactileOperator):
         return context.window_manager.invoke_confirm(self, event)
 
     def work(self, _context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         known = array_cache.entries()
         size = sum(map(size_of, known))
         for folder in known:

@@ -29,7 +29,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
     )
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         scene = context.scene
         name = self.sensor.lower()
         role = properties.role_of(name)
@@ -86,7 +86,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
                 self.layout.prop(self, size.slider)
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         require("msgspec")
         import msgspec
 
@@ -128,7 +128,7 @@ class TACTILE_OT_use_as_indenter(TactileOperator):
         return True
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         thing, sensor = context.object, sensor_of(context)
         indenter_objects.check_pose(thing, indenter_objects.world_axes(thing, sensor))
         about = properties.set_up(thing, "INDENTER", sensor.tactile.per_metre)

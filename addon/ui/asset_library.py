@@ -76,7 +76,7 @@ class TACTILE_OT_install_styles(TactileOperator):
     bl_options = {"REGISTER"}  # noqa: RUF012 (changes preferences, not the file)
 
     def work(self, _context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         install()
         self.report({"INFO"}, f'Asset library "{NAME}": {folder()}')
 

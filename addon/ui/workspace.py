@@ -31,7 +31,7 @@ class TACTILE_OT_open_workspace(TactileOperator):
         return context.window is not None and not bpy.app.background
 
     def work(self, context: bpy.types.Context) -> None:
-        """See ``TactileOperator``."""
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
         if NAME in bpy.data.workspaces:
             context.window.workspace = bpy.data.workspaces[NAME]
             return
