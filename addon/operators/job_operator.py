@@ -21,7 +21,7 @@ class JobOperator(TactileOperator):
     _timer: bpy.types.Timer | None = None
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Start the job, setting ``_folder`` and ``_job``; neither if nothing is to be waited for. Raises TactileError."""
+        """Start the job: set ``_folder`` and ``_job``, or neither with nothing to wait for. Raises TactileError."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context) -> None:

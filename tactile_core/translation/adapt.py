@@ -28,19 +28,19 @@ from .reference_signals import ReferenceSignals
 from .unit_rest import Simulated, UnitRest, find_rest, find_rest_sp, read_rest
 from .weights import read_card
 
-FEWEST_FRAMES = 50  # in contact, half a second: less holds no contact worth the name (assumed)
-MOST_FRAMES = 3_000  # looked at, evenly spread; neighbours at 100 Hz say the same
-FEWEST_CONTACTS = 5  # different ones: fewer tell no gain from the contact itself (assumed)
+FEWEST_FRAMES = 50  # in contact, half a second (assumed)
+MOST_FRAMES = 3_000  # looked at, evenly spread: neighbours at 100 Hz are alike
+FEWEST_CONTACTS = 5  # different ones: fewer do not separate gains from the contacts (assumed)
 FEW_CONTACTS = 20  # different ones; with fewer, gains of 30 % are found to 20 % only (simulated contacts at one place)
-# Error of gains over the scatter of those found, LEAST_LEFT + LEFT / sqrt(different contacts): measured, made-up units
-# of 15 and 30 % scatter, 15 to 320 different contacts, with noise (tests/translation/test_adapt.py). What is found is
-# shrunk towards 1, the more so the fewer contacts there are; matching by wrong gains leaves the rest.
+# Error of gains over the scatter of those found, LEAST_LEFT + LEFT / sqrt(different contacts): measured on simulated
+# units of 15 and 30 % scatter, 15 to 320 different contacts, with noise (tests/translation/test_adapt.py). Gains are
+# shrunk towards 1, more with fewer contacts; the rest comes from matching by wrong gains.
 LEAST_LEFT, LEFT = 0.17, 6.3
 BETWEEN = 3600.0  # s between two recordings of a unit, in which its fluid's conductivity may drift (assumed)
-TOUCHED = 2.0  # contacts that tell an electrode's gain; below, it is not fitted (assumed)
-MOVED = 5.0  # counts that the 99 % level of an electrode must reach, three times the noise: else it was never touched
+TOUCHED = 2.0  # least contacts that determine an electrode's gain, for it to be fitted (assumed)
+MOVED = 5.0  # counts, least 99 % quantile of an electrode that was touched: three times the noise
 SHOWN = 3  # names spelled out
-LARGEST_OFFSET = 30.0  # counts; more is no tare error but a match gone wrong (assumed)
+LARGEST_OFFSET = 30.0  # counts; a larger one is a wrong match, not a tare error (assumed)
 
 
 @dataclass(frozen=True)

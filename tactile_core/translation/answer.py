@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import TactileError
 
-CONTACTS = 1, 2  # looked for in a frame
-MOST_SAMPLES = 100  # contacts a frame; 50 bytes each (assumed: more tell nothing new)
+CONTACTS = 1, 2  # that may be looked for in a frame
+MOST_SAMPLES = 100  # contacts per frame; 50 bytes each (assumed enough)
 FARTHEST = 25.0  # mm, the gel's length: beyond, no contact of the BioTac lies on it
 Estimate = Literal["likely", "mean"]
 LIKELY: Estimate = "likely"

@@ -107,11 +107,11 @@ def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = 
             raise TactileError(f"{path}, nets.{net}", f"{size} {sizes[net][size]}", f"{expected}", ADVICE)
 
 
-DOUBT = "doubt"  # in a card: a sentence on what no real sensor has shown of its translations
-REST = "rest_counts"  # in a card: counts at rest that changes are those of, where the sensor's table holds none
+DOUBT = "doubt"  # in a card: a sentence on what was not checked on real sensors
+REST = "rest_counts"  # in a card: counts at rest of the unit whose changes it takes, if the sensor's table has none
 
 ROW, SET = "chain_rms_um", "test presses"  # BioTac signals to the gel's displacement, rms over its nodes
-WORSE = 0.8  # of the baseline, the error of no displacement at all: above it weights hardly translate (assumed)
+WORSE = 0.8  # error over that of zero displacement, above which weights hardly translate (assumed)
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
@@ -153,7 +153,7 @@ def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
 LEVEL = 0.95  # share of frames whose error the bound covers
 EDGES = (-14e-3, -8e-3, -2e-3)  # m, x of the contact's middle: tip, first and last electrodes, base (assumed)
 REGIONS = len(EDGES) + 2  # results without contact first
-FEWEST = 100  # contacts of a place: of fewer the 95 % quantile says little, and the factor of all counts (assumed)
+FEWEST = 100  # contacts in a region; with fewer the factor of all contacts is used (assumed)
 KINDS = ("signed", "rectified")
 
 

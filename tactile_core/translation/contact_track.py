@@ -20,25 +20,23 @@ from .card import PLACE, STATE
 from .layers import COMPRESSED_LIMIT
 from .posterior import LEAST_TOUCH, Posterior, touches
 
-# Standard deviation of what a state changes by in 10 ms. Places are in tens of cells of the gel, 0.4 mm each: 0.18 mm;
-# asinh of force and depth 0.6, which a tap that is over in 50 ms still reaches (chosen on the shipped recording with
-# gains off).
+# Standard deviation of a state's change in 10 ms: of place, in tens of the gel's cells of 0.4 mm, 0.18 mm; of asinh of
+# force and depth 0.6, which allows a tap of 50 ms (chosen on the shipped recording with gains off).
 STEP = np.array([0.045, 0.045, 0.6, 0.6])
-# Of rectified signals, whose places err by more and together: their steps of place are that much shorter (chosen on
-# sample 7 of the slides with the weights before these: rank of force .905 to .926, spread of place along the finger
-# .71 to .51 mm).
+# Factor on the steps of place of rectified signals, whose errors are larger and correlated (chosen on sample 7 of the
+# slides with the weights before these: rank of force .905 to .926, spread of place along the finger .71 to .51 mm).
 RECTIFIED_STEP = 0.3
-# Standard deviations of the logarithm of force over the signals' size: of its change in 10 ms, and of a frame's
-# estimate (chosen on scenes/training/test_sequences.npz with the weights before these: force 8.6 % to 7.8 %; from .05
-# to .15, and .2 for the second, within .1). Within a simulated press force goes with size to the power .98 (50,000
-# pairs), so that no lag comes of it. A first ratio is left as free as a place that may be anywhere.
+# Standard deviations of log(force / signal size): of its change in 10 ms, and of a frame's estimate (chosen on
+# scenes/training/test_sequences.npz with the weights before these: force 8.6 % to 7.8 %; from .05 to .15, and .2 for
+# the second, within .1). Smoothing it causes no lag: within a simulated press force grows as size^.98 (50,000 pairs).
+# The first ratio is as free as a place that may be anywhere.
 RATIO_STEP, RATIO_NOISE = 0.05, 0.1
 LEAST_SIZE = 0.1  # counts, below any reading's noise: a logarithm's floor
 FRAME = 0.01  # s
-GAP = 0.1  # s without a frame: nothing is known of what happened meanwhile (assumed)
+GAP = 0.1  # s without a frame, after which the path starts anew (assumed)
 ANYWHERE = 3.0  # tens of cells: the standard deviation of a place that may be anywhere on the gel
-JUMP = 8.0  # price of a jump in mid-contact: that of a step of four standard deviations (assumed)
-BLOCK, MARGIN = 256, 64  # frames smoothed at once, and how many more are read on either side (a course forgets sooner)
+JUMP = 8.0  # cost of a jump in mid-contact, that of a step of four standard deviations (assumed)
+BLOCK, MARGIN = 256, 64  # frames smoothed at once, and read in addition on either side: farther ones have no effect
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,7 @@ class Tracker:
         self._kept: tuple[int, Evidence, np.ndarray] | None = None
 
     def __call__(self, frames: np.ndarray) -> tuple[Evidence, np.ndarray]:
-        """Return evidence and states (n, STATE) of rising frames (n,); which others are asked for changes none."""
+        """Return evidence and states (n, STATE) of rising frames (n,); a frame's do not depend on the others asked."""
         blocks, parts, states = frames // BLOCK, [], []
         for block in np.unique(blocks):
             evidence, state = self._block(int(block))

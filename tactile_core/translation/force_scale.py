@@ -1,6 +1,5 @@
-"""Find how stiff a unit is from a measured force: one scale of force and pressure, judged on what it was not fitted to.
-A stiffer skin gives the same electrodes for the same dent at a larger force and pressure, so that no signal shows
-it."""
+"""Find how stiff a unit is from a measured force: one scale of force and pressure, judged on frames not fitted.
+Signals cannot show it: a stiffer skin has the same ones for the same dent, at a larger force and pressure."""
 
 from __future__ import annotations
 
@@ -23,10 +22,10 @@ from .translator import Translator
 MOST_FRAMES = 3_000  # translated of a recording, evenly spread
 FEWEST_FRAMES = 50  # beside a force, half a second (assumed)
 LAGS = np.round(np.arange(-1, 1.001, 0.01), 2)  # s, of the force behind the electrodes, that are tried (assumed)
-# Correlation of measured and translated force, at the lag where they agree best, below which they are not of one touch:
-# noise beside 180 frames reaches .24, time itself .33 (the shipped recording).
+# Least correlation of measured and translated force of one touch, at the best lag: against the shipped recording's 180
+# frames noise reaches .24, the time itself .33.
 TOGETHER = 0.4
-PARTS = 8  # of the frames, whose scales say by their scatter how far the scale is known
+PARTS = 8  # of the frames; the scatter of their scales gives the scale's error
 
 
 @dataclasses.dataclass(frozen=True)

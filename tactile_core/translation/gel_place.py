@@ -15,10 +15,10 @@ from .card import PLACE
 from .contact_frame import PLACE_UNIT, ContactFrame, between_nodes
 from .posterior import Posterior, touches
 
-STEPS = 8  # of Newton's method; it ends in three on our lattice, whose cells are nearly squares
+STEPS = 8  # of Newton's method; three suffice on our lattice, whose cells are nearly squares
 FADE = 5e-3  # m beside the gel, over which a moved field fades out (assumed: a step at its rim would show in pictures)
-SMALL = 1e-3  # cells, over which a slope is taken
-APART = 3e-3  # m, from which on two places are two contacts' (assumed)
+SMALL = 1e-3  # cells, step of a finite difference
+APART = 3e-3  # m, least distance of two different contacts (assumed)
 
 # Of the contact patch:
 SMOOTH = 0.7  # cells, width of the Gaussian that keeps the curvature from following single nodes
@@ -28,7 +28,7 @@ DEEP = 0.1  # of the largest depth; all three chosen together on 1,500 contacts 
 # 82 % at best; in the full tier it finds 79 % (docs/translation.md)
 FLOOR = 5e-6  # m: a dent less deep is no contact. It moves a picture by one level at most, where the camera's own noise
 # is 2 to 3 levels (docs/sources.md, DIGIT camera): no sensor of this kind could tell it from rest.
-_MARGIN = 20  # cells of rest round the lattice, so that opposite rims do not meet in the Fourier sums
+_MARGIN = 20  # cells of zero padding round the lattice, as the Fourier transform is periodic
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:

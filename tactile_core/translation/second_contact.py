@@ -15,8 +15,8 @@ from .layers import compress, in_blocks, residual
 from .networks import Networks
 from .posterior import touches
 
-FINE = 5.0  # times finer than the networks' scale is the second one that `parts` sees: at 3 counts noise begins
-PARTED = 0.25  # of the signal's length, the unit of half the difference between both parts (assumed)
+FINE = 5.0  # ratio of the networks' scale, 15 counts, to that of the second input of `parts`: 3 counts, as noise is
+PARTED = 0.25  # unit of half the difference of both parts, over the signal's length (assumed)
 
 
 class SecondContact(NamedTuple):

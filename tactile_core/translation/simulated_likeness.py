@@ -38,18 +38,18 @@ LEFT_BY_TWO, MORE_BY_ONE = 0.25, 0.17
 UNLIKE = 0.6
 # Cosine of two patterns, above which they are the same contact, a little moved or pressed (assumed).
 ALIKE = 0.6
-# Of the size of a signal on the networks' scale, the most that the nearest simulated one may leave of it. Chosen on
-# sample 7 of the slides (2 frames in 1,000 within): at .25 the rank of force stays .908 (quartile .879); with a fifth
-# of the posterior left to R2MPN the quartile falls to .86 at .28, to .81 at .33. Of the test contacts half are within,
-# of those from 0.3 mm two in three.
+# Largest share of a signal, on the networks' scale, that the nearest simulated one may leave for signs to be recovered.
+# Chosen on sample 7 of the slides (2 frames in 1,000 are within): at .25 the rank of force stays .908 (quartile .879);
+# with a fifth of the posterior left to R2MPN the quartile falls to .86 at .28, to .81 at .33. Half of the test contacts
+# are within, two in three of those from 0.3 mm.
 LEFT = 0.25
-# Length, counts, below which a change is noise: 19 electrodes of 1.5 have 6.5 (assumed).
+# Length, counts, below which a change is noise: 19 electrodes with 1.5 counts each have 6.5 (assumed).
 FAINT = 8.0
 # Most of the estimated pressure over the fluid's own, and of that over it: .24 to 1.7 on real grips and slides.
 # FELT : Pa, some 4 counts of PDC, its noise (assumed).
 MOST_OVER, MOST_BELOW, FELT = 2.0, 5.0, 150.0
 DRIFT = 1.1  # of the films' impedance, by which its pattern is drawn (assumed; it hardly depends on it)
-FIRST = 64  # patterns, the most similar to the signal, that one of the two is looked for among: an eighth of the work
+FIRST = 64  # patterns most like the signal, of which one must be among the two: an eighth of the work
 
 
 @dataclass(frozen=True)

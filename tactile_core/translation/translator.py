@@ -26,7 +26,7 @@ from .posterior import FORCE_SCALE, touches
 from .second_contact import second_contact, told_apart
 from .simulated_likeness import Patterns, contradicted, recovered, residual_shares, two_contacts, unlike
 
-# Frames that differ from training in kind, not in degree, are worth little.
+# Flags of frames that differ from the training in kind, whose confidence is at most UNTRAINED_CONFIDENCE.
 UNTRAINED = Flag.NO_QUIET_PART | Flag.SATURATED | Flag.DEAD_CHANNEL | Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE
 UNTRAINED |= Flag.UNEXPLAINED
 UNTRAINED_CONFIDENCE = 0.2  # assumed
@@ -37,8 +37,8 @@ EXPLAINED, WITHIN = (-0.6, 0.2, 1.0), (0.78, 0.96, 1.0)
 # (scripts/evaluate_translation.py --held-out) it flags half of that part's frames, and most of those it should. The
 # largest change of deep contacts at the tip is three times what 99 % of the contacts stay below, and is trained.
 IN_RANGE = {"mahalanobis": 0.99, "residual": 0.99, "largest": 0.999}
-UNDECIDED = 0.3  # share of the posterior that lies elsewhere, from which on a place is undecided (assumed)
-LEAST_SQUARE = 1.0  # counts^2 of all electrodes' change, below any reading's noise: what no contact makes
+UNDECIDED = 0.3  # share of the posterior elsewhere from which a place counts as undecided (assumed)
+LEAST_SQUARE = 1.0  # counts^2, sum over electrodes, least one to divide by: below any reading's noise
 SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterior
 
 
@@ -161,7 +161,7 @@ class Translator:
         skin = nets.decode_source(latent_source) * touched[:, None, None]
         gel = nets.decode_target(latent_target) * touched[:, None, None]
         gel = self._mounted(gel)
-        # Noise makes a contact of one frame now and then, but none that its neighbours bear out.
+        # Noise now and then makes a contact in one frame, but not in its neighbours too.
         least = self.silent("digit_m") if alone else STILL
         center = contact_center(gel, sensors.sensor_surface(self.target).rest, least)
         silent = np.isnan(center[:, 0])

@@ -22,9 +22,9 @@ from ..sensors import COUNT_MAX, divider
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)
 LEAST_PRESSED = 0.25  # share of the recordings, those of the lowest pressure, whose mean is taken for rest
 SPREAD_OVER = 0.5  # share of the recordings whose range estimates the error of rest
-LEAST_LOADED = 0.1  # share of a BioTac SP's readings of an electrode whose median its rest is first taken for (assumed)
-FRAMES, STEPS = 500, 40  # looked at, evenly spread; towards what simulated contacts leave (more change nothing)
-SIZES = 0.5, 2.0  # of a simulated contact's changes, that a real one's may be (assumed)
+LEAST_LOADED = 0.1  # share of a BioTac SP's highest readings of an electrode, whose median is the first rest (assumed)
+FRAMES, STEPS = 500, 40  # frames used, evenly spread; steps of rest toward the residual (more change nothing)
+SIZES = 0.5, 2.0  # least and largest size of a real contact's changes over a simulated one's (assumed)
 SMALL = 1000.0  # counts, root of the sum of squares: smaller changes weigh less. Chosen on one half of 35 recordings
 THICKNESSES = 1.0, 0.7, 0.5, 0.35  # of the films over a typical unit's, that are tried
 
