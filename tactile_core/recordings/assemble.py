@@ -23,6 +23,12 @@ MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
 MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
+LOOKED_AT = 10_000  # rows, by which fingers that take turns are found
+MOST_FINGERS = 5
+TURNS = 5  # times the change in a whole turn, the change to the next row (assumed; without turns it is the smaller)
+NOISE = (
+    1e-3  # of a reading (assumed; in real recordings rows change by 5 counts and less, units rest 50 apart and more)
+)
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 
@@ -109,6 +115,8 @@ def assemble(
         stamps = np.arange(frames) / SAMPLE_RATE
         notes += [] if snapshots else [f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed"]
     _check_share(path, np.any(bad, axis=1), problems, row_word)
+    if not snapshots:
+        _refuse_turns(path, electrodes[:LOOKED_AT])
     seconds, start, jumps, of_clock = clock_of(stamps, rows, row_word)
     clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
@@ -128,6 +136,22 @@ def assemble(
         labels=labels or {},
         **clean,
     )
+
+
+def _refuse_turns(path: str, electrodes: np.ndarray) -> None:
+    """Raise TactileError where fingers take turns: a row of readings (T, e) is like one some rows before, and unlike
+    the one before."""
+
+    def change(rows: int) -> float:
+        """Return the median change of an electrode in so many rows."""
+        return float(np.nanmedian(np.abs(electrodes[rows:] - electrodes[:-rows])))
+
+    if len(electrodes) < TURNS * MOST_FINGERS:
+        return
+    for count in range(2, MOST_FINGERS + 1):
+        if change(1) > TURNS * max(change(count), NOISE * float(np.nanmedian(np.abs(electrodes)))):
+            found = f"rows of {count} fingers take turns: each is like that {count} rows before, unlike the one before"
+            raise TactileError(path, found, "one recording", "Split the file: a file for each finger")
 
 
 def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from .array_store import Store
 from .assemble import check_electrodes
 from .bags.bag import open_bag
 from .bags.bag_recordings import names_of, read_bag, streams_of
+from .formats import MAP_ADVICE
 from .opened_file import opened, refuse_finger
 from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
@@ -30,7 +31,6 @@ from .tables.table_header import NUMBERED
 from .tables.truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
-MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
 PAC = re.compile(r"pac\d+")
 
 

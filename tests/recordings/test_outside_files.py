@@ -196,6 +196,31 @@ def test_fingers_that_take_turns_are_not_mixed(by_value, press, tmp_path):
         read_by_guess(tmp_path / "a.csv")
 
 
+@pytest.mark.parametrize("fingers", [2, 5])
+def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp_path):
+    apart = 50 * np.arange(fingers)[:, None]  # counts; units rest 52 and more apart
+    rows = (press.electrodes[:, None] + apart).reshape(-1, 19)
+    np.savez(tmp_path / "a.npz", electrodes=rows, time=np.arange(len(rows)) / (100 * fingers))
+    with pytest.raises(TactileError, match=rf"rows of {fingers} fingers take turns.*Split the file: a file for each"):
+        recordings.read(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("names", ["E{}_tared", "filtered_E{}", "delta/E{}"])
+def test_raw_electrodes_are_taken_before_processed_ones(names, press, tmp_path):
+    processed = [names.format(i) for i in range(1, 20)]
+    rows = np.column_stack([press.time, press.electrodes - press.electrodes[0], press.electrodes])
+    header = ",".join(["time", *processed, *NAMES[1:]])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=header, comments="", fmt="%g")
+    np.testing.assert_array_equal(read_by_guess(tmp_path / "a.csv").electrodes, press.electrodes)
+
+
+def test_arrays_of_electrodes_first_are_refused_with_the_way_to_read_them(press, tmp_path):
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes.T, time=press.time)
+    with pytest.raises(TactileError, match=r"shape \(19, 700\); expected \(frames, 19\). Transpose it, or give a map"):
+        recordings.read(tmp_path / "a.npz")
+    np.testing.assert_array_equal(read_by_guess(tmp_path / "a.npz").electrodes, press.electrodes)
+
+
 def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tmp_path):
     (tmp_path / "a.csv").write_text(clock("%m/%d/%Y %I:%M:%S.%f %p")(press), encoding="utf-8")
     with pytest.raises(TactileError, match=r"'11/08/2012 05:12:03.123000 PM' is not a number; expected .* or times as"):

@@ -115,6 +115,16 @@ def test_a_missing_column_is_named(missing, slide_lines, write):
         recordings.read(write(lines))
 
 
+@pytest.mark.parametrize(("to", "from_"), [("ele{}", 0), ("ele{:02d}", 1)])
+def test_electrodes_counted_otherwise_are_not_taken_for_others(to, from_, slide_lines, write):
+    header, *rows = slide_lines
+    for i in range(1, 20):
+        header = header.replace(f",ele{i}", f",{to.format(i - 1 + from_)}x", 1)
+    path = write([header.replace("x,", ",").rstrip("x"), *rows])
+    with pytest.raises(TactileError, match=r"column 'ele0\d?' and no 'ele\d+'; expected ele1 .. ele19. Name its"):
+        recordings.read(path)
+
+
 def test_stamps_that_go_back_or_leave_a_gap_are_flagged_and_kept(press, make, in_layout):
     press.time[100:] -= 0.5
     press.time[300:] += 0.03

@@ -12,16 +12,21 @@ it. An HDF5 layout has also ``ELECTRODES_NAME``, the array whose length is the n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
+from ...errors import TactileError
 from ...sensors import ELECTRODES, SP, electrode_count
 from ..array_store import Store
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
 from ..tables.table import Table
+
+MAP_ADVICE = "Name its columns in a map: tactile info FILE --columns map.toml writes one to fill in"
+TURN_ADVICE = "Transpose it, or give a map, which does: tactile info FILE --columns map.toml writes one"
 
 
 def share(keys: Collection[str], wanted: Collection[str]) -> float:
@@ -34,6 +39,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
 
     Missing channels are None, missing electrodes dead channels. Raises TactileError for another missing column, and the
     errors of ``assemble``."""
+    _check_numbers(table, electrodes)
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)
         for channel, names in channels.items()
@@ -56,6 +62,15 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
         tdc=table.column("tdc"),
         **columns,
     )
+
+
+def _check_numbers(table: Table, electrodes: list[str]) -> None:
+    """Raise TactileError where a missing electrode's column has another number: ele0 to ele18, or ele01."""
+    stem, missing = electrodes[0].rstrip("01"), [name for name in electrodes if not table.has(name)]
+    other = [name for name in table.header if re.fullmatch(rf"{stem}\d+", name) and name not in electrodes]
+    if other and missing:
+        found, expected = f"column {other[0]!r} and no {missing[0]!r}", f"{electrodes[0]} .. {electrodes[-1]}"
+        raise TactileError(f"{table.path}, line 1", found, expected, MAP_ADVICE)
 
 
 # A hand's fingers in the order of their numbers.
@@ -101,6 +116,8 @@ def _of_finger(style: str, finger: int) -> list[str]:
 def electrodes_of(store: Store, name: str) -> np.ndarray:
     """Read the array (T, 19) of that name. Raises TactileError for another sensor's, or another shape."""
     shape, kind = store.shapes[name]
+    if len(shape) == 2 and shape[0] == ELECTRODES != shape[1]:
+        raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {ELECTRODES})", TURN_ADVICE)
     if len(shape) == 2 and shape[1] != ELECTRODES:
         check_electrodes(store.path, shape[1], name)
     exact = kind.kind in "iu" and kind.itemsize <= 2  # in single precision, half the memory of a long recording

@@ -22,6 +22,7 @@ CLOCK_LIKE = re.compile(r"\d:\d\d")
 UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
 ELECTRODE = re.compile(r"electrode|(?:^|[^a-z])(?:elec|ele|el|e)[^a-z]*$")
 NOT_READ = re.compile(r"offset|time|stamp|pac|temp|force|joint")  # series of these are no electrodes
+PROCESSED = re.compile(r"tare|filt|smooth|norm|scale|delta|diff|change|mean|std")  # read only where no raw series is
 VALUE = re.compile(r"value|reading|count|data|signal")
 RAW = 0.35 * COUNT_MAX  # least counts at rest (docs/sources.md, BioTac read-out: from 2,000 on)
 SLIDE = 45  # columns of the slide set's layout, of which some files have lost the header
@@ -60,7 +61,8 @@ def _as_long(names: Collection[str], electrodes: tuple[str, ...]) -> Collection[
 
 
 def _series(names: Collection[str]) -> list[tuple[str, ...]]:
-    """List runs of 19 names that differ in one number: those called electrodes, some maybe missing, else any."""
+    """List runs of 19 names that differ in one number: those called electrodes, some maybe missing, else any; of both
+    those that are not called processed, else any."""
     series: dict[tuple[str, str], dict[int, str]] = {}
     for name in names:
         for found in NUMBER.finditer(name):
@@ -71,15 +73,16 @@ def _series(names: Collection[str]) -> list[tuple[str, ...]]:
         if NOT_READ.search(before + after):
             continue
         called = bool(ELECTRODE.search(before + after) or ELECTRODE.search(before.rstrip("[_ .")))
+        rank = not called, bool(PROCESSED.search(before + after))
         for first, last in _consecutive(sorted(each)):
             if last - first == ELECTRODES - 1:
-                runs.append((not called, tuple(each[number] for number in range(first, first + ELECTRODES))))
+                runs.append((rank, tuple(each[number] for number in range(first, first + ELECTRODES))))
         least = 0 if 0 in each else 1
         partial = ELECTRODES // 2 < len(each) < ELECTRODES and max(each) < least + ELECTRODES and min(each) >= least
         if partial and called:
-            runs.append((False, tuple(each.get(number, "") for number in range(least, least + ELECTRODES))))
-    best = min((other for other, _ in runs), default=True)
-    return [names for other, names in runs if other == best]
+            runs.append((rank, tuple(each.get(number, "") for number in range(least, least + ELECTRODES))))
+    best = min((rank for rank, _ in runs), default=None)
+    return [names for rank, names in runs if rank == best]
 
 
 def _consecutive(numbers: list[int]) -> list[tuple[int, int]]:
