@@ -3,8 +3,8 @@
     python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
     python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone
 
-Each command runs in processes of its own on few and on many frames: what is left at none is its start, the rest is
-each frame's. Times are CPU time of one thread; memory is the peak resident size; sizes are those of the files written.
+Each command runs in a process of its own on few and on many frames; a straight line through both gives the cost at the
+start and per frame. Times are CPU time of one thread; memory is peak resident; sizes are those of the files written.
 """
 
 from __future__ import annotations

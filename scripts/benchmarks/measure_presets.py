@@ -156,7 +156,7 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
 def converge(
     unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield each field's change from rest, grey levels (H, W, 3), by direct light alone and by the full model."""
+    """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model."""
     rest = of_unit(rest_height_map(unit.camera), unit)
     light = MatteLight(unit, truth, variant, rest, seed)
     resting, seen = light.direct(rest)

@@ -102,8 +102,8 @@ def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], 
 
 
 def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomContact) -> dict[str, np.ndarray]:
-    """A random contact in one tier, from its file, or solved and kept there; {} where the tier finds none.
-    Arrays by name: number, share of the thickness, displacement (n, 3) m, force N, seconds."""
+    """Return a random contact in one tier, read from its file, or solved and written there; {} if the tier finds none.
+    Arrays by name: number, share (depth over thickness), displacement (n, 3) m, force N (its size), seconds of CPU."""
     path = work / f"{sensor}_{tier}_{SEED}_{number:03d}.npz"
     if tier == "fast" or not path.exists():
         try:

@@ -21,11 +21,11 @@ from tactile_core.mechanics.fast.correction import (
 
 FIELDS = 32  # learned fields a sensor
 _WIDTHS = 2.0, 4.0, 8.0, 16.0  # of the kernel, in standard deviations of a feature
-# Over the kernel's mean diagonal. With a hundredth of it, contacts unlike those learned from were farther off: a ring
-# without tilt by 25 % of force.
+# Ridge over the kernel's mean diagonal. With a hundredth of it the fit extrapolated worse: a ring without tilt was 25 %
+# off in force.
 _RIDGES = 1e-1, 1.0
-MOST = 0.6  # of the logarithm of a force's factor: beyond lie contacts too small for the fast tier's lattice
-WHOLE = np.array([[0.0, 1.0, 1.0]])  # all of what is predicted is trusted
+MOST = 0.6  # limit of the logarithm of a force's factor: beyond, contacts are too small for the fast tier's lattice
+WHOLE = np.array([[0.0, 1.0, 1.0]])  # ``Learned.trust`` of a correction that is applied in full
 
 
 class Known(NamedTuple):
@@ -50,7 +50,7 @@ def mirrored(field: np.ndarray) -> np.ndarray:
 
 
 class Choice(NamedTuple):
-    """Kernel regression's settings. width : standard deviations; ridge : over the mean of the kernel's diagonal"""
+    """Kernel ridge regression's settings: ``width`` of the kernel, ``ridge`` over the mean of the kernel's diagonal."""
 
     width: float
     ridge: float
@@ -115,6 +115,6 @@ def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.
 
 
 def _size(error: np.ndarray) -> float:
-    """Median and mean of the root mean squares of errors (m, k), added."""
+    """Return the sum of median and mean of each row's root mean square, of errors (m, k)."""
     size = np.sqrt((error**2).mean(axis=1))
     return float(np.median(size) + size.mean())

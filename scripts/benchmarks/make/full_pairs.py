@@ -26,12 +26,12 @@ from tactile_core.simulation.scene import Scene
 
 REGION_X = -14e-3  # m: the region of the pad toward the tip, x below this, that a network may be kept from seeing
 SHARES = 0.25, 0.55, 1.0  # of a press's greatest depth on the BioTac, at which it is sampled
-_SHALLOWEST, _DEEPEST = 0.3e-3, 1.5e-3  # m, a press's greatest depth on the BioTac, even between (assumed)
+_SHALLOWEST, _DEEPEST = 0.3e-3, 1.5e-3  # m, a press's greatest depth on the BioTac, uniform between (assumed)
 _SLIDE_MOST = 1e-3  # m, likewise of slides (assumed)
-_SLIDING = 4, 11  # of twelve presses, those that end with a slide: one in the whole gel, one in the region
-# Of eight presses: the box's and the ring's, of which one is in the region; all others share the rest in turn.
+_SLIDING = 4, 11  # numbers, of twelve presses, that end with a slide: one on the whole gel, one in the region
+# Numbers, of eight presses, of the box's and the ring's, one in the region each; other bodies take turns in the rest.
 _BOX, _RING, _OTHERS = (0, 5), (2, 7), (1, 3, 4, 6)
-_TRIES = 12  # steps down to a depth that both sensors bear: to a fourteenth
+_TRIES = 12  # reductions by a fifth to a depth that both sensors bear: to a fourteenth
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,7 +69,7 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
 
 
 def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
-    """The depth, m, on the BioTac, or less, in steps of a fifth, until the DIGIT bears its force by the fast tier."""
+    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier."""
     for _ in range(_TRIES):
         try:
             force = solve(SOURCE, indenter, place, depth=depth, friction=friction).axial_force

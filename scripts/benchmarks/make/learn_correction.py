@@ -1,4 +1,4 @@
-"""Making the fast tier's correction: full-tier contacts on a sample of presses, and a kernel regression on them."""
+"""Make the fast tier's correction: full-tier contacts on a sample of presses, and a kernel regression on them."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """See ``Learned``: the share of what was predicted for held-out presses that leaves the least squares."""
+    """Return ``Learned.trust``: the share of predictions for held-out presses that leaves the least squares."""
     rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -MOST, MOST)
     for _, _, here in _bins(depth):
         pairs = (log_guess[which][here], log_ratio[here]), (guess[which][here], known.fields[which][here])
@@ -210,4 +210,4 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
             yield row(name, value, unit, baseline=baseline, of=of)
 
 
-_LEAST = 8  # contacts, below which a bin says nothing
+_LEAST = 8  # fewest contacts of a bin

@@ -21,8 +21,8 @@ from tactile_core.geometry.indenters import Sphere
 from tactile_core.pictures.calibrate.ball_print import TABLE
 from tactile_core.sensors import shape_of
 
-# Radius, m: the smaller a ball is, the deeper it is pressed. Depths and the distance of nodes under it are counted in
-# radii. Half the distance changes rises of the large ball by 1 um, forces of the small one by 0.4 %.
+# By radius, m: depths and the spacing of nodes below, in radii; smaller balls are pressed deeper. Half the spacing
+# changes rises of the large ball by 1 um, forces of the small one by 0.4 %.
 DIGIT = shape_of("digit")
 LARGE = np.array([0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6, 1.8, 2.0, 2.2]) / 3
 DEPTHS = {0.5e-3: np.r_[LARGE[1:], 0.85, 1.0, 1.15, 1.3], 1.2e-3: np.r_[LARGE[1:], 0.85, 1.0], 3e-3: LARGE}

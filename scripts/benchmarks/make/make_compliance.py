@@ -1,4 +1,4 @@
-"""Condense the sensors that ship and write them in little room, so that nobody waits for their matrices.
+"""Condense the sensors that ship and write them compressed, so that nobody waits for their matrices.
 
     python scripts/benchmarks/make/make_compliance.py                    a minute and 2.4 GB a sensor
     python scripts/benchmarks/make/make_compliance.py digit --out DIR
@@ -24,10 +24,10 @@ from tactile_core.mechanics.fast.compact_halves import BLOCK, PARITIES, Basis, S
 from tactile_core.mechanics.fast.condense import Half, axes_of  # noqa: E402
 from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes  # noqa: E402
 
-# Of an entry, m/N: so fine that most contacts move by less than 0.1 um rms (measured on random ones, docs/lean.md).
+# Rounding step of an entry, m/N: most contacts then move by less than 0.1 um rms (random ones, docs/lean.md).
 STEP = {"digit": 3e-7, "biotac": 1e-7}
 LEAF = 12  # points of the smallest clusters: fewer give more levels, each a pass over the matrix (measured)
-SWELL_STEPS = 2**14  # of the square root of what the fluid's swell does to itself: finer than single precision needs
+SWELL_STEPS = 2**14  # steps in the square root of the swell's work on itself: finer than single precision needs
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -108,7 +108,7 @@ def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.nd
     linear = np.column_stack([np.ones(len(places)), places])
 
     def gather(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """Points that hand on their motion, what a linear motion (k, 3) has there, and how far up the tree."""
+        """Return points whose motion goes on to the next cluster, their linear basis (k, 3), and the tree's height."""
         if len(points) <= LEAF:
             handed, moments, height = points, linear[points], 0
         else:

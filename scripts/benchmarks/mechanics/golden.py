@@ -21,7 +21,7 @@ TARGET = 0.5  # percent (docs/sources.md, Targets)
 MATERIAL = Material(1e6, 0.49)
 _REACH = 4e-3  # m; the contact of 1.8 mm depth ends at 2.5 mm
 _STEP = 0.2e-3  # m
-# node intervals inside and outside of the even part, its side in m, layers from the back, depths in m
+# Quarter discs: node intervals inside and outside of the even part, its side in m, layers from the back, depths in m.
 _QUARTERS = (
     ((16, 12), 1.6e-3, [0, 0.3, 0.55, 0.75, 0.87, 0.935, 1], [0.2e-3]),
     ((20, 8), 4.0e-3, [0, 0.2, 0.4, 0.575, 0.75, 0.825, 0.9, 0.95, 1], [0.6e-3, 1.0e-3, 1.4e-3, 1.8e-3]),

@@ -19,8 +19,8 @@ from tactile_core.translation.translate import load_translator
 from .mechanics_methods import EVERY
 from .method import TEST_SET, TRAINING
 
-COVER = 0.9, 0.98  # share of contacts below a bound of 95 %, between which it counts as right (assumed)
-FEWEST = 200  # contacts: of fewer, such a share is 1.5 % off and more by chance, and has no target
+COVER = 0.9, 0.98  # least and largest share of contacts below a right bound of 95 % (assumed)
+FEWEST = 200  # contacts for a target: with fewer the share is 1.5 % off and more by chance
 TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |", "|---|---|---|---|---|---|"
 FOLDS = 5
 EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
@@ -28,7 +28,7 @@ EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/ben
 
 @dataclass(frozen=True)
 class Promise:
-    """Bounds that 95 of 100 should stay below, and what was found, in ``unit``; groups : (C,) what each belongs to."""
+    """Stated 95 % bounds (C,) and measured errors (C,), in ``unit``; groups : (C,) number of each contact's group."""
 
     name: str
     unit: str
