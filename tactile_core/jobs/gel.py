@@ -35,10 +35,10 @@ from .gel_contact import PUSH, GelContact, given, matrix_of, not_negative, too_f
 
 _log = logging.getLogger(__name__)
 _NO_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
-_LARGEST_DROP = 1e3  # of the force, in one search: larger ones go by way of a force between (assumed)
-_SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # of the greatest depth, at which to stand where a force is not reached
-# The cube of the unknowns for each iteration: 5 to 10 s on a core, and the solve begun then (assumed). From nothing, a
-# ball of 300 mm diameter at 10 N, which touches 900 nodes of the DIGIT's gel, takes half of it, at 100 N five times.
+_LARGEST_DROP = 1e3  # largest factor by which a force falls in one search; else an intermediate one is sought (assumed)
+_SHALLOWER = (1.0, 0.8, 0.6, 0.4, 0.2)  # shares of the greatest depth, tried in turn if a force is not reached
+# Budget of ``Work``: 5 to 10 s on a core, and the solve begun then (assumed). From rest, a ball of 300 mm diameter at
+# 10 N, which touches 900 nodes of the DIGIT's gel, takes half of it, at 100 N five times.
 _WORK = 1e12
 _ENDED: Any = object()  # stands for poses or forces that are used up
 _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (assumed: 20 mm/s at 100 Hz)

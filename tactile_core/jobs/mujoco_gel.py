@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 _EDGE, _MOST_EDGE = 0.4e-3, 0.25  # m, and of the least side: edges of boxes and cylinders, which MuJoCo has sharp
-# Of what is missing, a frame; m a frame; and m in all, where the gel slips before it bears MuJoCo's shear (assumed).
+# Share of the missing shear corrected per frame; m, largest shift per frame; m, largest shift, reached if the gel slips
+# before it bears MuJoCo's shear (assumed).
 _SHEAR_GAIN, _SHEAR_STEP, _MOST_SHIFT = 0.5, 0.1e-3, 2e-3
 _BALL_FACES = 4  # subdivisions of the icosphere that ellipsoids are made of: 2,562 vertices
 

@@ -93,16 +93,16 @@ class Coating:
             raise TactileError("coating, spread_mm", f"{1e3 * self.spread:g}", f"0 to {1e3 * MOST_SPREAD:g}")
 
 
-# Degrees of the polynomial of the ambient light over the picture, and how many terms they have. The second is for units
-# whose untouched gel is photographed; a background estimated from presses would bend it round their traces. On the
-# GelSight Mini's fitted photographs 5 leaves 5.4 levels beside the press, 7 1.8, 9 1.3, the background's own 1.25.
+# Degrees of the ambient light's polynomial over the picture, and their numbers of terms. The second is for units whose
+# untouched gel is photographed; on a background estimated from presses it would fit their traces. On the GelSight
+# Mini's fitted photographs degree 5 leaves 5.4 levels beside the press, 7 1.8, 9 1.3, the background's own 1.25.
 AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE = 5, 7
 AMBIENT_TERMS, PHOTOGRAPHED_TERMS = (
     (degree + 1) * (degree + 2) // 2 for degree in (AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE)
 )
 AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient light's polynomial
-# m: ambient light is counted in what a LED gives on a coating that faces it from there, so that it goes with the LED's
-# power alone, not with its place.
+# m: the unit of ambient light is an LED's light on a coating that faces it at this distance, so that it depends on the
+# LED's power, not on its place.
 AMBIENT_DISTANCE = 20e-3
 MOST_RISE = 2.0  # a mm, of the ambient light's unit
 MOST_INDEX = 4.0  # germanium's: no clear solid has more

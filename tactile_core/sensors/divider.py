@@ -13,12 +13,12 @@ from . import COUNT_MAX, REST_COUNTS, SOURCE
 from .descriptor import of_kind
 from .fluid_sensor import Fluid
 
-# Of an electrode's impedance over the load, what its contact with the fluid resists: no part of the film's.
+# Resistance of an electrode's contact with the fluid, in series with the film, over the load.
 _SERIES = of_kind(SOURCE, Fluid).fluid.interface / of_kind(SOURCE, Fluid).readout.load
-_LEAST_LEFT = 0.05  # of a film, share below which it is not thinned: the laws know none thinner (assumed)
-_ENDS = 0.4, COUNT_MAX - 0.4  # counts, which round to the converter's ends: there nothing is known of the impedance
-# Counts that an electrode may rest at; real ones rest at 3,010 to 3,670 (two units, PHAC). One that is dead or
-# saturated rests elsewhere, and its noise would be blown up without end.
+_LEAST_LEFT = 0.05  # least share of a film that remains: the laws hold for no thinner one (assumed)
+_ENDS = 0.4, COUNT_MAX - 0.4  # counts that round to the converter's ends, where the impedance is unknown
+# Counts at rest that are converted; real ones are 3,010 to 3,670 (two units, PHAC). The noise of a dead or saturated
+# electrode, which rests elsewhere, would be amplified without limit.
 _RESTS = 500.0, 3750.0
 
 

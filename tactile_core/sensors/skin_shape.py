@@ -13,7 +13,7 @@ from .descriptor import of_kind
 from .fluid_sensor import Fluid
 from .profiles import read_radii
 
-_STEP = 20e-6  # m, of the march from the surface to the core; the last step is divided linearly
+_STEP = 20e-6  # m, of the march from the surface to the core; the last step is interpolated linearly
 _FARTHEST = 8e-3  # m, more than from the pad to the finger's axis
 _ROUNDING = 0.5e-3  # m, by which the corner of a flat inner cap, where the table ends, is rounded as the outer one is
 

@@ -15,20 +15,10 @@ _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, col
 
 def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Unit outward normals (n, 3) at nodes (n, 3): the area-weighted mean of the triangles around."""
-    return _unit(_node_area_vectors(nodes, faces))
-
-
-def node_areas(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Area (n,) m2 of each node: a third of each adjacent triangle."""
-    corners = nodes[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
-    return np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(nodes))
-
-
-def _node_area_vectors(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
     corners = nodes[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
-    return np.stack([np.bincount(faces.ravel(), np.repeat(area[:, k], 3), minlength=len(nodes)) for k in range(3)], -1)
+    summed = [np.bincount(faces.ravel(), np.repeat(area[:, k], 3), minlength=len(nodes)) for k in range(3)]
+    return _unit(np.stack(summed, -1))
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

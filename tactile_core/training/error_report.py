@@ -89,7 +89,7 @@ def signal_rows(measure: Measure) -> list[Row]:
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """Translate T signals of noise alone, each by itself: largest displacements (T,) m, size of the force (T,) N."""
+    """Translate T frames of noise alone, untracked; return largest displacements (T,) m and sizes of force (T,) N."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)
@@ -102,7 +102,7 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
 
 
 def silence_rows(measure: Measure) -> list[Row]:
-    """Make rows of the means of `silence`; doing nothing gives zero."""
+    """Make rows of the means of `silence`; their baseline is 0."""
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]

@@ -26,7 +26,7 @@ from .surface_codec import SurfaceCodec
 from .two_contacts import parts_sizes
 
 DRAWS = 4  # noisy readings of each training contact for the distance's statistics
-COLLAPSED = 1e-3  # share of the largest variance: latents that vary less are unused, their noise is no distance
+COLLAPSED = 1e-3  # least variance to divide by, over the largest: latents that vary less are unused
 RESIDUAL_FLOOR = 0.01  # compressed units, 0.15 counts: below the rounding of the readings
 UNITS = {
     "change": "counts, reading minus rest",

@@ -130,7 +130,7 @@ def _presses(used: np.ndarray) -> np.ndarray:
 
 EPOCHS, BATCH, RATE = 30, 64, 2e-4  # a few passes at a low rate: the start is a trained network (assumed)
 HOLD = 0.3  # weight of the shape being held, against place and force, each about 1 at first (assumed)
-PLACE_FLOOR = 0.05  # half a cell of the lattice: a smaller miss of the place counts squared (assumed)
+PLACE_FLOOR = 0.05  # half a cell of the lattice: smaller errors of the place count squared (assumed)
 
 Progress = Callable[[float, str], None]
 

@@ -17,10 +17,10 @@ from .modules import ContactPosterior, MeshVae, Residual, compress, initialise, 
 from .options import Options
 
 FORCE_WIDTH, FORCE_BLOCKS = 64, 1  # small heads: three numbers out of a latent, one or two out of a signal
-FORCE_FLOOR = 0.1  # N: an error counts against the force plus this, so that light touches do not rule (assumed)
+FORCE_FLOOR = 0.1  # N, added to the force that an error is divided by, so that light touches do not dominate (assumed)
 ERROR_FLOOR = 0.1e-6  # m, a step of the stored displacements: no error is known better
-LEAST_SIZE = 1e-2  # of a latent's mean square: silent samples alone have none
-CELL_WEIGHT = 4.0  # of an error of the place among those of the code, in the latents' own scales (assumed)
+LEAST_SIZE = 1e-2  # least mean square of latents to divide by: silent samples alone have 0
+CELL_WEIGHT = 4.0  # weight of the place's error against the code's, in the latents' own scales (assumed)
 
 
 class Model(nn.Module):

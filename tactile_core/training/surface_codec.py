@@ -13,7 +13,7 @@ from ..accuracy import MOVING
 from ..sensors import SOURCE, electrodes
 from ..translation.contact_frame import PLACE_UNIT, ContactFrame
 
-Z = 2  # the axis that turns round, of forces and, in nodes' own frames, of displacements
+Z = 2  # the axis that a mirror image reverses, of forces and, in nodes' own frames, of displacements
 SAME = 1e-4  # rad: angles closer than this are one
 
 
@@ -49,11 +49,11 @@ ROWS = 512  # contacts at a time: bounds the float32 copy of the int16 data to t
 EXTRA = 16  # columns of oversampling and
 ROUNDS = 4  # power iterations: Halko, Martinsson and Tropp 2011, ample for a spectrum that decays as fast as this one
 SILENT = -1  # row number of a sample without contact
-FEWEST = 100  # nodes that an error is shared by at least: light touches move few (assumed)
+FEWEST = 100  # least nodes that a squared error is divided by: light touches move few (assumed)
 ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
 LEAST_AWAY = 0.01  # cells, rounds the distance of places at zero
 BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
-SMALLEST_SCALE = 0.03  # of the largest: a coefficient's scale is its spread, but none is blown up without end (assumed)
+SMALLEST_SCALE = 0.03  # least scale of a coefficient, its spread, over the largest one (assumed)
 Fields = Callable[[np.ndarray], Tensor]  # row numbers (B,) -> (B, size) in millimetres: float32's middle range
 
 

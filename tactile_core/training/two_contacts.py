@@ -23,11 +23,11 @@ from .surface_codec import image_of_electrodes
 
 WIDTH, BLOCKS = 256, 3
 BATCH = 512
-APART = (4e-3, 15e-3)  # m, between two contacts: nearer ones are one, and the gel is 19 mm wide
-LIGHTEST = 0.25  # of the other's force, at least: lighter ones are lost in the other's noise (assumed)
-TRIES = 4  # times as many pairs are drawn as are wanted: one in three lies as far apart
-SINGLE = 0.99  # share of single contacts on validation presses that are left whole
-SINGLES = 20_000  # that this is told by
+APART = (4e-3, 15e-3)  # m, between two contacts: nearer ones count as one, and the gel is 19 mm wide
+LIGHTEST = 0.25  # least force over the other's: lighter ones are lost in the other's noise (assumed)
+TRIES = 4  # pairs drawn for each one wanted: one in three lies as far apart
+SINGLE = 0.99  # share of single contacts on validation presses that are not separated
+SINGLES = 20_000  # contacts that determine the threshold for it
 
 
 @dataclass(frozen=True)
