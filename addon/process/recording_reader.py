@@ -23,7 +23,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Recording:
-    """See ``tactile_core.recordings.read``; columns : file of a map, or empty."""
+    """Read a recording as ``tactile_core.recordings.read`` does; columns : file of a map, or empty."""
     if _is_hdf5(path) and not _hdf5_works():
         return _read_elsewhere(os.fspath(path), sensor, columns)
     return recordings.read(path, column_map.read(columns) if columns else None, sensor)

@@ -124,7 +124,7 @@ def catmull_rom(t: np.ndarray | float) -> np.ndarray:
 
 @Loop
 def _points_on_grid(axes, places, closed):  # noqa: ANN001, ANN202
-    """See ``on_grid``."""
+    """Compute ``on_grid`` in a loop."""
     rows, columns = axes.shape[1], axes.shape[2]
     points, along, across = np.empty((places.shape[1], 3)), np.empty(4), np.empty(4)
     for p in range(places.shape[1]):

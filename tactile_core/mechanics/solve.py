@@ -153,7 +153,7 @@ class _Fast:
         self.press = CorrectedPress(compliance_of(sensor), indenter, pose, limit, friction)
 
     def to(self, step: Step) -> Solution:
-        """See ``solve_path``. The force asked for is the corrected one."""
+        """Solve the next step, see ``solve_path``; a given force is the corrected one."""
         pose, compliance = self.pose.slid(*step.slide), self.press.compliance
         if step.force:
             found = self.press.at_force(step.force, pose)

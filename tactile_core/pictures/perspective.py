@@ -216,7 +216,7 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
 
 @Loop
 def interpolate(values, row, column):  # noqa: ANN001, ANN201
-    """See ``perspective.bilinear``."""
+    """Compute ``bilinear`` in a loop."""
     height, width = values.shape
     found = np.empty(row.shape, np.float32)
     for a in range(row.shape[0]):

@@ -30,11 +30,11 @@ class Box(Indenter):
             raise TactileError("box, edge", f"{self.edge * 1e3:g} mm", "less than half of the smallest size")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact: that of a box smaller by the edge radius, less the radius."""
+        """Return the exact distance (n,) m, that of a box smaller by the edge radius less the radius, and gradient."""
         return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``; zero at faces, 1 / arm across round edges, in all tangents at corners."""
+        """Return (n, 3, 3) 1/m: 0 at faces, 1 / arm across round edges and along all tangents of round corners."""
         arm = points - self._middle
         out = np.abs(arm) - self._inner
         beyond = np.copysign(np.maximum(out, 0), arm)
@@ -44,7 +44,7 @@ class Box(Indenter):
         return np.where((out > 0).sum(1)[:, None, None] > 1, (round_axes - normal * normal.swapaxes(1, 2)) / length, 0)
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         return self._middle + self._inner * sign_of(direction) + self.edge * direction
 
     @functools.cached_property

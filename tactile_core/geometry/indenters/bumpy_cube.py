@@ -47,7 +47,7 @@ class BumpyCube(Indenter):
             raise TactileError("bumpy cube, spacing", found, expected, "Bumps must not overlap")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact.
+        """Return the exact distance (n,) m and its gradient (n, 3); see ``Indenter.distance``.
 
         Inside the cube above a bump the nearest surface is the bump's cap or the rim at its foot, both below; the
         ball's upper part is no surface there.
@@ -56,7 +56,7 @@ class BumpyCube(Indenter):
         return distance, gradient
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Indenter.curvature``."""
         nearest, _, _, at_bump = self._nearest(points)
         curvature = np.empty((len(points), 3, 3))
         for branch, (indenter, pose) in ((_CUBE, self._parts[0]), (_SHAFT, self._shaft)):
@@ -67,11 +67,11 @@ class BumpyCube(Indenter):
         return curvature
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         return Several(self._parts).support(direction)
 
     def preview(self, hull: Hull) -> Surface:
-        """See ``Indenter.preview``."""
+        """Return nodes (n, 3) m and triangles (m, 3) that show the body; see ``Indenter.preview``."""
         return joined(self._parts, hull)
 
     @property

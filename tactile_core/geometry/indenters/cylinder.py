@@ -33,18 +33,18 @@ class Cylinder(Indenter):
             raise TactileError("cylinder, edge", f"{self.edge * 1e3:g} mm", "less than radius and half the length")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact."""
+        """Return the exact distance (n,) m and its gradient (n, 3); see ``Indenter.distance``."""
         inner, half = self.radius - self.edge, self.length / 2
         return _from_cylinder(contiguous(points), self.axis, self._middle, inner, half - self.edge, self.edge, NEAREST)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Indenter.curvature``."""
         arm, (across, own) = points - self._middle, _ORDER[self.axis]
         outline = extrusion.disc(arm[:, across], self.radius - self.edge)
         return extrusion.curvature(outline, arm[:, self.axis], self.length / 2 - self.edge)[:, own][:, :, own]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         across, inner = _ORDER[self.axis][0], np.zeros(3)
         ring = np.hypot(*direction[across])
         if ring > SQUARE:

@@ -36,16 +36,16 @@ class Edge(Indenter):
             raise TactileError("edge, radius", f"{self.radius * 1e3:g} mm", "less than half of length and height")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact: that of a wedge smaller by the radius, less the radius."""
+        """Return the exact distance (n,) m, that of a wedge smaller by the radius less the radius, and gradient."""
         distance, gradient = extrusion.distance(*self._prism(points), self.radius)
         return distance, gradient[:, _OWN]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Indenter.curvature``."""
         return extrusion.curvature(*self._prism(points))[:, _OWN][:, :, _OWN]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         corners = self._corners()
         reach = corners @ direction[1:]
         y, z = corners[reach > reach.max() - SQUARE * self.height].mean(axis=0)

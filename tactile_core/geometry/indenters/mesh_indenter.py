@@ -126,7 +126,7 @@ class MeshIndenter(Summary, Indenter):
         return cls(TipGrid(fine, coarse, float(stem_place[4])), hull, rms_and_largest)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``: the spline's value, and the unit normal of its level surface.
+        """Return the spline's value (n,) m and its level surface's unit normal (n, 3); see ``Indenter.distance``.
 
         Across a sharp edge the spline is flatter than a distance, down to a slope of 0.7.
         """
@@ -134,14 +134,14 @@ class MeshIndenter(Summary, Indenter):
         return value, _unit(slope)[1]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``: the derivative of the unit normal along the level surface."""
+        """Return (n, 3, 3) 1/m, the unit normal's derivative along the level surface; see ``Indenter.curvature``."""
         slope, bend = self.grid.gradient_and_hessian(points)
         steepness, normal = _unit(slope)
         along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
         return along @ bend @ along / np.maximum(steepness, _FLATTEST)[:, None, None]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``; computed from the mesh itself."""
+        """Return the mesh's own farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         reach = self.hull @ direction
         return self.hull[reach > reach.max() - _LEVEL].mean(axis=0)
 

@@ -31,24 +31,24 @@ class Ring(Indenter):
             raise TactileError("ring, tube", f"{self.tube * 1e3:g} mm", "less than the radius of the ring's middle")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact."""
+        """Return the exact distance (n,) m and its gradient (n, 3); see ``Indenter.distance``."""
         above = points.copy()
         above[:, 2] -= self.tube
         length, gradient = circle_distance(above, self.radius)
         return length - self.tube, gradient
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Indenter.curvature``."""
         return circle_curvature(points - [0.0, 0.0, self.tube], self.radius)
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         across = np.hypot(direction[0], direction[1])
         radial = np.array([direction[0], direction[1], 0.0]) / across if across > SQUARE else np.zeros(3)
         return np.array([0.0, 0.0, self.tube]) + self.radius * radial + self.tube * direction
 
     def preview(self, _hull: Hull) -> Surface:
-        """See ``Indenter.preview``."""
+        """Return nodes (n, 3) m and triangles (m, 3) that show the body; see ``Indenter.preview``."""
         along = np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)[:, None]
         across = np.linspace(0, 2 * np.pi, _ACROSS, endpoint=False)[None, :]
         reach = self.radius + self.tube * np.cos(across)
@@ -96,7 +96,7 @@ def _square(vectors: np.ndarray) -> np.ndarray:
 
 @Loop
 def _from_circle(points, radius, nearest):  # noqa: ANN001, ANN202
-    """See ``circle_distance``."""
+    """Compute ``circle_distance`` in a loop."""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         x, y, above = points[p, 0], points[p, 1], points[p, 2]

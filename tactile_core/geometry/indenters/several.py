@@ -37,12 +37,12 @@ class Several(Indenter):
             raise TactileError("several, parts", f"the lowest reaches z = {lowest * 1e3:g} mm", "z = 0", advice)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``."""
+        """Return the nearest part's distance (n,) m and gradient (n, 3); see ``Indenter.distance``."""
         distance, gradient, _ = self._nearest(points)
         return distance, gradient
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``; that of the nearest part."""
+        """Return the second derivatives (n, 3, 3) 1/m of the nearest part's distance; see ``Indenter.curvature``."""
         nearest = self._nearest(points)[2]
         curvature = np.empty((len(points), 3, 3))
         for k, (indenter, pose) in enumerate(self.parts):
@@ -50,13 +50,13 @@ class Several(Indenter):
         return curvature
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``; the mean of those of the parts that lie equally far."""
+        """Return the farthest part's support point (3,) m, the mean if several are equally far; see ``Indenter``."""
         places = np.array([pose.support(indenter, direction) for indenter, pose in self.parts])
         reach = places @ direction
         return places[reach > reach.max() - SQUARE].mean(axis=0)
 
     def preview(self, hull: Hull) -> Surface:
-        """See ``Indenter.preview``."""
+        """Return nodes (n, 3) m and triangles (m, 3) that show the body; see ``Indenter.preview``."""
         return joined(self.parts, hull)
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

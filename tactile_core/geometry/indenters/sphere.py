@@ -21,17 +21,17 @@ class Sphere(Indenter):
         check_length("sphere", "radius", self.radius)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Indenter.distance``; exact."""
+        """Return the exact distance (n,) m and its gradient (n, 3); see ``Indenter.distance``."""
         length, normal = _polar(contiguous(points), self.radius, NEAREST)
         return length - self.radius, normal
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Indenter.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Indenter.curvature``."""
         length, normal = _polar(contiguous(points), self.radius, NEAREST)
         return (np.eye(3) - normal[:, :, None] * normal[:, None, :]) / length[:, None, None]
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """See ``Indenter.support``."""
+        """Return the body's farthest point (3,) m along a direction (3,); see ``Indenter.support``."""
         return np.array([0.0, 0.0, self.radius]) + self.radius * direction
 
 

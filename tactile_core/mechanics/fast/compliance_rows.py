@@ -227,7 +227,7 @@ def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_for
 
 @Loop
 def _normal_compliance(matrix, normal, c, ridge):  # noqa: ANN001, ANN202
-    """See ``ComplianceBlock.normal``; ridge : relative, added to each point's own."""
+    """Compute ``ComplianceBlock.normal`` in a loop; ridge : relative, added to each point's own."""
     k = len(normal)
     size, gaps = 3 * k, np.empty((k + c, k + c))
     for a in range(k):

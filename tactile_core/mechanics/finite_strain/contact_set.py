@@ -278,9 +278,9 @@ class PlacedIndenter:
     pose: Pose
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Obstacle``."""
+        """Return the distance (n,) m and unit normal (n, 3); see ``Obstacle.distance``."""
         return self.pose.distance(self.indenter, points)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """See ``Obstacle``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Obstacle.curvature``."""
         return self.pose.curvature(self.indenter, points)

@@ -49,11 +49,11 @@ class NeoHookean:
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)))
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """See ``Law.energy``."""
+        """Return the isochoric energy density (...,) J/m3; see ``Law.energy``."""
         return self.shear / 2 * (j ** (-2 / 3) * np.einsum("...ij,...ij->...", f, f) - 3)
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Law.stress_tangent``."""
+        """Return stress and tangent (..., 3, 3), (..., 3, 3, 3, 3) Pa; see ``Law.stress_tangent``."""
         g = cofactors(f) / j[..., None, None]  # F^-T
         i1 = np.einsum("...ij,...ij->...", f, f)
         scale, pj = self.shear * j ** (-2 / 3), p * j
@@ -121,11 +121,11 @@ class SplitBulkModulus:
         return self.law.bulk - self.at_points
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """See ``Law.energy``."""
+        """Return the isochoric energy density (...,) J/m3; see ``Law.energy``."""
         return self.law.energy(f, j) + self.at_points / 2 * (j - 1) ** 2
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Law.stress_tangent``."""
+        """Return stress and tangent (..., 3, 3), (..., 3, 3, 3, 3) Pa; see ``Law.stress_tangent``."""
         stress, tangent = self.law.stress_tangent(f, j, p + self.at_points * (j - 1))
         cofactor = cofactors(f)
         tangent += self.at_points * cofactor[..., :, :, None, None] * cofactor[..., None, None, :, :]

@@ -54,7 +54,7 @@ def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
 
 class _LlvmTracer(Tracer):
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Tracer.trace``; all pixels and points in one compiled kernel."""
+        """Trace all pixels and points in one compiled kernel; see ``Tracer.trace``."""
         mi = activate(self.variant)
         import drjit as dr
 
@@ -109,7 +109,7 @@ class _ScalarTracer(Tracer):
         return {"light": {"type": "point", "position": [0, 0, 10]}, "eye": eye}
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """See ``Tracer.trace``; a point is seen where its light arrives."""
+        """Trace as ``Tracer.trace`` says; a point is seen where its light arrives."""
         mi = activate(self.variant)
         for axis, size, move in (("x", self.camera.width, shift[0]), ("y", self.camera.height, shift[1])):
             self.values[f"eye.principal_point_offset_{axis}"] = float(move / size)
