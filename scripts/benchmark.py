@@ -97,7 +97,7 @@ def stage_measured(
 
 
 def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """Measure one method, in a process of its own, so that its memory and its first call are its own."""
+    """Measure one method, to be called in a process of its own; None for one that only writes the others' truth."""
     measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
     return measure(name, quick, file) if stage in LEAVE_TRUTH else measure(name, quick)
 

@@ -37,7 +37,7 @@ def camera_of(gel: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
-    """The gel's coating: the first of its materials that is one."""
+    """The gel's coating: the first of its materials that is one; None without any."""
     materials = (slot.material for slot in gel.material_slots)
     return next((each for each in materials if each and digit_materials.is_coating(each)), None)
 

@@ -62,7 +62,7 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 
 
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
-    """Return the spec of an indenter object, and the STL of its mesh where it needs one.
+    """Return the spec of an indenter object, and the bytes of its mesh file, None for a shape without one.
 
     relative : (3, 3), see ``check_pose``. Raises TactileError.
     """

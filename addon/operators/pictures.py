@@ -141,7 +141,7 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
 
 
 def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the gel whose picture was drawn last, else ``properties.gel_of`` the scene."""
+    """Return the gel whose picture was drawn last, else ``properties.gel_of`` the scene; None without a gel."""
     last = None if _drawn is None else scene.objects.get(_drawn[0])
     return last if last is not None and last.tactile.role == "DIGIT" else properties.gel_of(scene)
 

@@ -180,7 +180,7 @@ def _items(names: tuple[str, ...], gels_only: bool) -> list[tuple[str, str, str]
 
 
 def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """Return the scene's object of a role: ``near`` itself, else one in its collections, else the scene's first."""
+    """Return the object of a role: ``near`` itself, else one in its collections, else the scene's first, else None."""
     return _beside(scene, role, near) or next((thing for thing in scene.objects if thing.tactile.role == role), None)
 
 
@@ -191,7 +191,7 @@ def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) ->
 
 
 def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """Return the gel that is meant: by ``near`` as in ``of_role``, else the scene camera's, else the scene's first."""
+    """Return the gel by ``near`` as in ``of_role``, else the scene camera's, else the scene's first, else None."""
     seen = None if scene.camera is None else scene.camera.parent
     seen = seen if seen is not None and seen.tactile.role == "DIGIT" and seen.name in scene.objects else None
     return _beside(scene, "DIGIT", near) or seen or of_role(scene, "DIGIT")

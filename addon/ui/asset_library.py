@@ -56,7 +56,7 @@ def write(place: Path) -> Path:
 
 
 def entry() -> bpy.types.UserAssetLibrary | None:
-    """Return the library as Preferences > File Paths lists it, if it does."""
+    """Return the library's entry in Preferences > File Paths; None if it is not listed."""
     libraries = bpy.context.preferences.filepaths.asset_libraries
     return next((each for each in libraries if Path(each.path) == folder()), None)
 

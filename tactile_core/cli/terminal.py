@@ -96,7 +96,7 @@ EVERY = 10.0  # s between two lines of progress in a log
 
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """Return a callback (done, in all): a bar on a terminal or if `forced`, else a line every ten seconds."""
+    """Yield a callback (done, in all): a bar on a terminal or if `forced`, else a line every ten seconds."""
     if not forced and not sys.stderr.isatty():
         yield _lines(name, unit)
         return

@@ -194,7 +194,7 @@ class Gel:
         return compliance_of(self.sensor)
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """Return ``_moved_to``'s contact; if the path leads to none, that of an indenter that comes straight in."""
+        """Return ``_moved_to``'s contact or None; if it fails, that of an indenter that comes straight in."""
         path = self._press
         try:
             return self._moved_to(pose, force, flags, began=began)

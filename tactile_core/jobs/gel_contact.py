@@ -68,7 +68,7 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 
 
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Return the checked pose of an indenter and its force, N. Raises TactileError for an invalid pose or force."""
+    """Check the pose of an indenter and its force, N, or None. Raises TactileError for an invalid pose or force."""
     if force is not None:
         force = not_negative(force, "Gel, force", "newtons, zero or more, and finite")
         if force > MOST_FORCE:

@@ -97,7 +97,7 @@ def _film(
     recording: Recording, change: Changes, rest: Baseline, pressure: np.ndarray, options: PrepareOptions, *,
     own_rest: bool,
 ) -> film.Film | None:  # fmt: skip
-    """Estimate the film of a raw recording whose rest is known; without simulated contacts, take the given one."""
+    """Estimate the film of a raw recording whose rest is known; without simulated contacts, the given one or None."""
     if contacts_of(recording.sensor) is None:
         return None if options.film is None else film.Film.given(options.film)
     return film.find(
@@ -130,7 +130,7 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
 def _unit_rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Rest | None:
-    """Return the unit's known rest unless a calm level lies near it: a steady grip is calm, too."""
+    """Return the unit's known rest, since a calm level may be a steady grip; None if a calm level lies near it."""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
     reason = "no quiet part"

@@ -137,7 +137,7 @@ def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: fl
 def _on_biotac(
     press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
 ) -> tuple[list[Solution], TactileError | None]:
-    """The contacts that were found, and the error that ended them. A slide keeps its depth under the surface."""
+    """Return the contacts found, and the error that ended them or None. A slide keeps its depth under the surface."""
     pose, surface, found = pose_at(SOURCE, press.indenter, press.place), sensors.biotac_surface(), []
     drops = [surface_drop(surface, press.indenter, pose, pose.slid(*slide)) for _, slide in steps]
     asked = [Step(max(depth + drop, 0.0), slide=tuple(to)) for (depth, to), drop in zip(steps, drops, strict=True)]

@@ -31,9 +31,9 @@ SEED_OF_CONTACTS = 5
 
 
 def measure(name: str, quick: bool, truth: str) -> Method | None:
-    """Draw test contacts by one preset, against the pictures in the file ``truth``, which the method "truth" makes.
+    """Draw test contacts by one preset, against the pictures in the file ``truth``.
 
-    Needs mitsuba."""
+    The method "truth" writes that file, and returns None. Needs mitsuba."""
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
     mapper = gel_mapper(unit.camera)
     if name == "truth":

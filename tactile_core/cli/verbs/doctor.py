@@ -87,7 +87,7 @@ MISSING, BROKEN = "missing", "broken"  # in place of a version
 
 
 def report() -> Iterator[str]:
-    """Return the lines to print; raises nothing."""
+    """Yield the lines to print; raises nothing."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:

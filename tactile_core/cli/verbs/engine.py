@@ -53,7 +53,7 @@ def check_counts(options: argparse.Namespace, *names: str) -> None:
 
 
 def part(text: str | None) -> tuple[int, int] | None:
-    """Parse ``"3/8"`` to (3, 8). Raises TactileError for anything else."""
+    """Parse ``"3/8"`` to (3, 8); None stays None. Raises TactileError for any other text."""
     if text is None:
         return None
     found = re.fullmatch(r"(\d{1,6})/(\d{1,6})", text)

@@ -131,7 +131,7 @@ def _done(folder: Path) -> int:
 
 
 def _calibration(file: str | None, gel: str | None) -> str | None:
-    """Return the calibration's file: the one that ships with the named gel, or the given one, checked for that gel."""
+    """Return the calibration's file: the given one, checked for a named gel; else that gel's shipped one, or None."""
     if gel is None:
         return file
     from ...sensors.calibration_file import calibration_path, load_calibration

@@ -156,7 +156,7 @@ class CorrectedPress:
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
     def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Solve by searching over depth: faster with points between nodes. Raises PenetrationError, UnsolvedError."""
+        """Solve by a search over depth, faster with points between nodes; None, or errors, as in ``_at_force``."""
 
         def move(depth: float, before: FastContact) -> FastContact:
             """Return the corrected contact at a depth m from first touch, starting from the contact before."""
@@ -185,7 +185,7 @@ class CorrectedPress:
         return self._last_power
 
     def _find_first_contact(self, pose: Pose) -> Contact | None:
-        """Find a shallow contact that carries force: at the least depths an indenter may touch no node."""
+        """Find a shallow contact that carries force (the shallowest may touch no node); None if none is found."""
         depth = _FIRST_DEPTH
         while depth <= self.limit:
             contact = self.problem.at_pose(pose.moved(depth))

@@ -63,7 +63,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
-    """Return the index of the first line that is no comment or title, and of the last comment before it."""
+    """Return the index of the first line that is no comment or title, and of the last comment before it, or None."""
     filled = [place for place, line in enumerate(lines) if line.strip()]
     first = next((place for place in filled if not lines[place].lstrip().startswith(COMMENTS)), None)
     if first is None:
