@@ -14,12 +14,14 @@ from ..errors import TactileError
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, units_file
+from ..recordings.flags import Flag
 from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
 from ..recordings.recording import FINGERS, short_of, split
 from ..recordings.tables.column_map import ColumnMap
 from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
+from ..recordings.unit.contact_law import as_contact
 from ..recordings.unit.gain_matching import PRIOR, Match, match
 from ..sensors import title, typical_rest
 from . import networks, reference_signals
@@ -64,7 +66,7 @@ def adapt(
 
     A recording that is never calm near the unit's rest uses the given rest, or the one estimated from all recordings.
     Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
-    in contact."""
+    in contact, an estimated rest that looks like a contact."""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings) if rest is None else rest
@@ -76,7 +78,7 @@ def adapt(
         if signals.kind == "scaled":
             advice = "Give its counts a unit, or use another recording"
             raise TactileError(path, "a scaled recording, whose unit is not known", "counts", advice)
-        if not signals.quiet.any() and bare is None:
+        if (signals.flags & Flag.NO_QUIET_PART).all():
             restless.append(short_of(path))
         kinds.add(signals.kind == "rectified")
         parts.append(_contacts(signals))
@@ -155,11 +157,16 @@ def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
 
 
 def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
-    """Find the unit's rest; None where the recordings are too few, or not raw."""
+    """Find the unit's rest; None where the recordings are too few, or not raw. Raises TactileError for a contact's."""
     try:
-        return find_rest(recordings)
+        found = find_rest(recordings)
     except TactileError:
         return None
+    if (share := as_contact(found.counts, recordings[0].sensor)) is not None:
+        held = f"even the least pressed recordings look like a contact, which explains {share:.0%} of their levels"
+        advice = "Add softer touches, or name a recording of the untouched finger (--rest)"
+        raise TactileError("rest of the unit", held, "some that are hardly pressed", advice)
+    return found
 
 
 def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare: ElectrodeGains) -> float:

@@ -14,6 +14,8 @@ from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, Sens
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.recording import split
+from tactile_core.sensors import REST_COUNTS
+from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.unit_rest import find_rest, read_rest
 
 REST = np.linspace(3100.0, 3500.0, 19)
@@ -64,6 +66,19 @@ def test_too_few_and_rectified_recordings_are_refused():
         find_rest(folded)
 
 
+def test_a_rest_of_grips_alone_is_refused(tmp_path):
+    contacts = polarity.contact_signals()
+    firm = contacts[np.argsort(np.linalg.norm(contacts, axis=1))[-50:]]
+    for k in range(3):
+        noise = np.random.default_rng(k).normal(0, 1, (400, 19))
+        np.savez(
+            tmp_path / f"{k}.npz", electrodes=np.rint(REST_COUNTS + firm[10 * k] + noise), pdc=np.full(400, 1200.0)
+        )
+    typical = reference_signals.read(networks.WEIGHTS_FOLDER)
+    with pytest.raises(TactileError, match=r"look like a contact, which explains \d+% of.*\(--rest\)"):
+        adapt.adapt_hand([tmp_path / f"{k}.npz" for k in range(3)], typical)
+
+
 def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
     unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     grip = held(0.6, 3)
@@ -106,7 +121,7 @@ def test_a_bag_s_units_are_read_by_topic_and_finger(tmp_path):
 def test_real_grips_lie_where_the_fingers_are_squeezed(outside_data):
     """The place of a flat object held by two real fingers, against the electrodes it squeezes (docs/sources.md)."""
     pytest.importorskip("scipy", reason="scipy is absent: pip install tactile-core[matlab]")
-    from tactile_core.translation import adapt, networks, reference_signals, translate
+    from tactile_core.translation import translate
 
     files = [path for path in sorted(outside_data("biotac_phac").glob("*.mat")) if path.stem.split("_")[-2] < "04"]
     hard = [path for path in files if path.name.startswith(("acrylic", "steel"))]
