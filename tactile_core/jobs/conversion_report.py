@@ -17,7 +17,7 @@ from ..recordings import flags
 from ..sensors import title
 from ..translation.card import doubt
 from ..translation.simulated_likeness import contradicted
-from ..translation.trust_words import DENIED, LOW_CONFIDENCE, SENTENCES
+from ..translation.trust_words import DENIED, FIRM, LOW_CONFIDENCE, SENTENCES, TOO_FIRM
 from .frame_pass import FramePass, Tools
 from .frames_file import described
 from .sheet_figure import FRAMES, SheetFigure, scale
@@ -40,6 +40,7 @@ class ConversionReport:
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._pressure: list[np.ndarray] = []
+        self._firm = 0  # frames of more force than the signals tell
         self._denied = 0  # frames that are unexplained because PDC shows another pressure
         self._explained: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
@@ -56,6 +57,7 @@ class ConversionReport:
         measured = self._rows.read(frames)[1].pressure_measured
         denied = contradicted(arrays["pressure"], measured) & (arrays["flags"] & flags.Flag.UNEXPLAINED > 0)
         self._denied += int(np.count_nonzero(denied))
+        self._firm += int(np.count_nonzero(accuracy.lengths(arrays["force"]) > FIRM * self._rows.signals.stiffness))
         self._explained.append(arrays["explained"])
         if "traction_force" in arrays:
             self._forces.append(np.stack([arrays["traction_force"], arrays["force"]]))
@@ -81,6 +83,8 @@ class ConversionReport:
             for count, meaning in ((self.flagged[name] - denied, described(words, self._tools.pair)), (denied, DENIED)):
                 if count:
                     found.append(f"{count} of {len(self._frames)} frames: {meaning} (flag {name})")
+        if self._firm:
+            found.append(f"{self._firm} of {len(self._frames)} frames: {TOO_FIRM}")
         if self._made.folded:
             found.append(f"{self._made.folded} frames: the translated gel folds over itself; heights there are guesses")
         return tuple(found)

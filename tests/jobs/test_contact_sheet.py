@@ -18,11 +18,17 @@ from tactile_core.translation.answer import Answer
 COUNT = 2
 
 
-def drawn(
-    path: Path, warnings: Sequence[str] = (), truth: bool = False, touched: bool = True, shift: tuple = (0.0, 0.0),
-    **about: Any,
-) -> Path:  # fmt: skip
-    """Draw the sheet of a made-up recording; truth : with the true skin; shift : mm; about : of ``Recording``"""
+def drawn(path: Path, *arguments: Any, **named: Any) -> Path:
+    """Draw the sheet of ``reported``, which takes the other arguments."""
+    reported(*arguments, **named).draw_sheet(path)
+    return path
+
+
+def reported(
+    warnings: Sequence[str] = (), truth: bool = False, touched: bool = True, shift: tuple = (0.0, 0.0),
+    force: float = 1.0, stiffness: float = 1.0, **about: Any,
+) -> ConversionReport:  # fmt: skip
+    """Report a made-up recording; truth : with the true skin; shift : mm; force : N; about : of ``Recording``"""
     rng = np.random.default_rng(0)
     known = {"name": "touch", "time": np.arange(COUNT) / 100, "simulated": truth, "truth": None} | about
     skin = (len(known["time"]), len(sensors.biotac_surface().rest), 3)
@@ -31,7 +37,7 @@ def drawn(
     recording, count = SimpleNamespace(**known), len(known["time"])
     unknown, frames = np.full(count, np.nan), np.arange(count)
     change = rng.normal(size=(count, 19)) if touched else np.full((count, 19), np.nan)
-    signals = SimpleNamespace(change=change, pressure_measured=unknown, warnings=warnings)
+    signals = SimpleNamespace(change=change, pressure_measured=unknown, warnings=warnings, stiffness=stiffness)
     rows = SimpleNamespace(
         recording=recording, signals=signals, at=lambda frames: frames, read=lambda frames: (None, signals)
     )
@@ -44,7 +50,7 @@ def drawn(
         "displacement_biotac": touched * rng.normal(size=skin) * 1e-4,
         "displacement_digit": touched * rng.normal(size=gel) * 1e-4,
         "image": rng.integers(0, 256, (count, 320, 240, 3), dtype=np.uint8),
-        "force": touched * np.tile([0, 1.0, 0], (count, 1)),
+        "force": touched * np.tile([0, force, 0], (count, 1)),
         "confidence": np.full(count, 0.9),
         "flags": np.zeros(count, np.uint16),
         "expected_error_digit": np.full(count, 30e-6),
@@ -53,8 +59,14 @@ def drawn(
         "pressure": np.linspace(0, 2e3, count) if touched else unknown,
         "explained": np.linspace(-3, 1, count) if touched else unknown,
     })  # fmt: skip
-    report.draw_sheet(path)
-    return path
+    return report
+
+
+@pytest.mark.parametrize(("force", "stiffness", "said"), [(4.5, 1.0, True), (3.5, 1.0, False), (4.5, 1.2, False)])
+def test_a_force_beyond_what_signals_tell_is_said(force: float, stiffness: float, said: bool) -> None:
+    found = [text for text in reported(force=force, stiffness=stiffness).warnings() if "force above 4 N" in text]
+    assert len(found) == said
+    assert all(text.startswith(f"{COUNT} of {COUNT} frames: ") for text in found)
 
 
 def size(path: Path) -> tuple[int, int]:

@@ -17,6 +17,7 @@ from tactile_core.jobs.pairs import make_pairs
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import Bodies, true_displacement
 from tactile_core.translation.translator import Translator
+from tactile_core.translation.trust_words import FIRM
 
 from .contact_rows import left_of_nothing, metrics, nearest_example
 from .test_set import SEED, as_read
@@ -38,8 +39,8 @@ indenters = [
 
 
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
-    """Return rows of each set's contacts: median errors of place, force and depth, the median overlap, and the mean of
-    the gel's error, divided by that of no displacement."""
+    """Return rows of each set's contacts: median errors of place, force (of firm contacts, too) and depth, the median
+    overlap, and the mean of the gel's error, divided by that of no displacement."""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
         "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),
@@ -74,6 +75,10 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
     for metric, unit in METRICS.items():
         value, baseline = (float(np.nanmedian(errors[f"{who}_{metric}"])) for who in ("found", "nearest"))
         made.append(row(f"bodies_{metric}", value, unit, baseline=baseline, of=of, at_least=metric == "iou"))
+    firm = lengths(pairs.force) > FIRM
+    if firm.any():
+        off, baseline = (float(np.median(errors[f"{who}_force_size_percent"][firm])) for who in ("found", "nearest"))
+        made.append(row("bodies_firm_force_percent", off, "%", baseline=baseline, of=f"{firm.sum()} over {FIRM:g} N"))
     true = true_displacement(pairs, "digit", every)
     left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
     return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
