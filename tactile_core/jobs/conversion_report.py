@@ -69,14 +69,16 @@ class ConversionReport:
             self._shown[int(frames[row])] = kept
 
     def warnings(self) -> tuple[str, ...]:
-        """Return warnings for the user: of the weights, the options, the recording, and its translated frames."""
+        """Return warnings for the user: of the weights, the recording, the options, and its translated frames."""
+        return *self._of_weights(), *self._of_recording()
+
+    def _of_weights(self) -> list[str]:
+        return [*filter(None, [doubt(self._tools.translator.card)])]
+
+    def _of_recording(self) -> list[str]:
+        """Return what was found, in the order of the steps: single samples first, whole frames last."""
         translator, drawer = self._tools.translator, self._tools.drawer
-        found = [
-            *filter(None, [doubt(translator.card)]),
-            *self._rows.signals.warnings,
-            *translator.answer.describe_shift(),
-        ]
-        found += drawer.describe_gel()
+        found = [*self._rows.signals.warnings, *translator.answer.describe_shift(), *drawer.describe_gel()]
         for flag, words in SENTENCES.items():
             name = str(flag.name).lower()
             denied = self._denied if flag is flags.Flag.UNEXPLAINED else 0
@@ -87,7 +89,7 @@ class ConversionReport:
             found.append(f"{self._firm} of {len(self._frames)} frames: {TOO_FIRM}")
         if self._made.folded:
             found.append(f"{self._made.folded} frames: the translated gel folds over itself; heights there are guesses")
-        return tuple(found)
+        return found
 
     @property
     def explained(self) -> float | None:
@@ -120,7 +122,7 @@ class ConversionReport:
         truth = None if skin is None else skin[self._rows.at(shown)]
         snapshots = bool(np.isnan(recording.time).all())
         time, columns = self._frames if snapshots else recording.time[rows], np.searchsorted(self._frames, shown)
-        lines = _sentences(self.warnings(), of["confidence"])
+        lines = _sentences([*self._of_weights(), *self._of_recording()[::-1]], of["confidence"])  # the gravest first
         figure = SheetFigure(len(shown), camera, lines, truth is not None, snapshots=snapshots)
         # File names may hold what is no text at all.
         figure.title("".join(letter if letter.isprintable() else "?" for letter in recording.name), recording.simulated)

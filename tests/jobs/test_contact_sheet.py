@@ -112,6 +112,15 @@ def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path) -> None:
     assert size(drawn(path, many))[1] < plain + 120
 
 
+def test_what_doubts_whole_frames_is_shown_before_single_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(SheetFigure, "png", lambda figure: "\n".join(figure.warnings).encode())
+    found = ["line 7: glitch in E3 900; interpolated", "rest found under load"]
+    lines = drawn(tmp_path / "sheet.txt", found, force=4.5).read_text().split("\n")
+    assert [line.split()[0] for line in lines] == [str(COUNT), "rest", "line"]
+
+
 @pytest.mark.parametrize("name", ["$\\alpha", "名前", "a\udcff\nb", "x" * 300])
 def test_any_name_can_be_drawn(tmp_path: Path, name: str, recwarn: pytest.WarningsRecorder) -> None:
     drawn(tmp_path / "a.png", name=name)
