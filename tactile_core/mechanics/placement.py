@@ -31,6 +31,7 @@ _NARROW = 2e-3  # m, four spacings of the coarser lattice, the BioTac's: a body 
 _BESIDE = 1e-3  # m, largest distance of a node from the line on which a body's foremost point moves
 _FRONT = 4e-3  # m: nodes this far behind the first one are on the far side of the sensor
 _MISSED = 1e-6  # m, a body that stays this far away has passed the sensor by
+MOST_TILT = np.pi / 4 + 1e-6  # rad, as in scenes, and rounding of single precision
 _SAME = 1e-12  # m, sideways, of poses that differ in depth alone
 
 
@@ -208,8 +209,9 @@ class Placement:
     """Place and angle of an indenter, the same for both sensors.
 
     x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto it
-    tilt : rad, between the indenter's axis and the surface normal
+    tilt : rad, between the indenter's axis and the surface normal; at most pi / 4 either way, as in scenes
     tilt_heading : rad, the way its upper end leans: 0 toward +x, pi / 2 toward -z
+    Raises TactileError for a larger tilt.
 
     >>> tactile.Placement(x=2e-3, z=0.0, tilt=0.1)
     """
@@ -218,6 +220,11 @@ class Placement:
     z: float
     tilt: float = 0.0
     tilt_heading: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not abs(self.tilt) <= MOST_TILT:  # nan, too
+            expected = f"-{MOST_TILT:.3f} to {MOST_TILT:.3f} rad, 45 degrees"
+            raise TactileError("Placement, tilt", f"{self.tilt:g} rad", expected, "Convert degrees: math.radians(20)")
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:

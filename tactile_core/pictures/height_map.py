@@ -33,6 +33,7 @@ MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a 
 MOVE_ITERATIONS = 12  # 2 or 3 do for presses, 6 for firm grips; where 12 do not, the surface folds over itself
 BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
 NEGLIGIBLE = 1e-12  # weight of a node in a pixel, of 1 in all: a hundred-thousandth of float32's rounding
+FARTHEST = 10e-3  # m that a node moves, twice the thickest gel (assumed)
 SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
 
 
@@ -77,14 +78,17 @@ class HeightMapper:
         """Return heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
 
         They are twice differentiable where the surface does not fold, and exactly ``rest`` where nothing moves. A point
-        from outside the window counts as its edge. Raises TactileError for another shape or a value that is not
-        finite."""
+        from outside the window counts as its edge. Raises TactileError for another shape, a value that is not finite,
+        and places in place of displacements."""
         displacement = np.asarray(displacement)
         expected = (len(self.surface.rest), 3)
         if displacement.ndim not in (2, 3) or displacement.shape[-2:] != expected:
             raise TactileError("displacement", f"shape {displacement.shape}", f"{expected} or (T, {expected[0]}, 3)")
         if not np.isfinite(displacement).all():
             raise TactileError("displacement", "values that are not finite", "metres", "Repair the frame first")
+        if (farthest := np.abs(displacement).max(initial=0)) > FARTHEST:
+            found, advice = f"up to {farthest:.3g}", "Divide millimetres by 1000; take the resting surface off places"
+            raise TactileError("displacement", found, f"at most {FARTHEST:g} m, more than a gel yields", advice)
         if displacement.ndim == 2:
             return self._one(displacement)
         maps = np.empty((len(displacement), *self.camera.shape), np.float32)

@@ -23,6 +23,7 @@ from .opened_file import opened, refuse_finger
 from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
 from .tables.column_map import ColumnMap, refuse_bag
+from .tables.column_map import read as read_map
 from .tables.json_table import read_json
 from .tables.mapped import read_mapped
 from .tables.mapped_files import open_store, read_by_map
@@ -41,13 +42,17 @@ def layouts() -> tuple[ModuleType, ...]:
 
 
 def read(
-    path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE, lean: bool = False
+    path: str | os.PathLike[str],
+    columns: ColumnMap | str | os.PathLike[str] | None = None,
+    sensor: str = SOURCE,
+    lean: bool = False,
 ) -> Recording:
     """Read a recording: CSV, HDF5, NPZ, NPY, MATLAB 5, JSON or a ROS bag, detected from the content, not from the name.
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers, ``hands.bag#left/biotac/finger1`` that
         of one topic of a bag
-    columns : which column or array of the file is what, where no known layout has its names; see ``column_map.read``
+    columns : which column or array of the file is what, where no known layout has its names; a map's file,
+        or one of ``column_map.read``
     sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
     lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
         in single precision where that is exact, as it is of counts: a third of the memory
@@ -60,6 +65,7 @@ def read(
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
     path = os.fspath(path)
+    columns = read_map(columns) if isinstance(columns, str | os.PathLike) else columns
     found = _read(path, columns, sensor, lean)
     if found.sensor != sensor:
         check_electrodes(path, found.electrodes.shape[1], f"a {title(found.sensor)}'s recording", sensor)

@@ -126,8 +126,11 @@ def translate(
     >>> touch = tactile.translate(recording)
     >>> touch.force[:, 1].max()  # N, largest force into the skin
     """
+    if not isinstance(recording, Recording):
+        advice = "Read its file with tactile.read; numpy.savez writes arrays to one"
+        raise TactileError("translate, recording", f"a {type(recording).__name__}", "a Recording", advice)
     chosen = np.arange(len(recording))[frames]
-    if not len(chosen) or chosen[0] > chosen[-1]:
+    if np.ndim(chosen) != 1 or not len(chosen) or (np.diff(chosen) <= 0).any():
         expected = f"a slice forward through {len(recording)} frames that holds at least one"
         raise TactileError("translate, frames", str(frames), expected)
     chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)

@@ -66,6 +66,12 @@ def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
     assert abs(pose.distance(cube, dome(near, 0.4e-3))[0].min()) < 0.5e-6  # m, as above
 
 
+@pytest.mark.parametrize("tilt", [20, -1, float("nan")])
+def test_degrees_are_no_tilt(tilt):
+    with pytest.raises(TactileError, match=r"Placement, tilt: .* rad; .*45 degrees. Convert degrees: math.radians"):
+        Placement(-6e-3, 0.0, tilt)
+
+
 def test_ball_set_on_a_smooth_place_stays_there():
     ball = Sphere(3.5e-3)
     point, outward = DIGIT.dome_point(-8e-3, 1e-3)

@@ -138,6 +138,9 @@ def test_bad_displacement_is_refused() -> None:
     for bad in (good[:-1], good[:, :2], good[None, None], good[:, 0]):
         with pytest.raises(TactileError, match="shape"):
             height_map(bad)
+    for bad in (1e3 * good + 0.3, good + sensors.digit_surface().rest):
+        with pytest.raises(TactileError, match="Divide millimetres by 1000; take the resting surface off places"):
+            height_map(bad)
     good[7, 1] = np.nan
     with pytest.raises(TactileError, match="not finite"):
         height_map(good)

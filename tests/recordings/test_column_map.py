@@ -60,6 +60,13 @@ def test_a_map_leads_through_convert_and_batch(own, tmp_path):
     assert list((tmp_path / "job" / "shards").rglob("*.h5"))
 
 
+def test_a_map_s_file_may_be_named_in_python(own, tmp_path):
+    assert main(["info", str(own), "--columns", str(tmp_path / "map.toml")]) == 0
+    by_name = recordings.read(own, tmp_path / "map.toml")
+    by_map = recordings.read(own, column_map.read(tmp_path / "map.toml"))
+    np.testing.assert_array_equal(by_name.electrodes, by_map.electrodes)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
