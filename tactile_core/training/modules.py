@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -202,3 +203,19 @@ def initialise(module: nn.Module, generator: torch.Generator) -> None:
             if name.endswith(("down", "last")):
                 nn.init.zeros_(layer.weight)
                 nn.init.zeros_(layer.bias)
+
+
+WARM_UP = 0.02  # share of a training over which the learning rate rises (assumed)
+
+
+def take_step(optimiser: torch.optim.Optimizer, loss: Callable[[], Tensor], share: float, rate: float) -> float:
+    """Take a step of training by ``loss()``, gradients clipped to a norm of 1; returns the loss.
+    share : of the training that this step completes; the learning rate rises to ``rate``, then falls as a cosine"""
+    for group in optimiser.param_groups:
+        group["lr"] = rate * min(1.0, share / WARM_UP) * 0.5 * (1.0 + math.cos(math.pi * share))
+    optimiser.zero_grad()
+    value = loss()
+    value.backward()
+    nn.utils.clip_grad_norm_([each for group in optimiser.param_groups for each in group["params"]], 1.0)
+    optimiser.step()
+    return float(value.detach())

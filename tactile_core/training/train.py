@@ -28,6 +28,7 @@ from . import checkpoint
 from .data import Contacts
 from .error_report import draw_losses, write_log
 from .export_weights import export, versions
+from .modules import take_step
 from .options import Options, device_of
 from .stages import STAGES, Model, Stage
 from .step_errors import Bodies, our_bodies
@@ -36,7 +37,6 @@ from .two_contacts import Presses, train_parts
 log = logging.getLogger(__name__)
 Progress = Callable[[float, str], None]
 CHECKPOINT = "checkpoint.npz"  # in the training's folder, until all else is written
-WARM_UP = 0.02  # share of the steps over which the learning rate rises (assumed)
 NETS_SHARE = 0.8  # of a training's time, before what tells two contacts apart is trained
 VALIDATION_SEED = 2**31  # stands in the place of the epoch; no training has as many
 
@@ -230,19 +230,10 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss. The rate rises up to ``rate`` at
-    first, then falls as a cosine."""
+    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss. rate : see ``take_step``"""
     total = 0.0
     for step, loss in enumerate(losses):
-        share = (epoch * len(losses) + step + 1) / (epochs * len(losses))
-        for group in optimiser.param_groups:
-            group["lr"] = rate * min(1.0, share / WARM_UP) * 0.5 * (1.0 + math.cos(math.pi * share))
-        optimiser.zero_grad()
-        value = loss()
-        value.backward()
-        torch.nn.utils.clip_grad_norm_([each for group in optimiser.param_groups for each in group["params"]], 1.0)
-        optimiser.step()
-        total += float(value.detach())
+        total += take_step(optimiser, loss, (epoch * len(losses) + step + 1) / (epochs * len(losses)), rate)
     if not math.isfinite(total):
         raise TactileError("training", "the loss is not finite", "a falling loss", "Check the pairs, or lower the rate")
     return total / len(losses)

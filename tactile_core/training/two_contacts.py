@@ -5,7 +5,6 @@ both press, is neglected). A sum has no first and second: the error is that of t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -17,7 +16,7 @@ from ..simulation.pairs_file import Split
 from ..translation.layers import COUNT_SCALE
 from ..translation.second_contact import FINE, PARTED
 from .data import measured
-from .modules import Residual, initialise
+from .modules import Residual, initialise, take_step
 from .options import Options
 from .surface_codec import image_of_electrodes
 
@@ -52,15 +51,10 @@ def train_parts(
     steps = max(1, round(options.effort * options.parts_steps))
     for step in range(steps):
         share = (step + 1) / steps
-        for group in optimiser.param_groups:
-            group["lr"] = options.rate * min(1.0, share / 0.02) * 0.5 * (1.0 + math.cos(math.pi * share))
-        optimiser.zero_grad()
-        loss = parts_loss(network, *_drawn(presses, split.train, options, rest, image, random))
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimiser.step()
+        batch = _drawn(presses, split.train, options, rest, image, random)
+        loss = take_step(optimiser, lambda batch=batch: parts_loss(network, *batch), share, options.rate)
         if step % 100 == 99 or step + 1 == steps:
-            progress(share, f"parts {step + 1}/{steps}: loss {float(loss.detach()):.4f}")
+            progress(share, f"parts {step + 1}/{steps}: loss {loss:.4f}")
     tensors = {f"map.{name}": tensor.numpy().astype(np.float16) for name, tensor in network.state_dict().items()}
     alone = presses.signal[random.choice(split.validation, SINGLES)]
     read = torch.from_numpy(measured(alone, random, options, 0.0, options.unit, rest)[:, :-1])

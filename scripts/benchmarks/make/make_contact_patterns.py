@@ -2,9 +2,9 @@
 
     python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
 
-The reference signals of the weights, in counts against rest, with the sign of a raw reading (``sensors.COUNT_SIGN``).
-With the fluid's pressure that the same weights give for them. They show a recording's polarity and whether it can be
-of a sensor as simulated. Run it again when the weights were trained again.
+The tables hold the reference signals of the weights, counts against rest with the sign of a raw reading
+(``sensors.COUNT_SIGN``), and the fluid's pressure that the weights give for them. They show a recording's polarity and
+whether it can be of a sensor as simulated. Run it again when the weights were trained again.
 """
 
 from __future__ import annotations

@@ -42,8 +42,8 @@ class Method:
 
 
 def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
-    """Least CPU ms a frame of calls of ``work``, each of some frames, after a first that may compile.
-    least_seconds : CPU s to go on for; most : calls, and three at least"""
+    """Return the least CPU ms per frame over repeated calls of ``work``, after a first that may compile.
+    frames : in a call; calls repeat for ``least_seconds`` of CPU, at least 3 and at most ``most`` times"""
     work()
     took, began = [], time.process_time()
     while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):

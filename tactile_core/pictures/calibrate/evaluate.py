@@ -33,14 +33,13 @@ TARGETS = {
 class Evaluation:
     """Result of a calibration on one photograph.
 
-    ball : three numbers fitted, the radius known; free_radius : m, of the fit of four numbers
+    ball : three numbers fitted, the radius known
     picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
     through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; the
         ``through_*`` metrics use the median share of the set's other photographs, all others the calibration's"""
 
     press: Press
     ball: Ball
-    free_radius: float
     picture: np.ndarray
     through: float
     metrics: dict[str, float]
@@ -103,7 +102,6 @@ def _try_press(
     more = missing_light(working, sight, fit_ball(working, sight, radius, lit=True)[0])[1]
     known = whole.calibration.through
     through = min(max(known + more, 0.0), 1.0)
-    free = float("nan")
     if search_radius:
         ends = [fit_ball(working, sight, start * radius, free_radius=True) for start in RADIUS_STARTS]
         free = min(ends, key=lambda end: end[1])[0].radius
@@ -113,7 +111,7 @@ def _try_press(
     if through > known + BRIGHT:
         light = f"{100 * through:.0f} % of the coating's own light comes through it from the ball"
         flags += (f"{light}, {100 * known:.0f} % by the calibration",)
-    return Evaluation(press, ball, free, picture, through, ours, baseline, flags)
+    return Evaluation(press, ball, picture, through, ours, baseline, flags)
 
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
