@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -51,8 +52,8 @@ def train_parts(
     steps = max(1, round(options.effort * options.parts_steps))
     for step in range(steps):
         share = (step + 1) / steps
-        batch = _drawn(presses, split.train, options, rest, image, random)
-        loss = take_step(optimiser, lambda batch=batch: parts_loss(network, *batch), share, options.rate)
+        loss_of_batch = partial(parts_loss, network, *_drawn(presses, split.train, options, rest, image, random))
+        loss = take_step(optimiser, loss_of_batch, share, options.rate)
         if step % 100 == 99 or step + 1 == steps:
             progress(share, f"parts {step + 1}/{steps}: loss {loss:.4f}")
     tensors = {f"map.{name}": tensor.numpy().astype(np.float16) for name, tensor in network.state_dict().items()}
