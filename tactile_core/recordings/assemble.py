@@ -26,9 +26,9 @@ MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no m
 LOOKED_AT = 10_000  # rows, by which fingers that take turns are found
 MOST_FINGERS = 5
 TURNS = 5  # times the change in a whole turn, the change to the next row (assumed; without turns it is the smaller)
-NOISE = (
-    1e-3  # of a reading (assumed; in real recordings rows change by 5 counts and less, units rest 50 apart and more)
-)
+# Of a reading, times TURNS 38 counts at rest (assumed: rows change by 5 counts and less, mains hum of 50 Hz at 100 Hz
+# swings by some 20 from row to row, units rest 50 apart and more).
+NOISE = 2.5e-3
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 

@@ -205,6 +205,12 @@ def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp
         recordings.read(tmp_path / "a.npz")
 
 
+def test_hum_at_half_the_rate_is_no_second_finger(press, tmp_path):
+    hum = 10 * (-1) ** np.arange(len(press.time))  # counts: 50 Hz of the mains at 100 Hz
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes + hum[:, None], time=press.time)
+    assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
+
+
 @pytest.mark.parametrize("names", ["E{}_tared", "filtered_E{}", "delta/E{}"])
 def test_raw_electrodes_are_taken_before_processed_ones(names, press, tmp_path):
     processed = [names.format(i) for i in range(1, 20)]
