@@ -167,7 +167,7 @@ class Candidates:
         gap, first = pose.distance(indenter, points)
         crease = _meet(points - gap[:, None] * first, first, left, normals)
         new, probe = np.zeros(len(at), bool), np.zeros_like(normals)
-        for reach in _CREASE_PROBES:
+        for reach in _CREASE_PROBES:  # the least at which either face's normal is seen beside the crease
             hit = ~new
             for face, other in ((normals, first), (first, normals)):
                 _, found = pose.distance(indenter, crease + reach * other)

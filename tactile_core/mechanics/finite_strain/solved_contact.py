@@ -46,10 +46,10 @@ def guarded(touch: ContactState) -> ContactState:
 
 @dataclasses.dataclass(frozen=True)
 class Tolerance:
-    """Criteria that end an iteration.
+    """Criteria that end an iteration: gaps below ``gap``, and an imbalance below ``balance`` or a step below ``step``.
 
-    gap : m, of every touching node; balance : relative, of the largest nodal force and of the fluid's volume, before
-        the last step; step : m, a last step so small that the balance after it is good, by quadratic convergence
+    gap : m; balance : residual over the largest nodal force, and the fluid's excess volume over its volume
+    step : m; after so small a step the balance is good, by quadratic convergence
     """
 
     gap: float
