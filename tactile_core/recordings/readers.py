@@ -25,6 +25,7 @@ from .tables.array_table import labels_in
 from .tables.column_map import ColumnMap, refuse_bag
 from .tables.column_map import read as read_map
 from .tables.json_table import read_json
+from .tables.map_guess import is_time
 from .tables.mapped import read_mapped
 from .tables.mapped_files import open_store, read_by_map
 from .tables.table import Table, read_header, read_table
@@ -98,9 +99,14 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
 
 
 def _noted(recording: Recording, store: Store) -> Recording:
-    """Add names of arrays that the recording leaves out and, unless it is simulated, the file's labels."""
+    """Add names of arrays that the recording leaves out, a warning of one that may be its time, and, unless it is
+    simulated, the file's labels."""
     labels = {} if recording.simulated else labels_in(store, len(recording))
-    return replace(recording, labels=labels, not_taken=tuple(name for name in store.shapes if name not in store.taken))
+    left, warnings = tuple(name for name in store.shapes if name not in store.taken), recording.warnings
+    clock = next((name for name in left if is_time(name) and store.shapes[name][0][:1] == (len(recording),)), None)
+    if clock and not recording.simulated and not any(is_time(name) for name in store.taken):
+        warnings = (*warnings, f"array {clock!r} is not taken for time. {MAP_ADVICE}")
+    return replace(recording, labels=labels, not_taken=left, warnings=warnings)
 
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:

@@ -220,6 +220,30 @@ def test_raw_electrodes_are_taken_before_processed_ones(names, press, tmp_path):
     np.testing.assert_array_equal(read_by_guess(tmp_path / "a.csv").electrodes, press.electrodes)
 
 
+@pytest.mark.parametrize(
+    ("names", "time", "pdc", "tac"),
+    [
+        ("section time pdc_offset pdc contact", "time", "pdc", ""),
+        ("elapsed x y biotac_pdc tac", "elapsed", "biotac_pdc", "tac"),
+    ],
+)
+def test_columns_whose_names_hold_another_s_are_not_taken_for_it(names, time, pdc, tac, press, tmp_path):
+    rows = np.column_stack([press.time, press.time, press.pdc, press.pdc, press.pdc, press.electrodes])
+    header = ",".join([*names.split(), *(f"biotac_e{i}" for i in range(1, 20))])
+    np.savetxt(tmp_path / "a.csv", rows, delimiter=",", header=header, comments="", fmt="%g")
+    with opened(str(tmp_path / "a.csv")) as (container, where, _, file):
+        (found,), _ = guess_map(where, container, file)
+    assert (found.time, found.pdc, found.tac) == (time, pdc, tac)
+
+
+@pytest.mark.parametrize("name", ["timestamps", "t", "stamp_ms"])
+def test_a_time_that_is_not_taken_is_named(name, press, tmp_path):
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes, **{name: press.time})
+    assert f"array {name!r} is not taken for time" in " ".join(recordings.read(tmp_path / "a.npz").warnings)
+    np.savez(tmp_path / "b.npz", electrodes=press.electrodes, time=press.time, **{name: press.time})
+    assert not recordings.read(tmp_path / "b.npz").warnings
+
+
 def test_arrays_of_electrodes_first_are_refused_with_the_way_to_read_them(press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=press.electrodes.T, time=press.time)
     with pytest.raises(TactileError, match=r"shape \(19, 700\); expected \(frames, 19\). Transpose it, or give a map"):

@@ -17,9 +17,10 @@ from .table import Table
 NUMBERED = re.compile(r"(.*?)(\d+)(\D*)$", re.DOTALL)
 NUMBER = re.compile(r"\d+")
 INDEXED = re.compile(r"\[\d+\]$")
-TIME = re.compile(r"time|stamp|clock|(?:^|[^a-z])ts?(?:[^a-z]|$)|sec")
+TIME = re.compile(r"time|stamp|clock|elapsed|(?:^|[^a-z])ts?(?:[^a-z]|$)|sec")
 CLOCK_LIKE = re.compile(r"\d:\d\d")
 UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
+NO_TAC = re.compile(r"biotac|contact|tactile")  # words that hold a channel's name
 ELECTRODE = re.compile(r"electrode|(?:^|[^a-z])(?:elec|ele|el|e)[^a-z]*$")
 NOT_READ = re.compile(r"offset|time|stamp|pac|temp|force|joint")  # series of these are no electrodes
 PROCESSED = re.compile(r"tare|filt|smooth|norm|scale|delta|diff|change|mean|std")  # read only where no raw series is
@@ -106,12 +107,12 @@ def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
 
 def _is_called(word: str, name: str) -> bool:
     """Return true for the column of a channel, false for one of its array's columns."""
-    return word in name.rpartition("/")[2] and not INDEXED.search(name)
+    return word in NO_TAC.sub("", name.rpartition("/")[2]) and not INDEXED.search(name)
 
 
 def _nearest(names: Iterable[str], like: str) -> str:
-    """Return the name with the longest common beginning with `like`, the first of such; "" for none."""
-    return max(names, key=lambda name: _alike(name, like), default="")
+    """Return the name with the longest common beginning with `like`, of such the first of the shortest; "" for none."""
+    return max(names, key=lambda name: (_alike(name, like), -len(name)), default="")
 
 
 def _alike(name: str, other: str) -> int:
@@ -120,11 +121,16 @@ def _alike(name: str, other: str) -> int:
     return next((place for place, (one, two) in enumerate(pairs) if one != two), min(len(name), len(other)))
 
 
+def is_time(name: str) -> bool:
+    """Return true for a name that time may have."""
+    return bool(TIME.search(name.lower().rpartition("/")[2]))
+
+
 def _timed(columns: ColumnMap, names: Collection[str], table: Table | None) -> ColumnMap:
     """Return the map with the time's column and unit."""
     like = next(filter(None, columns.electrodes), "")
     taken = columns.names()
-    timed = [name for name in names if TIME.search(name.rpartition("/")[2]) and name not in taken]
+    timed = [name for name in names if is_time(name) and name not in taken]
     if table is not None:
         timed = [name for name in timed if all(map(CLOCK_LIKE.search, table.words.get(name, ())))]  # the reader says it
         timed += [name for name in names if name.startswith("column") and name not in taken and _rises(table, name)]

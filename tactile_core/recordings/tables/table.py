@@ -264,7 +264,8 @@ def text_lines(path: str, data: bytes) -> list[str]:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:
-        raise TactileError(f"{path}, byte {data.index(0)}", "binary data", "a CSV, HDF5, NPZ or MATLAB 5 recording")
+        expected, advice = "a CSV, HDF5, NPZ or MATLAB 5 recording", "Write tables as CSV, arrays by numpy.savez"
+        raise TactileError(f"{path}, byte {data.index(0)}", "binary data", expected, advice)
     try:
         text = unquoted(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
