@@ -306,6 +306,12 @@ def test_readings_in_other_units_are_counts(top, words, press, tmp_path):
     np.testing.assert_allclose(found.pdc, counts.pdc)
 
 
+def test_millivolts_are_told_by_their_names(press, tmp_path):
+    text = table(press).replace(",E", ",mV_E")
+    (tmp_path / "a.csv").write_text(text, encoding="utf-8")
+    assert "electrodes are called mV ('mv_e1')" in " ".join(read_by_guess(tmp_path / "a.csv").warnings)
+
+
 def test_counts_per_unit_makes_readings_raw(press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=press.electrodes * 3 / 4095, time=press.time, pdc=press.pdc)
     options = recordings.PrepareOptions(counts_per_unit=4095 / 3)

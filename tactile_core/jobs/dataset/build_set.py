@@ -105,13 +105,20 @@ def _check_out(out: Path) -> None:
 
 
 def _counted(recipe: Recipe, found: Collected) -> list[str]:
-    """Return sentences on the sizes of train and test, with a warning where nothing is held out."""
+    """Return sentences on the sizes of train and test, with a warning where nothing is held out, and of labels that
+    differ in case alone."""
     splits = Counter(file.split for file in found.files)
     units = len(found.units())
     lines = [f"{len(found.files)} files of {units} units or hands: {splits[TRAIN]} train, {splits[TEST]} test"]
     if recipe.split.by and not splits[TEST]:
         wanted = f"values {', '.join(recipe.split.test)}" if recipe.split.test else "values one in five"
         lines.append(f"warning: nothing is held out for testing: no {recipe.split.by} among the {wanted}")
+    alike: dict[tuple[str, str], set[str]] = {}
+    for name, text in (label for file in found.files for label in file.labels.items()):
+        alike.setdefault((name, text.casefold()), set()).add(text)
+    for (name, _), texts in alike.items():
+        if len(texts) > 1:
+            lines.append(f"warning: {name} {', '.join(sorted(texts))} are taken for different ones: rename the files")
     return lines
 
 

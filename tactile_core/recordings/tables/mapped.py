@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,6 +22,7 @@ TITLES = {"csv": "CSV", "json": "JSON", "hdf5": "HDF5", "npz": "NPZ", "mat": "MA
 STAMPED = 1.5  # stamps for each value of a channel, up to which rows of one stamp are a frame (assumed)
 MOST_SERIES = 5  # values of a column that tells fingers apart; more are places in a buffer (assumed)
 LOOKED_AT = 10_000  # rows
+MILLIVOLTS = re.compile(r"(?:^|[^a-z])mv(?:[^a-z]|$)")
 TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers have 0.5 (assumed)
 
 
@@ -113,10 +115,19 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
         rows=table.lines,
         problems=table.essential({time, *electrodes}, named.values()),
         row_word="line" if container == "csv" else "frame",
-        warnings=table.warnings,
+        warnings=(*table.warnings, *_tell_millivolts(electrodes)),
         names=electrodes,
         labels=table.labels({time, *electrodes, *named.values()}),
         **channels,
+    )
+
+
+def _tell_millivolts(names: list[str]) -> list[str]:
+    """Return a sentence, or none, on electrodes whose names say mV, which counts cannot be told from."""
+    told = next(filter(MILLIVOLTS.search, names), None)
+    advice = "1.241 with --counts-per-unit if the range is 3.3 V"
+    return (
+        [f"electrodes are called mV ({told!r}) and taken for counts, without counts a unit: {advice}"] if told else []
     )
 
 

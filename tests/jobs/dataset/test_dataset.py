@@ -179,6 +179,15 @@ def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_p
     assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
 
 
+def test_labels_that_differ_in_case_alone_are_named(recipe, tmp_path, capsys):
+    for name in ("Ball_1", "ball_2", "rolled_1"):
+        (tmp_path / "in").mkdir(exist_ok=True)
+        (tmp_path / "in" / f"{name}.npz").touch()
+    assert main(command(recipe, tmp_path / "in", tmp_path / "out")) == 2
+    said = capsys.readouterr().err
+    assert "warning: object Ball, ball are taken for different ones: rename the files" in said
+
+
 @pytest.mark.parametrize(("name", "numbers"), [
     ("angle_1.5.csv", ["1.5"]), ("x_-10_y_0.6.csv", ["-10", "0.6"]), ("run.1.2.csv", ["1", "2"]),
     ("2024.01.05_a.csv", ["2024", "01", "05"]),
