@@ -14,6 +14,7 @@ import numpy as np
 from .. import accuracy
 from ..files import atomic
 from ..recordings import flags
+from ..recordings.doubt import reason_of
 from ..sensors import title
 from ..translation.card import doubt
 from ..translation.simulated_likeness import contradicted
@@ -122,7 +123,8 @@ class ConversionReport:
         truth = None if skin is None else skin[self._rows.at(shown)]
         snapshots = bool(np.isnan(recording.time).all())
         time, columns = self._frames if snapshots else recording.time[rows], np.searchsorted(self._frames, shown)
-        lines = _sentences([*self._of_weights(), *self._of_recording()[::-1]], of["confidence"])  # the gravest first
+        gravest_last = sorted(self._of_recording(), key=lambda text: reason_of(text) is not None)
+        lines = _sentences([*self._of_weights(), *gravest_last[::-1]], of["confidence"])
         figure = SheetFigure(len(shown), camera, lines, truth is not None, snapshots=snapshots)
         # File names may hold what is no text at all.
         figure.title("".join(letter if letter.isprintable() else "?" for letter in recording.name), recording.simulated)

@@ -11,6 +11,7 @@ from tactile_core import sensors
 from tactile_core.jobs.conversion_report import ConversionReport, choose_frames
 from tactile_core.jobs.frame_pass import Tools
 from tactile_core.jobs.sheet_figure import CAPTION, FOOT, SheetFigure
+from tactile_core.recordings.doubt import Doubt, Reason
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.translation.answer import Answer
@@ -112,13 +113,14 @@ def test_truth_adds_a_row_and_warnings_add_lines(tmp_path: Path) -> None:
     assert size(drawn(path, many))[1] < plain + 120
 
 
-def test_what_doubts_whole_frames_is_shown_before_single_samples(
+def test_what_doubts_the_whole_is_shown_before_frames_and_samples(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(SheetFigure, "png", lambda figure: "\n".join(figure.warnings).encode())
-    found = ["line 7: glitch in E3 900; interpolated", "rest found under load"]
+    loaded = Doubt(Reason.REST_LOADED, share=0.6)
+    found = ["line 7: glitch in E3 900; interpolated", loaded, "rectified: the sign is lost"]
     lines = drawn(tmp_path / "sheet.txt", found, force=4.5).read_text().split("\n")
-    assert [line.split()[0] for line in lines] == [str(COUNT), "rest", "line"]
+    assert [line.split()[0] for line in lines] == ["what", str(COUNT), "rectified:", "line"]
 
 
 @pytest.mark.parametrize("name", ["$\\alpha", "名前", "a\udcff\nb", "x" * 300])
