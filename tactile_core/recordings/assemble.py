@@ -29,6 +29,7 @@ TURNS = 5  # times the change in a whole turn, the change to the next row (assum
 # Of a reading, times TURNS 38 counts at rest (assumed: rows change by 5 counts and less, mains hum of 50 Hz at 100 Hz
 # swings by some 20 from row to row, units rest 50 apart and more).
 NOISE = 2.5e-3
+RAW = 0.3  # of the median, that nine in ten raw readings exceed (as in ``signal_kind``); changes lie on both sides of 0
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 
@@ -140,16 +141,17 @@ def assemble(
 
 def _refuse_turns(path: str, electrodes: np.ndarray) -> None:
     """Raise TactileError where fingers take turns: a row of readings (T, e) is like one some rows before, and unlike
-    the one before."""
+    the one before. Changes are not judged: all fingers rest at 0, and any hum would stand out."""
 
     def change(rows: int) -> float:
         """Return the median change of an electrode in so many rows."""
         return float(np.nanmedian(np.abs(electrodes[rows:] - electrodes[:-rows])))
 
-    if len(electrodes) < TURNS * MOST_FINGERS:
+    low, level = np.nanquantile(electrodes, [0.1, 0.5])
+    if len(electrodes) < TURNS * MOST_FINGERS or low <= RAW * level:
         return
     for count in range(2, MOST_FINGERS + 1):
-        if change(1) > TURNS * max(change(count), NOISE * float(np.nanmedian(np.abs(electrodes)))):
+        if change(1) > TURNS * max(change(count), NOISE * level):
             found = f"rows of {count} fingers take turns: each is like that {count} rows before, unlike the one before"
             raise TactileError(path, found, "one recording", "Split the file: a file for each finger")
 

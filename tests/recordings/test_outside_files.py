@@ -205,9 +205,11 @@ def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp
         recordings.read(tmp_path / "a.npz")
 
 
-def test_hum_at_half_the_rate_is_no_second_finger(press, tmp_path):
+@pytest.mark.parametrize("tared", [False, True])
+def test_hum_at_half_the_rate_is_no_second_finger(tared, press, tmp_path):
     hum = 10 * (-1) ** np.arange(len(press.time))  # counts: 50 Hz of the mains at 100 Hz
-    np.savez(tmp_path / "a.npz", electrodes=press.electrodes + hum[:, None], time=press.time)
+    rest = press.electrodes[0] if tared else 0
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes - rest + hum[:, None], time=press.time)
     assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
 
 
