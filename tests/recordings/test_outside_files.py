@@ -227,6 +227,8 @@ def test_raw_electrodes_are_taken_before_processed_ones(names, press, tmp_path):
     [
         ("section time pdc_offset pdc contact", "time", "pdc", ""),
         ("elapsed x y biotac_pdc tac", "elapsed", "biotac_pdc", "tac"),
+        ("section x y pdc tac", "", "pdc", "tac"),
+        ("second_touch x_centimeters x pdc tac", "", "pdc", "tac"),
     ],
 )
 def test_columns_whose_names_hold_another_s_are_not_taken_for_it(names, time, pdc, tac, press, tmp_path):

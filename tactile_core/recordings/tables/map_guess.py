@@ -17,7 +17,7 @@ from .table import Table
 NUMBERED = re.compile(r"(.*?)(\d+)(\D*)$", re.DOTALL)
 NUMBER = re.compile(r"\d+")
 INDEXED = re.compile(r"\[\d+\]$")
-TIME = re.compile(r"time|stamp|clock|elapsed|(?:^|[^a-z])ts?(?:[^a-z]|$)|sec")
+TIME = re.compile(r"(?<!cen)time|stamp|clock|elapsed|(?:^|[^a-z])ts?(?:[^a-z]|$)|(?:secs?|seconds)(?:[^a-z]|$)|second$")
 CLOCK_LIKE = re.compile(r"\d:\d\d")
 UNIT = re.compile(r"(?:^|[^a-z])(ns|us|ms|s)(?:[^a-z]|$)")
 NO_TAC = re.compile(r"biotac|contact|tactile")  # words that hold a channel's name
