@@ -155,7 +155,7 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         exr_file.write_exr(folder / "height.exr", {"height": np.zeros((8, 6), np.float32)}, {"made": "up"})
         found["exr"] = ((folder / "height.exr").read_bytes(), exr_file.read_height)
     heights = io.BytesIO()
-    np.savez_compressed(heights, height_map=np.zeros((2, 8, 6), np.float32))
+    np.savez_compressed(heights, height_map=np.full((2, 8, 6), 1.5e-3, np.float32))
     return found | {
         "photograph": (photograph.getvalue(), background.read_photograph),
         "scene": (scenes.read_bytes(), scene.load_scene),

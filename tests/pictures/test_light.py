@@ -7,6 +7,7 @@ import pytest
 from plain_unit import LEDS, LEVELS, plain_unit
 
 from tactile_core.errors import TactileError
+from tactile_core.pictures import renderer
 from tactile_core.pictures.height_map import rest_height_map
 from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.camera import Led
@@ -105,7 +106,8 @@ def test_undeformed_gel_that_shadows_itself_is_bit_equal_too() -> None:
     assert (free - shader.radiance(ridge))[..., 0].max() > 0.05 * LEVELS
 
 
-def test_tilted_plane_is_lambert() -> None:
+def test_tilted_plane_is_lambert(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(renderer, "MOST_BELOW", 1.0)  # a half of the plane lies deeper than a gel's surface may
     led = Led("red", (9e-3, -3e-3, 9e-3), 1e-7, 1.0)
     plane = 0.2 * RIGHT - 0.1 * DOWN
     unit = plain_unit(leds=(led, *LEDS[1:]))

@@ -191,8 +191,15 @@ def test_a_gel_that_reaches_the_camera_is_refused(any_variant, small):
 
 def test_heights_in_millimetres_are_refused(small):
     """A dent of half a millimetre, as half a metre: away from the camera nothing else stops it."""
-    with pytest.raises(TactileError, match=r"-500\.00 mm high; expected above .* metres"):
+    with pytest.raises(TactileError, match=r"50\d\.\d\d mm below the undeformed gel; .* Give metres"):
         Renderer(small, "fast")(np.full(small.camera.shape, -0.5))
+
+
+def test_heights_of_the_other_sign_and_changes_alone_are_refused(small):
+    rest = rest_height_map(small.camera)
+    for wrong in (-rest, rest - rest):
+        with pytest.raises(TactileError, match=r"mm below the undeformed gel; .* add the undeformed gel's"):
+            Renderer(small, "fast")(wrong)
 
 
 def test_an_unknown_preset_or_variant_is_refused(any_variant, small):

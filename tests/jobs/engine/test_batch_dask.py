@@ -43,7 +43,7 @@ def workers(**more):
 
 def test_dask_renders(tmp_path):
     random = np.random.default_rng(1)
-    np.savez(tmp_path / "heights.npz", height_map=1e-4 * random.random((60, 8, 6)))
+    np.savez(tmp_path / "heights.npz", height_map=1.5e-3 + 1e-4 * random.random((60, 8, 6)))
     asked = Options(preset="fast")
     one = render(tmp_path / "heights.npz", tmp_path / "one", asked, lambda word: nullcontext(lambda done, total: None))
     with workers(protocol="tcp://") as cluster:
@@ -185,7 +185,7 @@ def test_a_scheduler_elsewhere_without_tls_has_to_be_asked_for(address, tmp_path
 @pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "tls://127.0.0.1:1"], ids=["without TLS", "no answer"])
 def test_a_refused_cluster_leaves_no_job(address, tmp_path, monkeypatch):
     monkeypatch.setattr(dask_cluster, "wait", lambda: 0.1)
-    np.savez(tmp_path / "heights.npz", height_map=np.zeros((60, 8, 6)))
+    np.savez(tmp_path / "heights.npz", height_map=np.full((60, 8, 6), 1.5e-3))
     asked = Options(preset="fast")
     with pytest.raises(TactileError, match=address):
         render_in_parts(

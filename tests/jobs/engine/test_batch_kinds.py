@@ -77,7 +77,7 @@ def test_what_cannot_be_simulated_is_told_by_name(scene, tmp_path, capsys):
 def heights(tmp_path):
     """Three height maps of 60 x 80."""
     random = np.random.default_rng(1)
-    maps = 1e-4 * random.random((3, 80, 60)).cumsum(axis=1) / 80
+    maps = 1.5e-3 + 1e-4 * random.random((3, 80, 60)).cumsum(axis=1) / 80
     np.savez(tmp_path / "heights.npz", height_map=maps)
     return tmp_path / "heights.npz"
 
