@@ -25,7 +25,7 @@ from ..sensors.unrolling import roll_up, unrolled_nodes
 from .fast.compliance import compliance_of
 from .fast.compliance_rows import ComplianceRows
 from .node_areas import node_areas
-from .placement import Placement
+from .placement import MOST_TILT, Placement
 from .solution import Solution
 from .solve import solve
 
@@ -73,7 +73,6 @@ def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.
 RADII = 1.5e-3, 14e-3
 LEAST_NODES = 5  # of a patch, one more than a paraboloid needs; smaller patches get the usual radius
 USUAL_RADIUS = 4e-3  # m, the median of translated patches of the test contacts
-LARGEST_TILT = 0.8  # rad, a little more than sticking friction holds: atan(0.78) is 0.66 (assumed)
 
 
 @dataclass(frozen=True)
@@ -98,7 +97,7 @@ def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Plac
     up = -motion / np.linalg.norm(motion)
     tilt = float(np.arccos(np.clip(up @ outward, -1, 1)))
     heading = float(np.arctan2(up @ side, up @ along))
-    return Placement(x, z, min(tilt, LARGEST_TILT), heading)
+    return Placement(x, z, min(tilt, MOST_TILT), heading)
 
 
 def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:

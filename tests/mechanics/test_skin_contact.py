@@ -12,7 +12,7 @@ from tactile_core.geometry.indenters import Box, Sphere
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.node_areas import node_areas, traction
-from tactile_core.mechanics.placement import Placement, pose_at
+from tactile_core.mechanics.placement import MOST_TILT, Placement, pose_at
 from tactile_core.mechanics.skin_contact import pressing_traction
 from tactile_core.sensors.unrolling import node_normals
 from tactile_core.simulation.pairs_file import read_pairs
@@ -21,7 +21,6 @@ from tactile_core.translation.gel_place import contact_patch
 
 pytest.importorskip("scipy", reason="contacts are solved with scipy, of the extra [fem]")
 from tactile_core.mechanics.skin_contact import (
-    LARGEST_TILT,
     RADII,
     USUAL_RADIUS,
     leaning,
@@ -113,7 +112,7 @@ def test_a_press_leans_as_the_deepest_node_moves():
     found = leaning(-8e-3, 0.0, motion, DOWN)
     # The node lies up to half a spacing beside first touch, where the gel's normal is not straight down.
     assert found.tilt == pytest.approx(0.3, abs=0.05) and found.tilt_heading == pytest.approx(0.5, abs=0.15)
-    assert leaning(-8e-3, 0.0, np.array([5.0, 0.1, 0.0]), DOWN).tilt == LARGEST_TILT
+    assert leaning(-8e-3, 0.0, np.array([5.0, 0.1, 0.0]), DOWN).tilt == MOST_TILT
 
 
 def test_the_radius_of_a_ball_is_read_off_its_dent():

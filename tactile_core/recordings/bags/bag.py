@@ -125,7 +125,7 @@ def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
             others.append(f"topic {name} ({kind}, {'no' if empty else count} messages)")
     if not topics:
         found = f"no messages of a BioTac: {listed(others)}" if others else "no topics"
-        expected = "messages with a list of 19 or 24 electrodes, such as sr_robot_msgs/msg/BiotacAll"
+        expected = "messages with 19 or 24 numbers called electrodes or electrode_data, as sr_robot_msgs/msg/BiotacAll"
         raise TactileError(path, found, expected, "Record the topic of the BioTacs' driver")
     with refused(path):
         times = reader if hasattr(reader, "start_time") else reader.metadata  # a folder's reader has them itself
