@@ -70,6 +70,7 @@ def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
 def test_degrees_are_no_tilt(tilt):
     with pytest.raises(TactileError, match=r"Placement, tilt: .* rad; .*45 degrees. Convert degrees: math.radians"):
         Placement(-6e-3, 0.0, tilt)
+    assert Placement(-6e-3, 0.0, float(np.float32(np.pi / 4))).tilt > np.pi / 4  # 45 degrees, as Blender rounds them
 
 
 def test_ball_set_on_a_smooth_place_stays_there():

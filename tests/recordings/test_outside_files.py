@@ -17,6 +17,7 @@ import pytest
 from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
+from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.opened_file import opened
 from tactile_core.recordings.tables import column_map
@@ -205,6 +206,13 @@ def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp
         recordings.read(tmp_path / "a.npz")
 
 
+def test_grasps_that_alternate_are_no_turns_of_fingers(press):
+    rows = press.electrodes + 100 * (np.arange(len(press.time)) % 2)[:, None]
+    assert len(assemble("a.csv", "grasps", electrodes=rows, stamps=None, snapshots=True)) == len(rows)
+    with pytest.raises(TactileError, match="2 fingers take turns"):
+        assemble("a.csv", "frames", electrodes=rows, stamps=None)
+
+
 @pytest.mark.parametrize("tared", [False, True])
 def test_hum_at_half_the_rate_is_no_second_finger(tared, press, tmp_path):
     hum = 10 * (-1) ** np.arange(len(press.time))  # counts: 50 Hz of the mains at 100 Hz
@@ -253,6 +261,8 @@ def test_arrays_of_electrodes_first_are_refused_with_the_way_to_read_them(press,
     with pytest.raises(TactileError, match=r"shape \(19, 700\); expected \(frames, 19\). Transpose it, or give a map"):
         recordings.read(tmp_path / "a.npz")
     np.testing.assert_array_equal(read_by_guess(tmp_path / "a.npz").electrodes, press.electrodes)
+    np.savez(tmp_path / "b.npz", electrodes=press.electrodes[:19])
+    np.testing.assert_array_equal(recordings.read(tmp_path / "b.npz").electrodes, press.electrodes[:19])
 
 
 def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tmp_path):

@@ -12,6 +12,7 @@ from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, electrode_gains, polarity
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile, units_file
 from tactile_core.recordings.flags import Flag
+from tactile_core.recordings.polarity import spread_out
 from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.recording import split
 from tactile_core.sensors import REST_COUNTS
@@ -77,6 +78,19 @@ def test_a_rest_of_grips_alone_is_refused(tmp_path):
     typical = reference_signals.read(networks.WEIGHTS_FOLDER)
     with pytest.raises(TactileError, match=r"look like a contact, which explains \d+% of.*\(--rest\)"):
         adapt.adapt_hand([tmp_path / f"{k}.npz" for k in range(3)], typical)
+
+
+def test_a_rest_that_a_grip_may_be_is_said(tmp_path):
+    contacts = polarity.contact_signals()
+    firm = contacts[np.argsort(np.linalg.norm(contacts, axis=1))[-50:]]
+    noise, paths = np.random.default_rng(0).normal(0, 1, (400, 19)), [tmp_path / f"{k}.npz" for k in range(2)]
+    for k, path in enumerate(paths):
+        moves = [firm[10 * k]] * 300 + list(np.repeat(contacts[spread_out(len(contacts), 20)], 5, axis=0))
+        np.savez(path, electrodes=np.rint(REST_COUNTS + np.array(moves) + noise))
+    np.savez(tmp_path / "still.npz", electrodes=np.rint(REST_COUNTS + noise))
+    typical = reference_signals.read(networks.WEIGHTS_FOLDER)
+    said = [adapt.adapt_hand(paths, typical, None, rest)[1] for rest in (None, str(tmp_path / "still.npz"))]
+    assert ["no quiet part in 0.npz" in " ".join(each) for each in said] == [True, False]
 
 
 def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
