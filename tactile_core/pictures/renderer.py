@@ -30,8 +30,9 @@ from .presets import DEFAULT, FAST, preset_named
 # ways; by 0.75, 0.5, 0.25, 0 in means of four squares of 2 px, for each of which video keeps one colour. CHANNELS :
 # correlations of red, green and blue on photographs of one DIGIT (another: -.22, -.22, .07), assumed for all units.
 GRAIN = 4
-MOST_BELOW = 1e-3  # m under the undeformed gel; round a press it bulges by 0.03 mm (assumed)
 CHANNELS = (1.0, -0.44, 0.07), (-0.44, 1.0, -0.37), (0.07, -0.37, 1.0)
+# m under the undeformed gel: less than a DIGIT's dome, twice the most that a gel dragged by 3 mm yields (assumed)
+MOST_BELOW = 1.4e-3
 
 
 class Renderer:
