@@ -165,7 +165,8 @@ def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
     if (share := as_contact(found.counts, recordings[0].sensor)) is not None:
         held = f"even the least pressed recordings look like a contact, which explains {share:.0%} of their levels"
         advice = "Add softer touches, or name a recording of the untouched finger (--rest)"
-        raise TactileError("rest of the unit", held, "some that are hardly pressed", advice)
+        of = f"{listed([one.name for one in recordings], SHOWN)}: rest of the unit"
+        raise TactileError(of, held, "some that are hardly pressed", advice)
     return found
 
 

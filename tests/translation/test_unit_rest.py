@@ -76,7 +76,9 @@ def test_a_rest_of_grips_alone_is_refused(tmp_path):
             tmp_path / f"{k}.npz", electrodes=np.rint(REST_COUNTS + firm[10 * k] + noise), pdc=np.full(400, 1200.0)
         )
     typical = reference_signals.read(networks.WEIGHTS_FOLDER)
-    with pytest.raises(TactileError, match=r"look like a contact, which explains \d+% of.*\(--rest\)"):
+    with pytest.raises(
+        TactileError, match=r"^0, 1, 2: rest of the unit: .* a contact, which explains \d+% of.*\(--rest\)"
+    ):
         adapt.adapt_hand([tmp_path / f"{k}.npz" for k in range(3)], typical)
 
 
