@@ -69,7 +69,7 @@ def adapt(
     in contact, an estimated rest that looks like a contact."""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
-    rest = _rest(recordings) if rest is None else rest
+    rest = _rest(recordings, options) if rest is None else rest
     bare = _bare(rest)
     if bare is not None:
         bare = msgspec.structs.replace(bare, film=_film(recordings, options, bare))
@@ -156,13 +156,16 @@ def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
     return _rest_alone(rest, f"rest and film that bring {rest.recordings} contacts nearest to simulated ones")
 
 
-def _rest(recordings: Sequence[Recording]) -> UnitRest | None:
-    """Find the unit's rest; None where the recordings are too few, or not raw. Raises TactileError for a contact's."""
+def _rest(recordings: Sequence[Recording], options: PrepareOptions | None) -> UnitRest | None:
+    """Find the unit's rest. None if the recordings are too few or not raw, or if what is found looks like a contact and
+    one of them has a quiet part; raises TactileError if none has."""
     try:
         found = find_rest(recordings)
     except TactileError:
         return None
     if (share := as_contact(found.counts, recordings[0].sensor)) is not None:
+        if not all((Preparer(options)(one).flags & Flag.NO_QUIET_PART).all() for one in recordings):
+            return None
         held = f"even the least pressed recordings look like a contact, which explains {share:.0%} of their levels"
         advice = "Add softer touches, or name a recording of the untouched finger (--rest)"
         of = f"{listed([one.name for one in recordings], SHOWN)}: rest of the unit"

@@ -82,6 +82,18 @@ def test_a_rest_of_grips_alone_is_refused(tmp_path):
         adapt.adapt_hand([tmp_path / f"{k}.npz" for k in range(3)], typical)
 
 
+def test_presses_of_one_place_from_rest_need_no_other_rest(tmp_path):
+    contacts = polarity.contact_signals()
+    firm = contacts[np.argsort(np.linalg.norm(contacts, axis=1))[-50]]
+    pressed = np.interp(np.arange(400), [0, 80, 180, 400], [0, 0, 1, 0.8])[:, None]
+    paths = [tmp_path / f"{k}.npz" for k in range(3)]
+    for k, path in enumerate(paths):
+        noise = np.random.default_rng(k).normal(0, 1, (400, 19))
+        np.savez(path, electrodes=np.rint(REST_COUNTS + pressed * firm + noise))
+    found, said = adapt.adapt_hand(paths, reference_signals.read(networks.WEIGHTS_FOLDER))
+    assert found.unit.rest_counts is None and "no quiet part" not in " ".join(said)
+
+
 def test_a_rest_that_a_grip_may_be_is_said(tmp_path):
     contacts = polarity.contact_signals()
     firm = contacts[np.argsort(np.linalg.norm(contacts, axis=1))[-50:]]
