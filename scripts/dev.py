@@ -248,7 +248,7 @@ def is_foreign(folder: Path) -> bool:
 
 
 def why_unusable(python: Path, have: dict) -> str | None:
-    """The reason why an existing environment cannot be used, or None."""
+    """Return why an existing environment cannot be used, or None; have : its stamp, of `read_stamp`"""
     if have and have.get("root") != str(ROOT):
         return "it was made for {}".format(have.get("root"))
     if have.get("state") == "installing":

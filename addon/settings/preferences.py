@@ -64,7 +64,7 @@ def _tell(preferences: bpy.types.AddonPreferences) -> None:
 
 
 class TactilePreferences(bpy.types.AddonPreferences):
-    """Shown under the add-on's name."""
+    """Paths of the default calibration, the LLVM library and own sensors; what is installed."""
 
     bl_idname = ID
 

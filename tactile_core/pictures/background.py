@@ -66,7 +66,8 @@ def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Return grey levels (H, W, channel, LED) of the gel at rest: LEDs' radiance (H, W, 3), and ambient light."""
+    """Return grey levels (H, W, channel, LED) of the gel at rest; their sum over LEDs is the picture.
+    radiance : (H, W, LED), to which each LED's ambient light is added"""
     right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
     ambient = np.zeros((*unit.camera.shape, 3))
     table = np.asarray(unit.ambient)

@@ -221,7 +221,7 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
 
 
 def tare_frames(asked: slice | str, count: int) -> slice:
-    """Convert the tare frames to a plain slice. Raises TactileError where they are not among these `count` frames."""
+    """Convert tare frames, a slice or "A:B", to a slice without step; TactileError unless within `count` frames."""
     if isinstance(asked, slice):
         tare = asked
     else:

@@ -33,7 +33,7 @@ class Baseline:
         return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the readings (n, 19) counts at frames (n,); read-only."""
+        """Return the readings at rest (n, 19) counts, for frames (n,); read-only."""
         if len(self.levels) == 1:
             return np.broadcast_to(self.levels[0], (len(frames), self.levels.shape[1]))
         before = np.maximum(np.searchsorted(self.frames, frames, "right") - 1, 0)

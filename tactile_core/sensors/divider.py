@@ -40,7 +40,7 @@ def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) 
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert changes of a unit at counts ``of`` (19,) to one at rest counts (19,): the inverse of ``typical``."""
+    """Convert changes of a unit that rests at counts ``of`` (19,) to those of one at ``rest`` (19,)."""
     return _converted(change, of, rest)
 
 

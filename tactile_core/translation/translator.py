@@ -237,7 +237,8 @@ class Translator:
         return found
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
-        """Bound (T,) m on 95 of 100 largest errors, by `card.error_bound`; surface, kind : of the card's bounds"""
+        """Return the bound (T,) m that 95 of 100 largest node errors stay below, by `card.error_bound`.
+        expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger; surface, kind : of the card"""
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:

@@ -65,7 +65,9 @@ class Push:
 
 
 class PenaltyPoints:
-    """Points on quadratic faces (f, 9), node 3 b + a at (xi, eta) = (a, b) - 1."""
+    """Points at which springs keep an obstacle out between nodes of quadratic faces (f, 9): 16 a face, halfway.
+
+    Node 3 b + a of a face is at (xi, eta) = (a, b) - 1."""
 
     def __init__(self, faces: np.ndarray) -> None:
         self._nodes, self._weights = np.repeat(faces, len(_WEIGHTS), axis=0), np.tile(_WEIGHTS, (len(faces), 1))
