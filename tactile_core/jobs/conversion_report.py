@@ -41,7 +41,7 @@ class ConversionReport:
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._pressure: list[np.ndarray] = []
-        self._firm = 0  # frames of more force than the signals tell
+        self._firm_force, self._firm = FIRM * rows.signals.stiffness, 0  # N, and frames of more than that
         self._denied = 0  # frames that are unexplained because PDC shows another pressure
         self._explained: list[np.ndarray] = []
         self._forces: list[np.ndarray] = []  # that the traction adds up to, and the networks'
@@ -58,7 +58,7 @@ class ConversionReport:
         measured = self._rows.read(frames)[1].pressure_measured
         denied = contradicted(arrays["pressure"], measured) & (arrays["flags"] & flags.Flag.UNEXPLAINED > 0)
         self._denied += int(np.count_nonzero(denied))
-        self._firm += int(np.count_nonzero(accuracy.lengths(arrays["force"]) > FIRM * self._rows.signals.stiffness))
+        self._firm += int(np.count_nonzero(accuracy.lengths(arrays["force"]) > self._firm_force))
         self._explained.append(arrays["explained"])
         if "traction_force" in arrays:
             self._forces.append(np.stack([arrays["traction_force"], arrays["force"]]))
@@ -87,7 +87,7 @@ class ConversionReport:
                 if count:
                     found.append(f"{count} of {len(self._frames)} frames: {meaning} (flag {name})")
         if self._firm:
-            found.append(f"{self._firm} of {len(self._frames)} frames: {TOO_FIRM}")
+            found.append(f"{self._firm} of {len(self._frames)} frames: {TOO_FIRM.format(self._firm_force)}")
         if self._made.folded:
             found.append(f"{self._made.folded} frames: the translated gel folds over itself; heights there are guesses")
         return found

@@ -29,7 +29,7 @@ TURNS = 5  # times the change in a whole turn, the change to the next row (assum
 # Of a reading, times TURNS 38 counts at rest (assumed: rows change by 5 counts and less, mains hum of 50 Hz at 100 Hz
 # swings by some 20 from row to row, units rest 50 apart and more).
 NOISE = 2.5e-3
-RAW = 0.3  # of the median, that nine in ten raw readings exceed (as in ``signal_kind``); changes lie on both sides of 0
+RAW = 0.3  # share of their median that nine in ten raw readings exceed (assumed); changes lie on both sides of 0
 SHOWN = 8  # problems spelled out one by one; more are counted
 
 

@@ -44,11 +44,11 @@ SENTENCES = {
     Flag.UNEXPLAINED: "the signals resemble no contact's, or conductivity's more: drift, or rest under load",
     Flag.GEL_NOT_SOLVED: "no contact was solved on the gel, which is the networks' there, or at rest if they have none",
 }
-# N, as translated: of simulated contacts that read 4 to 5 N a fourth bear 1.5 times as much and more, of flat bodies
-# 1.7 times; below 3 N a fourth bears over 1.1 times. The skin meets the core under a ball of 7 mm at 3.5 N, of 28 mm at
-# 4.5 N, under a plate at 8 N.
+# N, as translated, of a BioTac of typical stiffness: of simulated contacts that read 4 to 5 N a fourth bear 1.5 times
+# as much and more, of flat bodies 1.7 times; below 3 N a fourth bears over 1.1 times. The skin meets the core under a
+# ball of 7 mm at 3.5 N, of 28 mm at 4.5 N, under a plate at 8 N.
 FIRM = 4.0
-TOO_FIRM = "force above 4 N may be half of the true one: where the skin meets the core, signals stop growing"
+TOO_FIRM = "force above {:.3g} N may be half of the true one: where the skin meets the core, signals stop growing"
 DENIED = "PDC shows another pressure than that of the contact: drift, rest under load, or PDC of another sensor"
 
 

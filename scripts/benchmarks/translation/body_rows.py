@@ -78,7 +78,8 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
     firm = lengths(pairs.force) > FIRM
     if firm.any():
         off, baseline = (float(np.median(errors[f"{who}_force_size_percent"][firm])) for who in ("found", "nearest"))
-        made.append(row("bodies_firm_force_percent", off, "%", baseline=baseline, of=f"{firm.sum()} over {FIRM:g} N"))
+        over = f"{firm.sum()} over {FIRM:g} N of {of}"
+        made.append(row("bodies_firm_force_percent", off, "%", baseline=baseline, of=over))
     true = true_displacement(pairs, "digit", every)
     left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
     return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
