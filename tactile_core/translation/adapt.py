@@ -62,9 +62,9 @@ def adapt(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     rest: UnitRest | None = None,
 ) -> Adapted:  # fmt: skip
-    """Fit one sensor from all of its recordings together.
+    """Fit one sensor from all of its recordings (paths) together, by simulated contacts' typical signals.
 
-    A recording that is never calm near the unit's rest uses the given rest, or the one estimated from all recordings.
+    rest : the unit's rest; None estimates it from all recordings. It is used where a recording is never calm near it
     Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
     in contact, an estimated rest that looks like a contact."""
     parts, kinds, restless = [], set(), []
@@ -208,7 +208,8 @@ def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
 def _fitted(
     parts: list[np.ndarray], rectified: bool, typical: ReferenceSignals, note: str, bare: ElectrodeGains | None
 ) -> Adapted:
-    """Fit gains and offsets and add the unit's rest; the rest alone where there is too little contact to fit gains."""
+    """Fit gains and offsets to the recordings' parts (n, 19) counts, frames in contact, and add the unit's rest `bare`
+    (None: not known); the rest alone where there is too little contact to fit gains."""
     change = np.concatenate(parts)
     if bare is None:
         return fit(change, rectified, typical, note)
@@ -227,8 +228,9 @@ def _contacts(signals: Signals) -> np.ndarray:
 
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
-    """Fit gains and offsets to frames in contact (n, 19) counts. Raises TactileError for less than half a second of
-    them, and for fewer than FEWEST_CONTACTS different contacts."""
+    """Fit gains and offsets to change (n, 19) counts, the frames in contact of all recordings, by simulated contacts'
+    typical signals; note : how it was fitted, kept in the result. Raises TactileError for less than half a second of
+    frames, and for fewer than FEWEST_CONTACTS different contacts."""
     frames = len(change)
     if frames < FEWEST_FRAMES:
         advice = "Use recordings with more contact"
@@ -254,7 +256,8 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains that the frames do not determine by 1; return gains, a mask of the fitted ones, and warnings."""
+    """Replace gains by 1 where the frames do not determine them; return gains (19,), mask of the fitted, and warnings.
+    gain : (19,) as matched; touched : (19,) bool, electrodes with enough contact; found : the whole match"""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
     if not touched.all():
@@ -273,7 +276,7 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
 
 
 def _uncertainty(gain: np.ndarray, contacts: int) -> float:
-    """Return the expected error of gains (n,) fitted from a number of different contacts; NaN for none."""
+    """Return the expected relative error of a fitted gain (n,), from a number of different contacts; NaN for none."""
     if not len(gain):
         return np.nan
     return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))

@@ -47,7 +47,7 @@ class ContactFrame:
         return np.cos(self.turn).astype(np.float32), np.sin(self.turn).astype(np.float32)
 
     def to_local(self, displacement: np.ndarray) -> np.ndarray:
-        """Rotate (T, n, 3) m from the shared frame to each node's: along, inward, around."""
+        """Rotate displacement (T, n, 3) m from the shared frame to each node's: along, inward, around."""
         cosine, sine = self._cosine_sine
         local = np.array(displacement, np.float32)
         local[..., 1] = cosine * displacement[..., 1] - sine * displacement[..., 2]
@@ -55,7 +55,7 @@ class ContactFrame:
         return local
 
     def to_shared(self, local: np.ndarray) -> np.ndarray:
-        """Rotate (T, n, 3) m from each node's frame back to the shared one, in place: the inverse of `to_local`."""
+        """Rotate `local` (T, n, 3) m from each node's frame back to the shared one, in place: inverse of `to_local`."""
         if self.turn.any():
             cosine, sine = self._cosine_sine
             inward, around = local[..., 1].copy(), local[..., 2]
@@ -64,7 +64,8 @@ class ContactFrame:
         return local
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
-        """Locate the dent of (T, n, 3): (T, 2) float32, row and column from the lattice's middle in PLACE_UNIT cells.
+        """Locate the dent of displacement (T, n, 3): (T, 2) float32, row and column from the middle in PLACE_UNIT
+        cells.
         It is the mean of the nodes that move more than `CORE` of the largest displacement, weighted with theirs."""
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
@@ -95,7 +96,7 @@ class ContactFrame:
         return np.outer(along, along).astype(np.float32)
 
     def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Cut the window (T, width, width, 3) around each cell (T, 2) from a field (T, n, 3); 0 beyond the lattice."""
+        """Cut windows (T, width, width, 3) from the field `local` (T, n, 3) around cells (T, 2); 0 beyond it."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)
         out = np.zeros((len(local), self.width, self.width, 3), local.dtype)
         for frame, cell in enumerate(cells):
@@ -104,7 +105,7 @@ class ContactFrame:
         return out
 
     def add(self, local: np.ndarray, windows: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Add windows (T, width, width, 3) to a field (T, n, 3) around each cell (T, 2), in place."""
+        """Add windows (T, width, width, 3) to the field `local` (T, n, 3) around cells (T, 2), in place; return it."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)  # a view
         for frame, cell in enumerate(cells):
             on_grid, in_window = self._overlap(cell)
@@ -112,7 +113,7 @@ class ContactFrame:
         return local
 
     def _overlap(self, cell: np.ndarray) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """Return the part of the lattice that a window covers, and the part of the window that lies on the lattice."""
+        """Return the part of the lattice that the window around a cell (2,) covers, and that of the window."""
         on_grid, in_window = [], []
         for middle, size in zip(cell.tolist(), (self.rows, self.columns), strict=True):
             first, last = max(middle - self.half, 0), min(middle + self.half + 1, size)
@@ -133,7 +134,8 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
 
 
 def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Interpolate values at a lattice's nodes (rows, columns, k) bilinearly at places (F, 2); returns (F, k)."""
+    """Interpolate grid (rows, columns, k), values at a lattice's nodes, bilinearly; returns (F, k).
+    place : (F, 2), row and column from the lattice's middle in PLACE_UNIT cells, clipped to the lattice"""
     size = np.array(grid.shape[:2])
     at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
     cell = np.minimum(at.astype(int), size - 2)

@@ -78,8 +78,8 @@ class _Course(NamedTuple):
 
 
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
-    """Estimate a `Posterior`'s states (T, STATE) float32 at times (T,) s from all frames' posteriors: place smoothed
-    forward and back, force by its smoothed ratio to the signals' size, depth as each frame has it."""
+    """Estimate states (T, STATE) float32, as of `Posterior`, from all frames' posteriors, the evidence: place smoothed
+    forward and back, force by its smoothed ratio to the signals' size, depth as each frame has it. time : (T,) s"""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)
     elapsed = _elapsed(time)
@@ -171,22 +171,23 @@ class ForwardTracker:
 
 
 def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-    """States (T, STATE) of contacts at places (T, PLACE), with each frame's own force and depth at that place."""
+    """Return states (T, STATE) of contacts at place (T, PLACE), with each frame's own force and depth at that place.
+    touched : (T,) bool, in contact; see `Posterior.near`"""
     return np.concatenate([place, evidence.near(place, touched)[:, PLACE:]], axis=-1)
 
 
 def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return log(force / signal size); force on the asinh scale of a state, size in counts."""
+    """Return log(force / signal size) (T,); force : (T,) on the asinh scale of a state; size : (T,) counts"""
     return np.log(np.sinh(np.clip(force, LEAST_TOUCH, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
 
 
 def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Forces on their asinh scale: the inverse of `_log_ratio`."""
+    """Return forces (T,) on their asinh scale from log_ratio (T,) and size (T,) counts: the inverse of `_log_ratio`."""
     return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
 
 
 class _Frame(NamedTuple):
-    """Components of frames: weight (..., C), a logarithm; mean, spread (..., C, STATE)."""
+    """Components of frames: weight (..., C), a logarithm; mean, spread (..., C, STATE), as of `Posterior`."""
 
     weight: np.ndarray
     mean: np.ndarray
@@ -199,18 +200,20 @@ def _components(posterior: Posterior) -> _Frame:
 
 
 def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarray:
-    """Return the variance (..., STATE) by which a state changes in a time (...,) s."""
+    """Return the variance (..., STATE) by which a state changes within seconds (...,).
+    rectified : (...,) bool, frames whose signals have lost their signs; their place moves by less"""
     shorter = np.where(np.asarray(rectified)[..., None] & (np.arange(STATE) < PLACE), RECTIFIED_STEP, 1.0)
     return np.square(shorter * STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
 def _ratio_step(seconds: np.ndarray) -> np.ndarray:
-    """Return the variance (T,) by which `_log_ratio` changes in a time (T,) s."""
+    """Return the variance (T,) by which `_log_ratio` changes within seconds (T,)."""
     return RATIO_STEP**2 * seconds / FRAME
 
 
 def _elapsed(time: np.ndarray, before: float = -np.inf) -> np.ndarray:
-    """Seconds (T,) since the frame before; infinite at the first frame, after gaps and where a clock runs backwards."""
+    """Return the seconds (T,) since the frame before, from time (T,) s; infinite at the first frame unless it follows
+    one at `before` s, after gaps and where a clock runs backwards."""
     seconds = np.diff(time, prepend=before)
     return np.where((seconds >= 0) & (seconds < GAP), seconds, np.inf)
 
@@ -218,6 +221,7 @@ def _elapsed(time: np.ndarray, before: float = -np.inf) -> np.ndarray:
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the log probability (..., C, C) of each component's step to each of the next frame, and whether it is
     free.
+    before, now : components of frames and of those that follow them; step : (..., STATE), variances of `_step`
 
     It is minus half the squared distance in standard deviations, without a density's normalisation: errors of
     neighbouring frames are correlated (gains, rest), so two frames that agree prove less than independent ones would.
@@ -234,9 +238,9 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Continue the best paths (Viterbi): from their scores (C,) through further frames, return the last scores (C,),
-    and for each frame and component (T, C) its best predecessor.
-    moves : (T, C, C) log probability of each step; weight : (T, C) log weights of the components"""
+    """Continue the best paths (Viterbi) through further frames: return the last scores (C,), and for each frame and
+    component (T, C) its best predecessor.
+    score : (C,) of the paths so far; moves : (T, C, C) log probability of each step; weight : (T, C) log weights"""
     came = np.empty(weight.shape, int)
     for frame, move in enumerate(moves):
         total = score[:, None] + move
@@ -246,7 +250,7 @@ def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[n
 
 
 def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
-    """Find the best path through the components of each frame; steps : (T, STATE), variances."""
+    """Find the best path through the components of frames; steps : (T, STATE), variances of `_step` before each"""
     before, now = (_Frame(*(each[part] for each in frames)) for part in (slice(None, -1), slice(1, None)))
     moves, free = _moves(before, now, steps[1:])
     score, came = _scored(frames.weight[0], moves, now.weight)
@@ -277,7 +281,8 @@ def _filtered(
 
 
 def _smoothed(value: np.ndarray, noise: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Means (T, k) of a random walk given all measurements, their variances, and the walk's `steps` (variances)."""
+    """Return the means (T, k) of a random walk given all measurements (Rauch, Tung and Striebel 1965).
+    value, noise, steps : (T, k) measurements, their variances, and the walk's variance before each"""
     mean, variance, expected = _filtered(value, noise, steps, value[0], np.zeros(value.shape[1]))
     for frame in range(len(steps) - 2, -1, -1):
         back = variance[frame] / expected[frame + 1]

@@ -37,14 +37,15 @@ def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
 
 
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m."""
+    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m.
+    displacement : (T, n, 3) m of the gel's nodes; rest : (n, 3) m, their positions at rest"""
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
     return center
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from states (T, STATE)."""
+    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from state (T, STATE)."""
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
     far = accuracy.lengths(points - on_gel(frame, place)[:, None]) > APART
@@ -52,7 +53,8 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """Return the places (T, 2) of points (T, 2) m, inverse of `on_gel`; points beside the gel get its rim's places."""
+    """Return the places (T, 2), of ``ContactFrame.place``, of point (T, 2) = (x, z) m, inverse of `on_gel`; points
+    beside the gel get its rim's places."""
     grid = _grid(frame.sensor, frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)
@@ -70,13 +72,14 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
 
 
 def beyond_picture(center: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return the flags (T,) uint16 of contacts (T, 2) = (x, z) m on the gel that a camera does not see."""
+    """Return the flags (T,) uint16, `Flag.BEYOND_PICTURE` or 0, of contacts that a camera does not see.
+    center : (T, 2) = (x, z) m on the gel, NaN without contact"""
     beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
     return np.where(beside, Flag.BEYOND_PICTURE, 0).astype(np.uint16)
 
 
 def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
-    """Mark (T, n) bool the nodes in contact from displacements (T, n, 3) m of a surface that is one lattice.
+    """Mark (T, n) bool the nodes in contact of a surface that is one lattice; displacement : (T, n, 3) m of its nodes
 
     A surface takes the indenter's curvature in contact and the opposite one beside it: the patch is where the smoothed
     Laplacian of the depth is negative. (Pressure on a half-space is |k| times the depth, k the wave number; the
@@ -116,7 +119,7 @@ class Shift:
         self._share = np.maximum(1 - beside / FADE, 0)[:, None].astype(np.float32)
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """Shift a field (T, n, 3) m; it fades out where the gel ended."""
+        """Shift displacement (T, n, 3) m of the gel's nodes; it fades out where the gel ended."""
         rows, columns, count = self._frame.rows, self._frame.columns, len(displacement)
         grid = np.moveaxis(displacement, 0, 1).reshape(rows, columns, count * 3)
         found = between_nodes(grid, self._place) * self._share
@@ -125,5 +128,5 @@ class Shift:
 
 @functools.cache
 def _grid(sensor: str, rows: int, columns: int) -> np.ndarray:
-    """Coordinates (x, z), (rows, columns, 2) m, of the gel's nodes at rest."""
+    """Return coordinates (rows, columns, 2) = (x, z) m of the gel's nodes at rest."""
     return sensors.sensor_surface(sensor).rest[: rows * columns, [0, 2]].reshape(rows, columns, 2)

@@ -22,10 +22,8 @@ class SignalDistance:
     """Distances of signals from the training signals; the card holds quantiles of each.
 
     mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
-    residual : (T,) float32, error of SVB's reconstruction, rms over the electrodes in units of its residual in
-        validation
-    largest : (T,) float32, counts, largest absolute change of an electrode
-    """
+    residual : (T,) float32, rms over electrodes of the signal autoencoder's (SVB's) error over that in validation
+    largest : (T,) float32, counts, largest absolute change of an electrode"""
 
     mahalanobis: np.ndarray
     residual: np.ndarray
@@ -36,7 +34,7 @@ DISTANCES = tuple(field.name for field in fields(SignalDistance))
 
 
 def compress(change: np.ndarray) -> np.ndarray:
-    """Convert changes (...) counts to the networks' scale: arcsinh(change / 15 counts).
+    """Convert change (...) counts to the networks' scale: arcsinh(change / 15 counts).
 
     A reading s has a noise variance of 1.5^2 + (0.1 s)^2 counts^2 (training augmentation); arcsinh(s / 15) is the
     variance-stabilising transform of that law (Bartlett 1947), so a light touch weighs as much as a firm one."""
@@ -49,19 +47,20 @@ def expand(compressed: np.ndarray) -> np.ndarray:
 
 
 def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """Map x (T, inputs) to (T, outputs); weight (outputs, inputs) as in torch."""
+    """Map x (T, inputs) to (T, outputs); the named tensors are weight (outputs, inputs), as in torch, and bias."""
     return x @ tensors[f"{name}.weight"].T + tensors[f"{name}.bias"]
 
 
 def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """Normalise the last axis (Ba et al. 2016), biased variance as in torch."""
+    """Normalise x (..., width) over the last axis (Ba et al. 2016), biased variance as in torch; tensors : by name,
+    `name`.weight and `name`.bias (width,)."""
     centred = x - _mean(x)
     spread = np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
     return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
 
 
 def _mean(x: np.ndarray) -> np.ndarray:
-    """Average over the last axis; `np.mean`'s checks cost more than the sum for a single frame."""
+    """Average x over its last axis, which is kept; `np.mean`'s checks cost more than the sum for a single frame."""
     return np.add.reduce(x, axis=-1, keepdims=True) / np.float32(x.shape[-1])
 
 
@@ -71,14 +70,15 @@ def silu(x: np.ndarray) -> np.ndarray:
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
-    """Apply linear layers with ReLU between them: (T, inputs) to (T, outputs)."""
+    """Apply linear layers with ReLU between them: x (T, inputs) to (T, outputs); tensors : named by `plain_shapes`"""
     for layer in range(layers):
         x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
     return x
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Apply a residual MLP of ``blocks`` and a linear skip, (T, inputs) to (T, outputs); docs/sources.md, Networks."""
+    """Apply a residual MLP of ``blocks`` and a linear skip, x (T, inputs) to (T, outputs); docs/sources.md, Networks.
+    tensors : by the names of `residual_shapes`"""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")
@@ -112,7 +112,8 @@ def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: in
 
 
 def in_blocks(function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Apply a function in padded blocks, or to one frame alone; raises TactileError if x is not (T, *shape)."""
+    """Apply a function to frames x (T, *shape) in padded blocks, or to one frame alone; raises TactileError, which
+    names the network by `name`, if x has another shape."""
     x = np.asarray(x, np.float32)
     if x.shape[1:] != shape:
         expected = "(T, " + ", ".join(map(str, shape)) + ")"

@@ -46,7 +46,10 @@ class Networks:
     tensors : network -> tensor name -> array
     card : the model card (fields: `training/export_weights.py`); source, target : the sensors that it names
     electrodes : number of the source's electrodes; shapes below say 19, as of a BioTac
-    sha256 : hash of the card, which identifies these weights"""
+    sha256 : hash of the card, which identifies these weights
+
+    K, L, L' are the sizes of the latents of signal, source and target; N, M the nodes of source and target; a state is
+    that of `Posterior`. change is against rest; rectified (T,) or one for all, true where it has lost its signs"""
 
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
         self.card, self.sha256 = card, sha256
@@ -64,7 +67,8 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode changes (T, 19) counts, signed as `sensors.COUNT_SIGN` or rectified, to SVB's mean (T, K)."""
+        """Encode change (T, 19) counts, signed as `sensors.COUNT_SIGN` or, where rectified (T,) or one is true, without
+        signs, to latent_signal (T, K), the mean that SVB infers."""
         return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
@@ -86,7 +90,7 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), states of contacts (T, STATE), rectified (T,) or one, to latent_source (T, L)."""
+        """Map latent_signal (T, K), state of contacts (T, STATE), rectified (T,) or one, to latent_source (T, L)."""
         return self._either("code", np.concatenate([latent_signal, state], -1), rectified)
 
     def m2m(self, latent_source: np.ndarray) -> np.ndarray:
@@ -96,7 +100,7 @@ class Networks:
     def latents(
         self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), states (T, STATE), rectified (T,) or one, to latent_source and latent_target."""
+        """Map latent_signal (T, K), state (T, STATE), rectified (T,) or one, to latent_source and latent_target."""
         latent_source = self.given(latent_signal, state, rectified)
         return latent_source, self.to_target(state, latent_source)
 
@@ -107,13 +111,13 @@ class Networks:
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
-        """Map states (T, STATE) and latent_source (T, L) to latent_target (T, L') placed where the state says."""
+        """Map state (T, STATE) and latent_source (T, L) to latent_target (T, L') placed where the state says."""
         latent = self.m2m(latent_source)
         latent[:, :PLACE] = state[:, :PLACE]
         return latent
 
     def m2m_back(self, latent_target: np.ndarray) -> np.ndarray:
-        """Map the DIGIT's latent (T, L') to the BioTac's (T, L)."""
+        """Map the DIGIT's latent_target (T, L') to the BioTac's latent_source (T, L)."""
         return self._map_placed("D2BPN", "MVD", latent_target)
 
     def m2s(self, latent_source: np.ndarray) -> np.ndarray:
@@ -145,7 +149,7 @@ class Networks:
         return in_blocks(self._force, latent_source, (self.sizes["MVB"]["latent"],), "force")
 
     def force_in(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
-        """Return forces (T, 3) N: direction from latent_source (T, L), size from the states (T, STATE)."""
+        """Return forces (T, 3) N: direction from latent_source (T, L), size from the contacts' state (T, STATE)."""
         estimate = self.force(latent_source)
         length = np.sqrt(np.square(estimate).sum(-1))
         size = np.float32(FORCE_SCALE) * np.sinh(np.clip(state[:, PLACE], 0, COMPRESSED_LIMIT))
@@ -197,7 +201,8 @@ class Networks:
         return np.where(signal[:, -1:] > 0, rectified, signed)
 
     def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Apply a part of S2MPN, or of R2MPN to rectified frames."""
+        """Apply a part of S2MPN, or of R2MPN to rectified frames, to its inputs `seen` (T, inputs).
+        part : "posterior" or "code"; rectified : (T,) or one, true where the signs are lost"""
         which = np.broadcast_to(np.asarray(rectified, bool), len(seen))
         if which.all() and len(which):
             return self._map("R2MPN", seen, part)
@@ -212,13 +217,15 @@ class Networks:
         return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
-        """Map latents (T, L), joined by the remainder of their place after rounding to cells, by the network `net`."""
+        """Map latent (T, L), joined by the remainder of its place after rounding to cells, by the network `net`.
+        vae : the autoencoder of that latent, "MVB" (BioTac) or "MVD" (DIGIT)"""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
         return in_blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append to a latent the remainder of its place after rounding to cells: (B, L + 2); also return the cells."""
+        """Append to latent (B, L) the remainder of its place after rounding to cells; return (B, L + 2), cells
+        (B, 2)."""
         cells, left = self.frames[net].cells(latent[:, :PLACE])
         return np.concatenate([latent, left], -1), cells
 
@@ -226,7 +233,7 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def encode(block: np.ndarray) -> np.ndarray:
-            """Encode u (BLOCK, n, 3) m: wide = W u, near = N window(u - W^T wide), scaled, with the place."""
+            """Encode block (BLOCK, n, 3) m, u: wide = W u, near = N window(u - W^T wide), scaled, with the place."""
             local = frame.to_local(block)
             place = frame.place(local)
             cells, left = frame.cells(place)
@@ -243,7 +250,7 @@ class Networks:
         tensors, sizes, frame = self.tensors[net], self.sizes[net], self.frames[net]
 
         def decode(block: np.ndarray) -> np.ndarray:
-            """Decode (BLOCK, L) to W^T wide + N^T near, the latter in the window around the place."""
+            """Decode block (BLOCK, L) of latents to W^T wide + N^T near, the latter in the window around the place."""
             placed, cells = self._placed(net, block)
             modes = residual(placed, tensors, "decoder", sizes["blocks"]) * tensors["scale"]
             wide, near = modes[:, : sizes["wide"]], modes[:, sizes["wide"] :]
@@ -254,7 +261,8 @@ class Networks:
         return in_blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
 
     def _signal(self, change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
-        """Build SVB's input (T, 20) and the shape of one frame of it; `in_blocks` reports wrong shapes."""
+        """Build SVB's input (T, 20) of change (T, 19) counts and the mark rectified (T,) or one; and the shape of one
+        frame of it. A change of another shape is returned as it is: `in_blocks` reports it."""
         change = np.asarray(change, np.float32)
         if change.shape[1:] != (self.electrodes,):
             return change, (self.electrodes,)

@@ -18,11 +18,11 @@ SEED = 0  # of contacts that are drawn: the same recording, the same contacts
 
 @dataclass(frozen=True)
 class Posterior:
-    """Posterior of a contact's state given the signals: a mixture of Gaussians.
+    """Posterior of a contact's state given the signals: a mixture of C Gaussians in each of T frames.
 
-    A state (STATE,) is the place of the gel's dent, as in the DIGIT's latent, asinh(force / 0.1 N) and asinh(depth of
-    that dent / 20 um); all zero without contact. The place is that on the gel, which is flat: at the BioTac's tip,
-    where most real contacts lie, the skin's lattice has a pole, and a place on it says little.
+    A state (STATE,) is the place of the gel's dent (2 numbers, of ``ContactFrame.place``), asinh(force / 0.1 N) and
+    asinh(depth of that dent / 20 um); all zero without contact. The place is that on the gel, which is flat: at the
+    BioTac's tip, where most real contacts lie, the skin's lattice has a pole, and a place on it says little.
     weight : (T, C), sum 1 over C; mean, spread : (T, C, STATE)"""
 
     weight: np.ndarray
@@ -42,8 +42,8 @@ class Posterior:
         return state.astype(np.float32)
 
     def near(self, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
-        """Return the mean state (T, STATE) of the components, weighted by their density at places p (T, PLACE):
-        weight exp(-|(p - mean) / spread|^2 / 2) / product of the spreads.
+        """Return the mean state (T, STATE) of the components, weighted by their density at place p (T, PLACE): weight
+        exp(-|(p - mean) / spread|^2 / 2) / product of the spreads.
         touched : (T,) bool, true averages the components in contact, false those without contact. (Both may lie at one
             place, because components without contact have place zero.)"""
         spread = self.spread[..., :PLACE].astype(np.float64)
@@ -72,5 +72,5 @@ class Posterior:
 
 
 def touches(state: np.ndarray) -> np.ndarray:
-    """Mark the states (..., STATE) that are in contact."""
+    """Mark (...,) bool the contacts in state (..., STATE): their force is at least half the lightest in training."""
     return state[..., PLACE] >= LEAST_TOUCH

@@ -29,9 +29,10 @@ TRIES = 2_000  # readings made up to find the match's own bias
 
 @dataclass(frozen=True, eq=False)
 class ReferenceSignals:
-    """Typical signals (P, 19) counts, signed; bias : log gains (19,) that matching finds for simulated signals
-    themselves. There is one bias for signed and one for rectified readings: a typical signal is a mean of signals and
-    therefore smaller than they are."""
+    """Typical signals of simulated contacts, and the bias of matching readings to them.
+    typical : (P, 19) counts, signed
+    bias_signed, bias_rectified : (19,), log gains that matching finds for simulated readings themselves, signed or
+        rectified: a typical signal is a mean of signals and therefore smaller than they are"""
 
     typical: np.ndarray
     bias_signed: np.ndarray
@@ -43,13 +44,13 @@ class ReferenceSignals:
 
 
 def touching(change: np.ndarray) -> np.ndarray:
-    """Mark (n,) bool the frames (n, 19) counts that are large enough to determine gains."""
+    """Mark (n,) bool the frames of change (n, 19) counts that are large enough to determine gains."""
     return np.sqrt(np.square(change).sum(axis=1)) >= TOUCHING
 
 
 def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
-    """Compute typical signals of simulated changes (C, 19) counts without noise: k-means in the networks' scale. Raises
-    TactileError where too few of them are contacts."""
+    """Compute typical signals of simulated contacts, by k-means in the networks' scale. TactileError for too few.
+    signal : (C, 19) counts, their changes without noise; seed : of the random choices"""
     random = np.random.default_rng(seed)
     signal = np.asarray(signal, np.float64)
     signal = signal[touching(signal)]

@@ -20,9 +20,9 @@ PARTED = 0.25  # unit of half the difference of both parts, over the signal's le
 
 
 class SecondContact(NamedTuple):
-    """Second contacts in n of T frames. rows : (n,), which frames
+    """Second contacts in n of T frames, of e electrodes. rows : (n,) int, which frames
     skin, gel : (n, N, 3), (n, M, 3) m, displacements; predicted : (n, e) counts, the electrodes' changes under them
-    center : (T, 2) m on the gel, NaN without; force : (T, 3) N, zero without"""
+    center : (T, 2) = (x, z) m on the gel, NaN without; force : (T, 3) N, zero without"""
 
     rows: np.ndarray
     skin: np.ndarray
@@ -33,7 +33,7 @@ class SecondContact(NamedTuple):
 
 
 def told_apart(nets: Networks, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Separate the changes (T, e) counts of the stronger contact from those of the weaker, NaN where there is only one.
+    """Separate change (T, e) counts into the stronger contact's and the weaker one's, NaN where there is only one.
     unsigned : (T,) bool, frames whose signs are lost; they are not separated"""
     tensors, blocks = nets.tensors[PARTS], nets.sizes[PARTS]["blocks"]
     change = np.asarray(change, np.float32)
@@ -51,7 +51,7 @@ def second_contact(
     nets: Networks, change: np.ndarray, silent: np.ndarray, mounted: Callable[[np.ndarray], np.ndarray], least: float,
     stiffness: float,
 ) -> SecondContact:  # fmt: skip
-    """Translate the weaker of two contacts from its changes (T, e) counts, NaN where there is none, each frame alone.
+    """Translate the weaker of two contacts from its change (T, e) counts, NaN where there is none, each frame alone.
     silent : (T,) bool, frames without a first contact, which get no second
     mounted : function that moves gels (n, M, 3) m by the mount's shift
     least : m, smallest displacement of the deepest node that counts as contact; stiffness : of `Signals`"""

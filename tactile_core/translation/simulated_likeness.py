@@ -54,8 +54,8 @@ FIRST = 64  # patterns most like the signal, of which one must be among the two:
 
 @dataclass(frozen=True)
 class Patterns:
-    """Simulated contacts: signals (P, e) float64 counts; units (P, e), scaled to length one; alike (P, P), their
-    cosines.
+    """Simulated contacts, P of them, of e electrodes.
+    signals : (P, e) float64 counts; units : (P, e), scaled to length one; alike : (P, P), their cosines
     drift : (e,), of length one, the change when the fluid's conductivity changes"""
 
     signals: np.ndarray
@@ -65,7 +65,7 @@ class Patterns:
 
 
 def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
-    """Return the patterns of simulated contacts with signals (P, e) counts, of a unit that rests at counts (e,)."""
+    """Return the patterns of simulated contacts with signals (P, e) counts, of a unit with rest (e,) counts."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
     drift = divider.of_films(DRIFT, rest) - rest
     return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))
@@ -78,7 +78,7 @@ def shipped_patterns(sensor: str = SOURCE) -> Patterns:
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
-    """Return the shares (T, 3) of changes (T, 19) counts that the best pattern, the best two, and drift do not explain.
+    """Return the shares (T, 3) of change (T, 19) counts that the best pattern, the best two, and drift do not explain.
     change : of a typical unit; patterns : of the sensor, None for a BioTac's
     rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN"""
     patterns = patterns or shipped_patterns()
@@ -92,13 +92,13 @@ def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Pattern
 
 
 def two_contacts(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that two contacts explain and one does not, by their ``residual_shares`` (T, 3)."""
+    """Mark (T,) bool the frames that two contacts explain and one does not; shares : (T, 3), of `residual_shares`"""
     one, two, _ = shares.T
     return (two < LEFT_BY_TWO) & (one - two > MORE_BY_ONE)
 
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that resemble no simulated contact, or drift more, by ``residual_shares`` (T, 3).
+    """Mark (T,) bool the frames that resemble no simulated contact, or drift more; shares : (T, 3), see `two_contacts`
     change : (T, 19) counts; in faint changes a larger share is allowed, for noise"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)
@@ -106,7 +106,7 @@ def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames whose estimated pressure (T,) Pa disagrees with the measured one (NaN: none)."""
+    """Mark (T,) bool the frames whose estimated pressure (T,) Pa disagrees with that measured (T,) Pa (NaN: none)."""
     measured = np.maximum(measured, 0)
     return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + PRESSED)
 
@@ -131,8 +131,7 @@ def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarra
 def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Restore the signs of changes (T, 19) counts where they are certain; also return the frames (T,) that stay
-    rectified.
+    """Restore the signs of change (T, 19) counts where they are certain; also return the frames (T,) still rectified.
     rectified : (T,) bool, frames that have lost their signs; patterns : of the sensor, None for a BioTac's"""
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)

@@ -54,7 +54,7 @@ class RecordingPass:
         return time, self._translator.encode(signals)
 
     def __call__(self, frames: np.ndarray) -> Decoded:
-        """Translate rising frames (T,)."""
+        """Translate frames (T,) int, rising numbers of frames in the recording."""
         time, signals = self._read(frames)
         if self._tracker is None:
             evidence, state = self._translator.encode(signals), None
@@ -64,7 +64,7 @@ class RecordingPass:
 
 
 def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> RecordingPass:
-    """Return the pass over signals in memory at times (T,) s."""
+    """Return the pass over signals in memory; time : (T,) s, of their frames"""
     return RecordingPass(translator, lambda frames: (time[frames], signals.at(frames)), len(time))
 
 

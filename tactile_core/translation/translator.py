@@ -193,7 +193,7 @@ class Translator:
         )  # fmt: skip
 
     def _mounted(self, gel: np.ndarray) -> np.ndarray:
-        """Return gels (T, M, 3) m, moved by the mount's shift."""
+        """Return `gel` (T, M, 3) m, displacements of the gel's nodes, moved by the mount's shift."""
         return gel if self._shift is None else self._shift(gel)
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
@@ -215,8 +215,8 @@ class Translator:
     def _explained(
         self, signals: Signals, change: np.ndarray, predicted: np.ndarray, rectified: np.ndarray
     ) -> np.ndarray:
-        """Return the share (T,) of typical changes (T, e) that predicted ones (T, e) explain, as of this unit; see
-        `Translation`. Rectified frames (T,) bool are compared without signs."""
+        """Return the share (T,) of change (T, e) that predicted (T, e) explains, both counts of a typical unit,
+        compared as of this unit; see `Translation`. Where rectified (T,) bool, signs are ignored."""
         at = self.card.get(REST, sensors.typical_rest(self.source))
         own, told = (signals.of_typical(each, at) for each in (change, predicted))
         own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
@@ -228,7 +228,8 @@ class Translator:
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Compute expected largest errors and their bounds, by `Translation`'s names; x : (T,) m, of the contact."""
+        """Compute expected largest errors and bounds, by `Translation`'s names, of change (T, e), rectified (T,) bool.
+        x : (T,) m, of the contact along the finger, NaN without contact"""
         expected, found = self.nets.expected_error(change, rectified), {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
@@ -238,18 +239,21 @@ class Translator:
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
         """Return the bound (T,) m that 95 of 100 largest node errors stay below, by `card.error_bound`.
-        expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger; surface, kind : of the card"""
+        expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger, NaN without
+        surface, kind : of the card: one of `SURFACES`, and "signed" or "rectified" signals"""
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool the changes (T, 19) counts that lie outside the training's in any of the distances."""
+        """Mark (T,) bool the frames of change (T, 19) counts that lie outside the training's in any of the distances.
+        rectified : (T,) bool or one for all, true where signs are lost"""
         return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 
     def _confidence(
         self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray, explained: np.ndarray
     ) -> np.ndarray:
-        """Return the confidence (T,); see `Translation`. explained : (T,), NaN without contact. Each distance to the
-        training's signals lowers it: by nothing up to the distance's 95 % quantile, to zero at the outermost."""
+        """Return the confidence (T,); see `Translation`. change : (T, e) counts; rectified : (T,) bool; explained :
+        (T,), NaN without contact. Each distance to the training's signals lowers it: by nothing up to the distance's 95
+        % quantile, to zero at the outermost."""
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         near = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))
@@ -257,12 +261,13 @@ class Translator:
         return (near * np.interp(np.nan_to_num(explained, nan=1.0), EXPLAINED, WITHIN)).astype(np.float32)
 
     def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Stack the distances (distances, T) of `layers.SignalDistance`."""
+        """Stack `layers.SignalDistance` to (distances, T), of change (T, e) counts, rectified (T,) or one for all."""
         distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
         return np.stack([getattr(distance, name) for name in DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
-        """Quantiles (distances, T) or (distances, 1), at a level each, over validation frames of the same kind."""
+        """Return quantiles (distances, T), or (distances, 1) for one `rectified`, over validation frames of that kind.
+        rectified : (T,) bool or one, the frames' kind; level : of each distance by its name, 0 to 1"""
         table = self.card["distance"]
         limits = {
             kind: np.array([[np.interp(level[name], table["levels"], table[kind][name])] for name in DISTANCES])
@@ -271,7 +276,8 @@ class Translator:
         return np.where(rectified, limits["rectified"], limits["signed"])
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Mark (T,) contacts of the BioTac that have no counterpart on the gel: the dent's centre unrolls beyond it."""
+        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it.
+        displacement : (T, N, 3) m of the skin's nodes"""
         moved = accuracy.lengths(displacement)
         peak = moved.max(axis=1, keepdims=True)
         core = (moved > accuracy.CORE * peak) & (peak > self.silent("biotac_m"))

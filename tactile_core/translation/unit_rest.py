@@ -115,7 +115,8 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
 
 
 def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: float) -> tuple[np.ndarray, float]:
-    """Move rest (e,) counts to where simulated contacts explain readings (n, e) best; also return what they leave."""
+    """Move rest (e,) counts to where simulated contacts explain readings (n, e) counts best; also return the mean share
+    of the changes' squares that they leave. film : thickness, divided by a typical unit's"""
     share = np.inf
     for _ in range(STEPS):
         change = readings - rest
@@ -138,7 +139,8 @@ def _pressure(recording: Recording) -> np.ndarray | None:
 
 
 def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the level (19,) counts of the window of lowest pressure, and that pressure, counts of PDC."""
+    """Return the level (19,) counts of the recording's window of lowest pressure, and that pressure, counts of PDC.
+    pdc : (T,) counts, the recording's fluid pressure"""
     electrodes = _raw(recording)
     n = min(window_frames(recording.rate), len(electrodes))
     windows = np.convolve(pdc, np.full(n, 1 / n), mode="valid")

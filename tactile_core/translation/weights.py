@@ -36,7 +36,7 @@ def sha256(data: bytes) -> str:
 
 
 def to_safetensors(tensors: dict[str, np.ndarray]) -> bytes:
-    """Encode float32 and float16 arrays by name as a safetensors file, in the order of their names."""
+    """Encode tensors, float32 and float16 arrays by name, as a safetensors file, in the order of their names."""
     names = {dtype: name for name, dtype in DTYPES.items()}
     header, offset = {}, 0
     arrays = [(name, np.asarray(array, order="C")) for name, array in sorted(tensors.items())]
