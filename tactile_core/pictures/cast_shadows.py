@@ -63,6 +63,7 @@ class ShadowCaster:
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
         """Return (rows, columns), LED radii per unit slope: how far a mapped line of sight rises at the LED.
+        across, along : (rows, columns) m, right and down of the polar grid's places
 
         A rise dw of the mapped line at the LED is a displacement (1 - h / H)^2 (-right / H, -down / H, 1) dw in space,
         with the mapped LED's right and down, h and H the LED's and the apparent height; its part across the line
@@ -104,8 +105,9 @@ class ShadowCaster:
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
-        """Return sight (rows, columns) at distances r from the foot, where the mapped field has heights h(r):
-        ((foot - h(r)) / r - horizon) radii, with horizon = max over steps d of (h(r - d) - h(r)) / d."""
+        """Return sight (rows, columns) at distances r from the foot, where the mapped field has heights h(r): ((foot -
+        h(r)) / r - horizon) radii, with horizon = max over steps d of (h(r - d) - h(r)) / d.
+        field : (rows, columns) m, h in the part ``polar`` of the polar grid; reach : columns of the longest shadow"""
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
             foot = np.float32(self.foot[2])
@@ -124,7 +126,7 @@ class ShadowCaster:
 
 @functools.cache
 def march_steps(reach: int) -> tuple[int, ...]:
-    """Return the steps of a march, columns: 1 at first, then a tenth of the way (a long shadow is wide)."""
+    """Return the steps of a march of ``reach`` columns: 1 at first, then a tenth of the way (long shadows are wide)."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)
@@ -144,7 +146,8 @@ def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | Non
 
 
 def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
-    """Slice of at least two integers from 0 to ``highest`` that encloses the wanted values, and `more` above."""
+    """Return the slice of 2 or more integers from 0 to highest that encloses values wanted (...), and ``more``
+    above."""
     first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
     last = min(int(np.ceil(wanted.max())) + more, highest)
     return slice(first, max(last, first + 1) + 1)
@@ -170,7 +173,8 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @Loop
 def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN201
-    """Compute ``ShadowCaster._march`` by loops; distance : (columns,) m; radii : (rows, columns); steps : (k,)"""
+    """Compute ``ShadowCaster._march`` by loops, of a field (rows, columns) m under an LED's foot, m high.
+    distance : (columns,) m; radii : (rows, columns); steps : (k,) columns, each of grid_step m"""
     rows, columns = field.shape
     sight = np.empty((rows, columns), np.float32)
     horizon = np.empty(columns, np.float32)

@@ -119,7 +119,8 @@ class HeightMapper:
         return self.rest + down @ self._raised(move).astype(np.float32) @ right
 
     def _raised(self, move: np.ndarray) -> np.ndarray:
-        """Change of height (fine rows, fine columns) m at the refined grid's nodes, which stay in place."""
+        """Return the change of height (fine rows, fine columns) m at the refined grid's nodes, which stay in place, by
+        a move (rows, columns, 3) m of the window's nodes."""
         down, right = self.to_fine[0]
         if not move[..., [0, 2]].any():
             return down @ move[..., 1] @ right.T
@@ -174,7 +175,8 @@ class HeightMapper:
         return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate splines with coefficients (k, rows, columns) at places (n,) m; (n, k) float32, to 0.1 nm a mm."""
+        """Evaluate k splines of coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, to .1 nm a
+        mm."""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
@@ -213,7 +215,8 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
 
 
 def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
-    """Advise a scale that lets a picture whose pixels see (p,) m along an axis lie inside the nodes (n,) m."""
+    """Advise a scale at which a picture whose pixels see places (p,) m along axis name (x, z) lies inside nodes (n,)
+    m."""
     room = 2e3 * min(seen.mean() - nodes[0], nodes[-1] - seen.mean())
     if room <= 0:
         return f"Its centre_{name}_mm lies outside"
@@ -227,7 +230,8 @@ def _short(matrix: np.ndarray) -> np.ndarray:
 
 
 def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows (2, n) each of the inverse of I + du/dX, from du/dx and du/dz (2, rows, columns)."""
+    """Return rows (2, n) each of the inverse of I + du/dX, n = rows x columns, from by_x = du/dx and by_z = du/dz (2,
+    rows, columns), u = sideways displacement (x, z)."""
     a, c = 1 + by_x[0].ravel(), by_x[1].ravel()
     b, d = by_z[0].ravel(), 1 + by_z[1].ravel()
     determinant = np.maximum(a * d - b * c, SMALLEST_AREA)
@@ -245,7 +249,8 @@ def _gel_mapper(camera: Camera) -> HeightMapper:
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-    """Return heights (H, W) or (T, H, W) float32 m of a camera's gel displaced by (n_nodes, 3) or (T, n_nodes, 3) m."""
+    """Return heights (H, W) float32, m, of a camera's gel under displacement (n_nodes, 3) m; (T, H, W) of (T, n_nodes,
+    3). camera : None for the shipped DIGIT's"""
     return gel_mapper(camera)(displacement)
 
 

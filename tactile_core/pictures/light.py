@@ -38,7 +38,7 @@ class Surface(NamedTuple):
 
     @classmethod
     def in_perspective(cls, view: Perspective, height: np.ndarray) -> Surface:
-        """Return the surface that a camera's pixels see, given its heights (H, W) m there; slopes are computed."""
+        """Return the surface that a camera's pixels see at height (H, W) m, as ``view`` returned; makes slopes."""
         return cls(view.right, view.down, height, *slopes(height, view.camera), view.inverse)
 
 
@@ -57,7 +57,7 @@ class Lit(NamedTuple):
 
 
 def lambert(surface: Surface, positions: np.ndarray) -> Lit:
-    """Return the light of LEDs at positions l (L, 3) m, image frame, by Lambert's law and the inverse square.
+    """Return the light on a surface of LEDs at positions l (L, 3) m, image frame: Lambert's law and the inverse square.
 
     light = (n . v) |l|^2 / |v|^3, v = l - p from the gel point p to the LED, n the unit normal at p; it is 1 for a
     coating at the origin that faces the LED. Written out for speed: |v|^2 = |p|^2 - 2 p . l + |l|^2."""
@@ -111,7 +111,7 @@ class Lamps:
         self._positions = np.array([led.position for led in leds])
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
-        """Return the light (L, H, W) float32, with soft shadows, on heights (H, W) m that pixels see; see ``Lit``."""
+        """Return the light (L, H, W) float32, with soft shadows, on gel seen at height (H, W) m; see ``Lit``."""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):
@@ -123,13 +123,12 @@ class Lamps:
 
 
 def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, mapped: np.ndarray, edge: Box) -> None:
-    """Darken the light of LED k where gel of heights (H, W) m stands in its way.
+    """Darken the light of LED k, in place, where gel of height (H, W) m stands in its way.
 
     The part of its disc above the horizon shines. With l the vector to the LED and e the unit vector upward across l,
     that part's centre is l + (radius moment / share) e, and
     normal . e = (tilt |l|^2 - above facing) / (|l| sqrt(|l|^2 - above^2)).
-    mapped : (H, W) m, the field on which shadows are cast, see ``cast_shadows``; edge : box in which shadows may
-        begin"""
+    lit : changed; mapped : (H, W) m, the field for shadows, see ``cast_shadows``; edge : box where they may begin"""
     sight, box = caster.sight(mapped, edge)
     facing, square = lit.facing[k][box], lit.square[k][box]
     share, moment = disc_share(sight)

@@ -39,12 +39,12 @@ class MarkerField:
         self.rest = self._in_picture(still)[0]
 
     def motion(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the motion (T, n, 2) float32, px right and down, of the dots on gels displaced by (T, M, 3) m."""
+        """Return the motion (T, n, 2) float32, px right and down, of n dots under displacement (T, n_nodes, 3) m."""
         moved = [self._in_picture(frame)[0] - self.rest for frame in displacement]
         return np.stack(moved).astype(np.float32) if moved else np.zeros((0, *self.rest.shape), np.float32)
 
     def marks(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the share (H, W) float32 of the coating's light that dots leave, on a gel displaced by (M, 3) m."""
+        """Return the share (H, W) float32 of light that dots leave, on a gel under displacement (n_nodes, 3) m."""
         share = np.ones(self.unit.camera.shape, np.float32)
         middle, *rim = self._in_picture(displacement)
         # Columns: half of the dot's image along x and along z, px.
@@ -54,15 +54,16 @@ class MarkerField:
         return share
 
     def _in_picture(self, displacement: np.ndarray) -> np.ndarray:
-        """Return positions (5, n, 2) px, right and down, of the dots' middles and four points of their rims."""
+        """Return positions (5, n, 2) px, right and down, of the n dots' middles and four points of their rims, on a gel
+        under displacement (n_nodes, 3) m."""
         camera, mapper = self.unit.camera, self._mapper
         x, z, height = mapper.follow(displacement, self._x.ravel(), self._z.ravel())
         row, column = camera.to_pixel(x, z, height - (1 - self.unit.dome_scale) * self._dome)
         return np.stack([column, row], -1).reshape(*self._x.shape, 2)
 
     def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
-        """Darken the pixels (H, W) of one dot's ellipse by the covered part of each.
-        place : (2,) px, its middle; axes : (2, 2), from a unit disc to px"""
+        """Darken ``share`` (H, W) of light left, in place, by the part of each pixel that one dot's ellipse covers.
+        place : (2,) px, its middle, right and down; axes : (2, 2), from a unit disc to px"""
         area = abs(np.linalg.det(axes))
         if area < LEAST_AREA:
             return

@@ -37,7 +37,7 @@ class Perspective:
             self._begin_at(self(rest))
 
     def _begin_at(self, seen: np.ndarray) -> None:
-        """Start each search at heights (H, W) m near those that the pixels see."""
+        """Start each search at heights ``seen`` (H, W) m, near those that the pixels see."""
         self.start, self.start_near = seen, 1 - seen * self.inverse
         row, column = self._places(self.start_near)
         self.start_nearest = _nearest(row, column, self.camera.width)
@@ -68,7 +68,8 @@ class Perspective:
         return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return (slope along p) |p| / apparent height (H, W), p the place from the picture's middle; and its least."""
+        """Return (slope along p) |p| / apparent height, (H, W), of height (H, W) m, p from the middle; and its
+        least."""
         slope_right, slope_down = slopes(height, self.camera)
         slope_right *= self.right * self.inverse
         slope_down *= self.down * self.inverse
@@ -84,8 +85,8 @@ class Perspective:
         return row, np.clip(column, 0, 2 * self.middle[1], out=column)
 
     def _from_above(self, height: np.ndarray) -> np.ndarray:
-        """Find the heights (H, W) m that pixels see by a march along each ray from the highest level down: slower, but
-        right where gel hides gel."""
+        """Find the heights (H, W) m that pixels see of ``height`` (H, W) m by a march along each ray from the highest
+        level down: slower, but right where gel hides gel."""
         high, low = np.float32(height.max() + 1e-6), np.float32(height.min() - 1e-6)
         above = np.full(self.camera.shape, high)
         below = np.full(self.camera.shape, low)
@@ -107,7 +108,7 @@ class Perspective:
 
 
 def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
-    """Return the flat indices of the pixels nearest to places within a map."""
+    """Return flat indices (...) of the pixels nearest to fractional row, column (...) of a map ``width`` px wide."""
     index = (row + np.float32(0.5)).astype(np.int32)
     index *= np.int32(width)
     index += (column + np.float32(0.5)).astype(np.int32)
@@ -115,7 +116,7 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes (H, W) of heights (H, W) m along the picture's right, and down; second order, at edges too."""
+    """Return the slopes (H, W) of height (H, W) m along the picture's right, and down; second order, at edges too."""
     right, down = camera.pixel_size
     return _differences(height, 1, right), _differences(height, 0, down)
 
@@ -131,7 +132,7 @@ def _differences(values: np.ndarray, axis: int, step: float) -> np.ndarray:
 
 
 def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Return float32 values (h, w), 2 x 2 or more, interpolated at fractional rows and columns within them."""
+    """Return float32 values (h, w), 2 x 2 or more, interpolated at fractional row, column (...) within them."""
     if available() and values.dtype == row.dtype == column.dtype == np.float32 and row.ndim == 2:
         return interpolate(*map(np.ascontiguousarray, (values, row, column)))  # one kind of arrays is compiled
     height, width = values.shape
@@ -153,7 +154,7 @@ def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 
 
 def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that samples maps (H, W) of the gel at places on it, m, image frame."""
+    """Return a function that samples maps (H, W) of the gel at right, down (...) on it, m, image frame; edges held."""
     step_right, step_down = camera.pixel_size
     row = down * np.float32(1 / step_down) + np.float32(camera.height / 2 - 0.5)
     return lookup(row, right * np.float32(1 / step_right) + np.float32(camera.width / 2 - 0.5), camera.shape)
@@ -166,7 +167,7 @@ def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Calla
 
 
 def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate between the values at indices start and the next, by a share."""
+    """Return values (...) between those of flat (n,) at indices start (...) and the next, by a share (...), 0 to 1."""
     left = flat.take(start)
     right = flat[1:].take(start)
     right -= left

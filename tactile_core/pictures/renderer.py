@@ -99,15 +99,15 @@ class Renderer:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
     def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8 of heights (H, W) m; equal to the background where nothing changed.
+        """Return the picture (H, W, 3) uint8 of a height_map (H, W) m; equal to the background where nothing changed.
         marks : (H, W) share of light that dots leave, from ``marks``; required for a unit with dots"""
         if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
             return self._rest_picture.copy()
         return self.picture(self.radiance(height_map), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield pictures (H, W, 3) uint8 of heights (H, W) m, less and less noisy; the last is that of a call. Only the
-        preset ``reference`` by LLVM yields more than one."""
+        """Yield pictures (H, W, 3) uint8 of a height_map (H, W) m, less and less noisy; the last is that of a call.
+        Only the preset ``reference`` by LLVM yields more than one."""
         heights = self._heights(height_map, "height map")
         if not isinstance(self._light, GelLight):
             yield self.picture(self._spread_radiance(heights))
@@ -128,11 +128,11 @@ class Renderer:
         return pictures
 
     def marks(self, displacement: np.ndarray) -> np.ndarray | None:
-        """Return the share (H, W) of light that dots of a gel displaced by (n_nodes, 3) m leave; None without dots."""
+        """Return the share (H, W) of light that dots leave under displacement (n_nodes, 3) m; None without dots."""
         return None if self.dots is None else self.dots.marks(displacement)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels of its band, that each LED gives to what pixels see."""
+        """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m."""
         return self._spread_radiance(self._heights(height_map, "height map"))
 
     def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
@@ -155,7 +155,7 @@ class Renderer:
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
-        The change passes the camera's toe and shoulder (``camera_curve``).
+        radiance : (H, W, LED), of ``radiance``. The change passes the camera's toe and shoulder (``camera_curve``).
         noise : generator of the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
         if self.dots is not None and marks is None:
@@ -182,7 +182,7 @@ class Renderer:
         return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
-        """Return the unit's heights (H, W) float32 m, checked."""
+        """Return the unit's heights (H, W) float32 m of a map ``given`` (H, W) m, checked. name : for errors"""
         heights = camera_array(given, self.camera.shape, name)
         if (below := float((self._resting - heights).max())) > MOST_BELOW:
             found = f"{below * 1e3:.2f} mm below the undeformed gel"
@@ -223,7 +223,7 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raise TactileError for heights (H, W) m that reach an LED's middle or the camera."""
+    """Raise TactileError, of the map ``name``, where ``height`` (H, W) m reaches an LED's middle or the camera."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():

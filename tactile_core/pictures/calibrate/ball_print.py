@@ -32,7 +32,8 @@ class _Table:
     coefficients: np.ndarray
 
     def rise(self, distance: np.ndarray, depth: float, radius: float) -> np.ndarray:
-        """Rise of the flat layer, m, at distances from the axis, m, under a ball of another radius, m: lengths scale"""
+        """Return the flat layer's rise (...) m at distance (...) m from the axis of a ball of radius m at depth m.
+        The table's ball has ``self.radius``: all lengths are scaled by the ratio of the two radii."""
         scale = radius / self.radius
         distance, depth = distance / scale, depth / scale
         k = int(np.clip(np.searchsorted(self.depths, depth) - 1, 0, len(self.depths) - 2))
@@ -66,14 +67,15 @@ def print_on(
 
 
 def deepest(radius: float, thickness: float = LAYER) -> float:
-    """Return the depth, m, up to which the print of a ball of a radius, m, is tabulated for a gel of a thickness, m."""
+    """Return the depth m up to which the print of a ball of radius m is tabulated for a gel of thickness m."""
     return sum(
         share * radius / table.radius * float(table.depths[-1]) for table, share in _tables_near(radius, thickness)
     )
 
 
 def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
-    """Return the tables of the balls next in size to one on a layer, with weights: linear in the logarithm of size."""
+    """Return the tables next in size to a ball of radius m on a layer of thickness m, and their weights, which sum to
+    1: linear in the logarithm of radius over thickness. A table of weight 0 is left out."""
     tables = _tables()
     sizes = np.log([table.radius for table in tables])
     place = np.interp(np.log(radius * (LAYER / thickness)), sizes, np.arange(len(tables)))
@@ -83,7 +85,8 @@ def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
 
 
 def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
-    """Height, m, of the ball's underside over its lowest point, at distances, m, from the axis."""
+    """Return the height (...) m of the underside of a ball of radius m over its lowest point, distance (...) m from its
+    axis."""
     edge = SPHERE_TO * radius
     inner = np.minimum(distance, edge)
     fall = np.sqrt(radius**2 - inner**2)
@@ -91,7 +94,8 @@ def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
-    """Invert ``_profile``: the distance, m, from the axis at which the ball is ``gap`` m above its lowest point."""
+    """Invert ``_profile``: return the distance (...) m from the axis where a ball of radius m is ``gap`` (...) m
+    high."""
     edge = SPHERE_TO * radius
     fall = np.sqrt(radius**2 - edge**2)
     inner = np.minimum(gap, radius - fall)

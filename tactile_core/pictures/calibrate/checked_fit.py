@@ -68,7 +68,7 @@ def check_orientation(
     """Raise TactileError for photographs that another orientation or order of colours explains clearly better, with the
     share that each leaves unexplained.
 
-    ball_diameter : m; progress : called with (ways tried, in all)
+    ball_diameter : m; start : calibration under which the balls are fitted; progress : called with (ways tried, in all)
     Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Among ways that
     explain the presses about equally well (lights may stand opposite each other) the untouched gel decides, compared
     with the start's and the shipped unit's, as a start of round numbers hardly predicts it."""
@@ -105,7 +105,9 @@ def _changed(press: Press, way: Way) -> Press:
 
 
 def _best(left: dict[Way, float], apart: dict[Way, float]) -> Way:
-    """Return the way with the least residual; of those within CLEARLY, one whose untouched gel is clearly nearer."""
+    """Return the way with the least residual; of those within CLEARLY, one whose untouched gel is clearly nearer.
+    left : by way, share of the presses' squares left unexplained, median; apart : by way, mean difference in grey
+        levels between the untouched gel's photograph and the nearest known picture of it"""
     best = min(left, key=left.__getitem__)
     near = [way for way in left if CLEARLY * left[way] <= left[best]]
     nearest = min(near, key=apart.__getitem__)
@@ -122,7 +124,8 @@ def _resting(unit: Calibration) -> list[np.ndarray]:
 
 
 def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int]) -> dict[bool, Calibration]:
-    """Return calibrations in the pixels of pictures (h, w), as they are and transposed, if of the camera's shape."""
+    """Return the calibration ``start`` in the pixels of pictures of ``shape`` (h, w), by whether they are transposed. A
+    way whose aspect ratio is not the camera's is left out; raises TactileError where both are."""
     units = {}
     for transposed, (height, width) in ((False, shape), (True, shape[::-1])):
         try:
@@ -152,6 +155,7 @@ def fit_unit(
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
     """Fit a unit, as ``fit.calibrate``, and evaluate each press by a fit to the other thirds of the presses.
+    ball_diameter : m; start : calibration that the fit starts from; unit : name; quick : without Mitsuba
     reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
     Raises TactileError for photographs in another orientation, and as ``fit.calibrate`` does."""
 
@@ -174,7 +178,8 @@ def cross_validated(
     quick: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate each press by a calibration on the others, in thirds; none for a single press. ball_diameter : m"""
+    """Evaluate each press by a calibration on the others, in thirds; none for a single press. ball_diameter : m;
+    progress : called with (steps done, in all)"""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

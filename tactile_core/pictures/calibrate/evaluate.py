@@ -57,6 +57,8 @@ def evaluate_unit(
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate a calibration on each press of the photographs. radius : m, of balls for which none is given
+    search_radius : true also searches the ball's radius, for ``ball_radius_error``; progress : called with (done, in
+        all)
     pictures : class that draws the compared pictures; places and depths are found with the fast ones
     Raises TactileError for photographs of another shape than the calibration's pictures."""
     unit = fitted_size(calibration, photographs)
@@ -92,8 +94,10 @@ def fitted_size(calibration: Calibration, photographs: Photographs) -> Calibrati
 def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
-    """Fit the ball to a press, compare its picture (of `whole`) with the photograph, and fit the ball's light and, with
-    `search_radius`, its radius as further unknowns. working : reduced pixels, for fits"""
+    """Fit the ball to a press, compare its picture (of ``whole``) with the photograph, and fit the ball's light and,
+    with ``search_radius``, its radius as further unknowns.
+    working : pictures of reduced pixels, for fits; background : (H, W, 3) levels, of the untouched gel
+    radius : m, of the ball, if the press does not give its own"""
     sight = Sight(press)
     radius = sight.radius(radius)
     ball, _ = fit_ball(working, sight, radius)
@@ -115,14 +119,15 @@ def _try_press(
 
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Picture (H, W, 3) uint8 of a change in levels, and its metrics; drift of light is added, as to the baseline."""
+    """Return a press's picture (H, W, 3) uint8 by a ``change`` (H, W, 3), levels, of the ``background`` (H, W, 3), and
+    its metrics against the photograph. The photograph's drift of light is added, as to the baseline."""
     untouched = background + press.drift
     picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
-    """Return flags of a photograph in words, with whether the picture's edge cuts the fitted ball."""
+    """Return the press's flags in words, one more if the edge of the pictures of ``bench`` cuts the ball's print."""
     camera = bench.camera
     contact = contact_radius(ball.depth, ball.radius)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]

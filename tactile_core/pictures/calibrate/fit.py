@@ -42,7 +42,7 @@ class Calibrated:
 
 
 def check_diameter(ball_diameter: float) -> None:
-    """Raise TactileError for a ball, m, that does not fit on the gel."""
+    """Raise TactileError where a ball of ``ball_diameter``, m, does not fit on the gel (MM_LIMITS)."""
     if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
         expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
         raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
@@ -58,8 +58,9 @@ def calibrate(
     reflectance: float | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Calibrated:
-    """Fit camera, dome, coating, lights and gain of a unit, from a start. ball_diameter : m; unit : its name
+    """Fit camera, dome, coating, lights and gain of a unit, from the calibration ``start``.
 
+    ball_diameter : m; unit : its name; progress : called with (steps done, in all)
     reflectance : of the ball, above 0 to 1; the coating's transmission is then fitted. None keeps the start's
         transmission and fits the reflectance: photographs of one object determine only the product
     quick : stop after the fast picture, as where Mitsuba by LLVM does not work
@@ -211,7 +212,7 @@ class _Search:
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
         """Return standard errors by name, and the names of parameters that the photographs do not determine. How units
-        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR."""
+        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR. factor : of pixels"""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]

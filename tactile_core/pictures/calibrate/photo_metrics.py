@@ -44,7 +44,7 @@ def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray
 
 
 def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the structural similarity (H, W, 3) of two pictures over 7 x 7 px, variances unbiased, edges mirrored."""
+    """Return the structural similarity (H, W, 3) of pictures one, other (H, W, 3) over 7 x 7 px; edges mirrored."""
     mean_one, mean_other = windowed(one), windowed(other)
     unbiased = WINDOW**2 / (WINDOW**2 - 1)
     var_one = unbiased * (windowed(one * one) - mean_one**2)

@@ -161,7 +161,8 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool of pixels within 9 px of a change over 18 levels in any channel."""
+    """Return the mask (H, W) bool of pixels within 9 px of a change of picture (H, W, 3) from background (H, W, 3) over
+    18 levels in any channel."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
@@ -200,7 +201,8 @@ def _pictures(path: Path) -> dict[str, np.ndarray]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
-    """Return the press in a photograph (H, W, 3), of a ball of a radius, m; None where there is none."""
+    """Return the press in a photograph ``picture`` (H, W, 3) uint8 of a gel whose untouched ``background`` is (H, W, 3)
+    levels; None where there is none. name : of the press; radius : m, of its ball, None for that of the whole set"""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift
@@ -248,11 +250,11 @@ def lighting_drift(change: np.ndarray) -> np.ndarray:
 
 
 def _middles(count: int, step: int, size: int) -> np.ndarray:
-    """Middles (count,) of squares of `step` px, -1 to 1 over a picture's `size` px."""
+    """Return the middles (count,) of ``count`` squares of ``step`` px, on a scale of -1 to 1 over ``size`` px."""
     return 2 * (np.arange(count) + 0.5) * step / size - 1
 
 
 def _terms(down: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Terms (H, W, 6): 1, right, down and their products."""
+    """Return the terms (H, W, 6) of a quadratic in down (H,), right (W,): 1, right, down and their products."""
     down, right = np.meshgrid(down, right, indexing="ij")
     return np.stack([np.ones_like(down), right, down, right * right, right * down, down * down], axis=-1)

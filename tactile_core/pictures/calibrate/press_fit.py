@@ -91,7 +91,8 @@ class Sight:
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
-        """Return starts (right, down) m: the change's centre of mass, and where its mean over a print is largest."""
+        """Return starts (right, down) m for a ball of ``radius``, m: the change's centre of mass, and where its mean
+        over a print's width is largest. bench : gives the places of the working pixels"""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
@@ -104,7 +105,7 @@ def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
     """Fit the ball whose picture is nearest the photograph; returns it and the mean squared residual, levels squared.
-    bench : in working pixels; radius : m, the ball's, or the search's start
+    bench : draws balls in working pixels; radius : m, the ball's, or where its search starts with ``free_radius``
     lit : true fits the object's light through the coating as well (``missing_light``), false takes the unit's"""
     problem = _PressProblem(bench, sight, radius, lit)
     starts = [
@@ -157,7 +158,7 @@ LIKELY = 0.1  # prior deviation of the light that comes through, over the coatin
 
 
 def contact_radius(depth: float, radius: float) -> float:
-    """Return the contact radius, m, of a ball of a radius, m, pressed to a depth, m."""
+    """Return the contact radius, m, of a ball of ``radius``, m, pressed to ``depth``, m."""
     return float(min(CONTACT_SHARE * np.sqrt(2 * radius * depth), radius))
 
 
@@ -165,6 +166,7 @@ def missing_light(
     bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
 ) -> tuple[np.ndarray, float]:
     """Fit the light of the object that comes through the coating and that the picture of a ball lacks.
+    bench : draws balls; ball : its right, down, depth and radius, m
     Returns the residual (n, 3), grey levels, of the picture with that light, and the light over that of a coating that
     faces the LEDs, by least squares."""
     missed, slope = sight.missed(bench.change(ball)[sight.counts])

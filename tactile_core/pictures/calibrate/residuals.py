@@ -179,7 +179,8 @@ class UnitResiduals:
         return np.concatenate([changes, right * changes, down * changes])
 
     def _missed(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return residuals (3, p) of each press's picture, and slopes (3, p) of the camera's curve there."""
+        """Return residuals (3, p), levels, of each press's p counted pixels, and slopes (3, p) of the camera's
+        curve."""
         pairs = zip(self._last, self._sights, strict=True)
         found = (sight.missed((self.gain @ lights.terms).T) for lights, sight in pairs)
         return [(missed.T, slope.T) for missed, slope in found]
@@ -199,8 +200,8 @@ class UnitResiduals:
             self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return Gauss-Newton's matrix (n, n), gradient (n,) over x, gain eliminated (Schur's complement): A - sum over
-        channels of B G^-1 B^T, A of x alone, G of the gain, B mixed. The gain's own gradient is zero at its optimum."""
+        """Return Gauss-Newton's matrix (n, n), gradient (n,) at x (n,), gain eliminated (Schur's complement): A - sum
+        over channels of B G^-1 B^T, A of x alone, G of the gain, B mixed. The gain's gradient is 0 at its optimum."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
@@ -222,7 +223,8 @@ class UnitResiduals:
         return matrix, gradient
 
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Derivatives (3, free, p) of each press's picture by the unit's numbers, forward differences."""
+        """Return derivatives (3, free, p) of each press's picture, channel first, by the free ones of the unit's
+        numbers (22,): forward differences."""
         slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
         column = {number: k for k, number in enumerate(np.flatnonzero(self._free).tolist())}
         for group in TOGETHER:
@@ -240,7 +242,8 @@ class UnitResiduals:
         return slopes
 
     def _moved(self, numbers: np.ndarray, group: tuple[int, ...]) -> tuple[BallPictures, int]:
-        """Return pictures with some numbers one step larger and 1, or smaller and -1 where a unit cannot have more."""
+        """Return pictures with the numbers (22,) whose indices are in ``group`` one step larger, and 1; or one step
+        smaller, and -1, where a unit cannot have more."""
         moved = np.zeros_like(numbers)
         moved[list(group)] = STEP[list(group)]
         try:
@@ -249,7 +252,7 @@ class UnitResiduals:
             return self._pictures(with_parameters(self._bench.calibration, numbers - moved)), -1
 
     def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
-        """Derivatives (3, 3, p) of a press's picture by its right, down and depth."""
+        """Return derivatives (3, 3, p), levels a mm, of press k's picture at x (n,): channel; right, down, depth; p."""
         ball, lights, sight = self.balls(x)[k], self._last[k], self._sights[k]
         after = [self._lights(self._bench, ball + step, sight).terms for step in PRESS_STEP * np.eye(3)]
         return np.stack([self.gain @ (terms - lights.terms) / PRESS_STEP for terms in after], axis=1)

@@ -26,7 +26,7 @@ PATHS_A_PASS = 64  # per pixel; a square number, as the stratified sampler needs
 
 class GelLight:
     """Radiance by one preset; scenes are made once, only the gel's vertices change. The coating's spread is not
-    included: ``Renderer`` adds it (``coating_spread``).
+    included: ``Renderer`` adds it (``coating_spread``). rest : (H, W) m, heights that the scene starts with
     surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers"""
 
     def __init__(
@@ -102,7 +102,7 @@ class GelLight:
         self._height = drjit.opaque(mi.Float, MM * camera.apparent_height)
 
     def _towards(self, mi: Any, step: int, times: int = 1) -> Any:
-        """Return rays at every step-th pixel, `times` of each."""
+        """Return rays at every ``step``-th pixel, ``times`` of each."""
         camera = self.unit.camera
         first = (step - 1) / 2
         right = camera.right[0] + (first + step * np.arange(camera.width // step) + ASIDE[0]) * camera.pixel_size[0]
@@ -112,12 +112,13 @@ class GelLight:
         return mi.Ray3f(mi.Point3f(start), mi.Vector3f(toward))
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, LED) float32, levels, of heights (H, W) m."""
+        """Return the radiance (H, W, LED) float32, levels, of a height_map (H, W) m."""
         *_, found = self.refined(height_map)
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield what ``radiance`` returns, (H, W, LED); of traced paths the noisier mean after each pass first."""
+        """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m; of traced paths the noisier means after each
+        pass."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
@@ -193,7 +194,7 @@ class GelLight:
         return self._finer(evened((found * (step / cell) ** 2).astype(np.float32)), cell)
 
     def _finer(self, coarse: np.ndarray, step: int) -> np.ndarray:
-        """Interpolate a coarse grid's (h, w, 3) light to every pixel."""
+        """Interpolate the ``coarse`` light (h, w, 3), of squares of ``step`` px, to every pixel (H, W, 3)."""
         row, column = (np.indices(self.unit.camera.shape) - (step - 1) / 2) / step
         at = lookup(row.astype(np.float32), column.astype(np.float32), coarse.shape[:2])
         return np.stack([at(np.ascontiguousarray(coarse[..., k])) for k in range(3)], -1)

@@ -43,19 +43,20 @@ class GelMesh:
         self.count = len(along) * len(across)
 
     def vertices(self, height: np.ndarray) -> np.ndarray:
-        """Return the vertices (n, 3) float32 in mesh coordinates of a height map (H, W) m."""
+        """Return the vertices (n, 3) float32 in mesh coordinates of heights ``height`` (H, W) m."""
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
 
     def normals(self, height: np.ndarray) -> np.ndarray:
-        """Return the vertices' unit normals (n, 3) float32 from the map's slopes; not for a mesh that is scaled."""
+        """Return the vertices' unit normals (n, 3) float32 by the slopes of height (H, W) m; not for a scaled mesh."""
         right, down = (each[np.ix_(self._rows, self._columns)] for each in slopes(height, self.camera))
         found = np.stack([-right, down, np.ones_like(right)], -1)
         found /= np.linalg.norm(found, axis=-1, keepdims=True)
         return found.reshape(-1, 3).astype(np.float32)
 
     def shape(self, mi: Any, height: np.ndarray, *, smooth: bool = False) -> Any:
-        """Return the gel at heights (H, W) m as a mesh of Mitsuba's. Raises TactileError as ``check_mesh`` does."""
+        """Return the gel of height (H, W) m as a mesh of Mitsuba's, the module ``mi``; smooth : give it normals. Raises
+        TactileError as ``check_mesh`` does."""
         vertices = self.vertices(height)
         check_mesh(vertices, self.faces, self.count)
         return triangle_mesh(mi, "gel", vertices, self.faces, smooth=smooth)

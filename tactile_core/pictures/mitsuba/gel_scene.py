@@ -31,7 +31,7 @@ def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, 
 
 
 def material(coating: Coating, gel_index: float) -> dict[str, Any]:
-    """Return a coating, under gel of a refractive index, as Mitsuba's plugin."""
+    """Return a coating, under gel of the refractive index ``gel_index``, as Mitsuba's plugin."""
     albedo = {"type": "rgb", "value": list(coating.albedo)}
     if coating.bsdf == DIFFUSE:
         return {"type": "diffuse", "reflectance": albedo}
@@ -47,7 +47,7 @@ def material(coating: Coating, gel_index: float) -> dict[str, Any]:
 
 
 def _outer_index(gel_index: float) -> float:
-    """Return the index around the clear coat; Mitsuba refuses equal indices, which reflect nothing."""
+    """Return gel_index, moved off the clear coat's: Mitsuba refuses equal indices, which reflect nothing."""
     return gel_index if abs(gel_index - PIGMENT_INDEX) > LEAST_STEP else PIGMENT_INDEX - LEAST_STEP
 
 
@@ -63,7 +63,8 @@ def _lamp(led: Led) -> dict[str, Any]:
 
 
 def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[float]) -> dict[str, Any]:
-    """Return a lamp as Mitsuba's plugin; place and radius in m, image frame; brightness : (3,) radiance x radius^2."""
+    """Return a lamp as Mitsuba's plugin. position : (right, down, toward the camera) m; radius : m, 0 for a point
+    brightness : (3,) radiance x radius^2, levels m2, in the bands of the red, green and blue LED"""
     if radius < POINTLIKE * np.linalg.norm(position):
         intensity = [value * np.pi * MM**2 for value in brightness]  # of an evenly bright disc
         return {"type": "point", "position": to_scene(position), "intensity": {"type": "rgb", "value": intensity}}

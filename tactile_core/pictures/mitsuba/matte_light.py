@@ -29,7 +29,8 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
 
 class MatteLight:
-    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; the caller checks the arguments."""
+    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; the caller checks the arguments.
+    variant : see ``make_tracer``; rest : (H, W) m, heights that the scene starts with; seed : of the light points"""
 
     def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
         self.unit, self.preset = unit, preset
@@ -37,12 +38,12 @@ class MatteLight:
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels, of heights (H, W) m."""
+        """Return the radiance (H, W, 3) float32, levels, of a height_map (H, W) m."""
         height = np.asarray(height_map, np.float32)
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
-        """Return the radiance (H, W, 3) float32 of heights (H, W) m by the LEDs alone, and the surface seen."""
+        """Return the radiance (H, W, 3) float32, by the LEDs alone, of ``height`` (H, W) m, and the surface seen."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)
@@ -51,14 +52,16 @@ class MatteLight:
         return total / np.float32(self.preset.passes), first
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Surface) -> np.ndarray:
-        """Return the radiance (H, W, 3) with the preset's other effects: interreflection, refraction at the window."""
+        """Return the radiance (H, W, 3) with the preset's other effects: interreflection, refraction at the window.
+        height : (H, W) m, of the gel; direct, hits : what ``direct`` returned for it"""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
         return through_window(radiance, hits.height, self.unit) if preset.window else radiance
 
     def _one_pass(self, number: int, tilt: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, Surface]:
-        """Return direct light (H, W, 3) and the surface that pixels saw."""
+        """Return direct light (H, W, 3) of pass ``number``, from 0, and the surface that pixels saw.
+        tilt : slopes (H, W) of the height map to the right, and down"""
         leds, count = self.unit.leds, self.preset.points
         if self.preset.passes == 1:
             shift, points = ASIDE, [light_points(led, count) for led in leds]
@@ -92,8 +95,9 @@ def direct_light(
 
 
 def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
-    """Replace `facing` (cosine times distance) of a light's middle, in place, by the mean over its visible points.
-    These are so close together that they differ in direction alone: n . (l + d), d from the middle to the point."""
+    """Replace ``facing`` (H, W), cosine times distance of a light's middle, in place, by the mean over its visible
+    points. These are so close together that they differ in direction alone: n . (l + d), d from the middle to a point.
+    seen : (H, W) uint32, bit k for point k visible; cloud : (n, 3) m, the points; soften : see ``direct_light``"""
     every = 2 ** len(cloud) - 1
     box = bounding_box(seen != every, margin=1)
     if box is None:
@@ -110,7 +114,7 @@ def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray,
 
 def light_points(led: Led, count: int) -> np.ndarray:
     """Return points (count, 3) m, image frame, around the light's middle, in the plane that faces the picture's middle:
-    a ring of radius sqrt(1/2), which has the second moments of an even disc."""
+    a ring of sqrt(1/2) of its radius, which has the second moments of an even disc."""
     angle = 2 * np.pi * np.arange(count) / count
     return led.position + led.radius * np.sqrt(0.5) * _across(led, np.cos(angle), np.sin(angle))
 
@@ -133,7 +137,8 @@ def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray
 
 
 def _across(led: Led, aside: np.ndarray, upward: np.ndarray) -> np.ndarray:
-    """Vectors (n, 3) across the line to the picture's middle: `aside` is level, `upward` leans away from the gel."""
+    """Return vectors (n, 3) across the line from the LED to the picture's middle: ``aside`` (n,) times a level unit
+    vector, and ``upward`` (n,) times one that leans away from the gel."""
     toward = np.asarray(led.position) / np.linalg.norm(led.position)
     side = np.cross(toward, [0.0, 0.0, 1.0])
     side /= np.linalg.norm(side)
@@ -176,7 +181,9 @@ def _axis(first: float, step: float, count: int, margin: int) -> np.ndarray:
 def _on_gel(
     height: np.ndarray, right: np.ndarray, down: np.ndarray, direct: np.ndarray, unit: Calibration, margin: int
 ) -> np.ndarray:
-    """Radiance (h, w, 3) of a coarse map of the gel: the picture's inside it, unshadowed light on the rim, 0 beyond."""
+    """Return the radiance (h, w, 3) of a coarse map of gel: inside, the picture's; on the rim, unshadowed; beyond, 0.
+    height : (h, w) m; right : (w,), down : (h,) m, its axes; margin : cells on each side that lie outside the picture
+    direct : (H, W, 3) radiance of the picture by the LEDs alone"""
     camera = unit.camera
     right, down, flat = right[None, :], down[:, None], np.zeros_like(height)
     radiance = np.moveaxis(open_light(Surface(right, down, height, flat, flat), unit), 0, -1).copy()
@@ -223,8 +230,9 @@ def irradiance(
 
 
 def _weight(tangent: np.ndarray, aside: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Cosine-weighted solid angle below an elevation, a radian of azimuth: integral of (n . w) cos(e) de from -90. With
-    w = (cos e, sin e) in the plane of the azimuth and n = (aside, level) there; up to a constant."""
+    """Return the cosine-weighted solid angle (...) below an elevation, a radian of azimuth: integral of (n . w) cos(e)
+    de from -90, up to a constant. With w = (cos e, sin e) in the plane of the azimuth and n = (aside, level) there.
+    tangent : (...), of the elevation"""
     share = tangent / (1 + tangent * tangent)
     return 0.5 * (aside * (np.arctan(tangent) + share) + level * (tangent * share))
 
@@ -238,7 +246,7 @@ def _distances(step: float, reach: float, growth: float) -> list[float]:
 
 
 def _shifted(field: np.ndarray, right: float, down: float, margin: int) -> np.ndarray:
-    """Return the field (h, w, k) shifted by a fractional number of cells, without its margin."""
+    """Return the field (h, w, k) shifted by fractions of cells, right and down, without its margin of cells."""
     column, row = int(np.floor(right)), int(np.floor(down))
     s, t = np.float32(right - column), np.float32(down - row)
     height, width = field.shape[0] - 2 * margin, field.shape[1] - 2 * margin

@@ -51,8 +51,8 @@ def scene_files(path: str | os.PathLike) -> tuple[Path, Path, Path]:
 
 
 def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarray) -> None:
-    """Write the scene of heights (H, W) m of the unit's own gel; each file appears whole or not at all. Raises
-    TactileError for another ending than .xml and for heights that are not finite."""
+    """Write the scene of a height_map (H, W) m of the unit's own gel to the path and beside it (``scene_files``); files
+    appear whole or not at all. Raises TactileError for another ending than .xml and heights that are not finite."""
     path, shape, eye = scene_files(path)
     mesh, height_map = GelMesh(unit.camera, SPACING / 2), np.asarray(height_map, np.float32)
     check_mesh(mesh.vertices(height_map), mesh.faces, mesh.count)
@@ -110,7 +110,7 @@ def _eye(camera: Camera) -> dict[str, Any]:
 
 
 def _add(parent: ElementTree.Element, name: str, value: Any) -> None:
-    """Add a plugin, colour, number, text or transform as XML."""
+    """Add a plugin, colour, number, text or transform as XML, as the field ``name`` of ``parent``."""
     if isinstance(value, Mapping) and value["type"] == "rgb":
         _field(parent, "rgb", name, ", ".join(f"{each:.9g}" for each in value["value"]))
     elif isinstance(value, Mapping):
@@ -138,7 +138,7 @@ def _field(parent: ElementTree.Element, kind: str, name: str, value: str) -> Non
 
 
 def _ply(mesh: GelMesh, height: np.ndarray) -> bytes:
-    """Return the gel with normals as binary PLY."""
+    """Return the gel of ``height`` (H, W) m with normals as binary PLY."""
     vertices = np.hstack([mesh.vertices(height), mesh.normals(height)]).astype("<f4")
     fields = "".join(f"property float {name}\n" for name in ("x", "y", "z", "nx", "ny", "nz"))
     header = (

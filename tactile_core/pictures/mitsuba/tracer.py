@@ -19,7 +19,7 @@ BEHIND_MM = 1e3  # nothing of the gel lies farther behind the plane of height ze
 
 
 class Tracer(abc.ABC):
-    """Renderer of one scene in one variant."""
+    """Renderer of one scene in one ``variant`` of Mitsuba's. height : (H, W) m, of the gel, until ``load``"""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         self.mesh, self.variant = mesh, variant
@@ -33,7 +33,7 @@ class Tracer(abc.ABC):
         return {}
 
     def load(self, height: np.ndarray) -> None:
-        """Give the gel other heights (H, W) m."""
+        """Replace the gel's heights by ``height`` (H, W) m."""
         vertices = self.mesh.vertices(height)
         check_mesh(vertices, self.mesh.faces, self.mesh.count)
         activate(self.variant)
@@ -42,13 +42,13 @@ class Tracer(abc.ABC):
 
     @abc.abstractmethod
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Trace the pixels' rays to the gel, and from there to points (n, 3) m, 1 <= n <= 32.
+        """Trace the pixels' rays to the gel, and from there to points (n, 3) m, image frame, 1 <= n <= 32.
         shift : pixels to the right and down from each pixel's middle
         Returns places (H, W, 3) float32 m, and seen (H, W) uint32, bit k: point k lights the gel's front there."""
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
-    """Make a scene of a height map (H, W) m in ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
+    """Make a scene of ``height`` (H, W) m in the variant ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
     return (_LlvmTracer if variant == LLVM else _ScalarTracer)(mesh, height, variant)
 
 
@@ -109,7 +109,7 @@ class _ScalarTracer(Tracer):
         return {"light": {"type": "point", "position": [0, 0, 10]}, "eye": eye}
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Trace as ``Tracer.trace`` says; a point is seen where its light arrives."""
+        """Trace points (n, 3) m at a shift as ``Tracer.trace`` says; a point is seen where its light arrives."""
         mi = activate(self.variant)
         for axis, size, move in (("x", self.camera.width, shift[0]), ("y", self.camera.height, shift[1])):
             self.values[f"eye.principal_point_offset_{axis}"] = float(move / size)
@@ -125,7 +125,7 @@ class _ScalarTracer(Tracer):
 
 
 def _mended(place: np.ndarray, seen: np.ndarray, mesh: GelMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (H, W, 3) m, image frame, and their bits, with holes filled: a ray that misses the gel has its
-    place at the origin, where no ray leads. Raises TactileError as ``mend`` does."""
+    """Return places m, image frame, of ``place`` (H, W, 3) in mesh coordinates, and bits ``seen`` (H, W), holes filled:
+    a ray that misses the gel has its place at the origin, where no ray leads. Raises TactileError as ``mend`` does."""
     mend(np.logical_not(place.any(-1)), place, seen)
     return place * np.array([1 / MM, -1 / (MM * mesh.up_scale), 1 / MM], np.float32), seen

@@ -26,13 +26,15 @@ def window_height(camera: Camera) -> float:
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Return the air, m, between window and pinhole that lets the pinhole appear at the camera's height (by Snell)."""
+    """Return the air, m, between window and pinhole that lets the pinhole appear at the camera's height, by Snell.
+    index : of refraction, of gel and window"""
     return (camera.apparent_height - window_height(camera)) / index
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
     """Return the pinhole's apparent height (...), m over height zero, for pixels that look ``distance`` (...) m aside.
-    Snell's law through a flat window. A camera nearer than its window is thick keeps its height."""
+    Snell's law through a flat window of refractive ``index``. A camera nearer than the window's thickness keeps its
+    own."""
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
@@ -42,7 +44,7 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
 
 
 def tangent(sine: np.ndarray) -> np.ndarray:
-    """Convert sines (...) of angles to their tangents (...)."""
+    """Return the tangents (...) of angles given by their ``sine`` (...)."""
     return sine / np.sqrt(1 - sine**2)
 
 
@@ -59,7 +61,8 @@ def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -
 
 
 def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Interpolate (h, w, k) at fractional places by Catmull-Rom splines, edges held; exact at whole ones."""
+    """Interpolate a picture (h, w, k) at fractional ``row``, ``column`` (...), pixels, by Catmull-Rom splines, edges
+    held; exact at whole ones. Returns (..., k) float32."""
     nodes, weights = stencil(picture.shape[:2], np.stack([row.ravel(), column.ravel()]), closed=False)
     found = np.einsum("abn,abnk->nk", weights, picture.reshape(-1, picture.shape[2])[nodes])
     return found.reshape(*row.shape, -1).astype(np.float32)
