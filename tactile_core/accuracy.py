@@ -28,10 +28,10 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the root mean square (C,) m of the vector error over the nodes whose true displacement exceeds 10 um.
+    """Return the root mean square (C,) m of predicted - true (C, n, 3) m over nodes whose true displacement is over 10
+    um.
 
-    NaN where no node moves that much. The average over contacts is the rmsC of docs/sources.md, Networks.
-    """
+    NaN where no node moves that much. The average over contacts is the rmsC of docs/sources.md, Networks."""
     moving = lengths(true) > MOVING
     squares = np.where(moving, lengths(predicted - true) ** 2, 0.0).sum(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -39,20 +39,20 @@ def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the largest vector error (C,) m of any node."""
+    """Return the largest error (C,) m of any node: the length of predicted - true (C, n, 3) m."""
     return lengths(predicted - true).max(-1)
 
 
 def height(displacement: np.ndarray) -> np.ndarray:
-    """Return the displacement (C, n) m of nodes along +y, into the DIGIT's gel."""
+    """Return the displacement (C, n) m along +y, into the DIGIT's gel, from displacement (C, n, 3) m of its nodes."""
     return np.asarray(displacement[..., 1], np.float64)
 
 
 def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
     """Return the RMS error (C,) m of the depth over the core, nodes above 30 % of the true peak; NaN without contact.
 
-    depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved
-    """
+    predicted, true : (C, n, 3) m, displacements of the nodes in C contacts
+    depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved"""
     found, truth = depth(predicted), depth(true)
     peak = truth.max(-1, keepdims=True)
     core = (truth > CORE * peak) & (peak > MOVING)
@@ -61,7 +61,8 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """Return the error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact."""
+    """Return the error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact.
+    predicted, true, depth : as in `core_height_error`"""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(truth > MOVING, np.abs(peak - truth) / truth, np.nan)
@@ -91,7 +92,8 @@ def mean(values: np.ndarray) -> float | None:
 
 
 def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
-    """Compute four metrics (C,) of meshes (C, n, 3) m, by name: micrometres, and per cent for the peak."""
+    """Compute four metrics (C,) of displacement predicted against true (C, n, 3) m, by name: rms_um, max_um,
+    core_height_um, and peak_depth_percent. depth : as in `core_height_error`"""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),
         "max_um": 1e6 * max_error(predicted, true),
@@ -139,7 +141,7 @@ def failed(rows: list[Row]) -> list[Row]:
 
 
 def order(sizes: list[float], errors: list[float]) -> float:
-    """Return the observed order of accuracy: slope of the straight line fitted to log(error) over log(size)."""
+    """Return the observed order of accuracy: slope of the straight line fitted to log(errors) over log(sizes)."""
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])
 
 

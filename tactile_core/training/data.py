@@ -20,9 +20,9 @@ from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, to
 
 @dataclass(frozen=True)
 class Batch:
-    """A batch of contacts.
+    """A batch of B contacts of e electrodes.
 
-    rows : (B,) contact numbers as of ``Contacts``               signal : (B, 20) SVB's input
+    rows : (B,) contact numbers as of ``Contacts``               signal : (B, e + 1) SVB's input, see `measured`
     biotac, digit : (B, K) inputs of the mesh encoders           force : (B, 3) N
     pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
     signed : (B,) rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
@@ -70,14 +70,14 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate signals (B, 20) of the contacts as a sensor reads them: see `measured`."""
+        """Simulate signals (B, 20) of contacts rows (B,) as a sensor reads them; rectified, unit : see `measured`"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts of rows (B,) with signals (B, 20) as SVB takes them."""
+        """Return the contacts of rows (B,), as of `Contacts`, with signal (B, 20) as SVB takes it."""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])
@@ -105,7 +105,7 @@ def measured(
     change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0,
     rest_counts: np.ndarray = REST_COUNTS,
 ) -> np.ndarray:  # fmt: skip
-    """Simulate a sensor's reading (B, 20) of true changes (B, 19) counts: changes, and whether they are rectified.
+    """Simulate a sensor's reading (B, 20) of a true change (B, 19) counts: the change, and 1 where it is rectified.
 
     Rectified changes have the sign of a thinning film, as the networks read them. Simulated are a gain error for each
     channel, noise, whole counts and the ends of 12 bits. The rest lies near that of a typical unit (``rest_counts``,

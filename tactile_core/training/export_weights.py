@@ -174,7 +174,8 @@ def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, 
 
 
 def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dict[str, int]) -> dict[str, object]:
-    """Write the file of one network; returns the card's entry: file, sha256, sizes, shapes."""
+    """Write the file of network `net`; returns the card's entry: file, sha256, sizes, shapes.
+    tensors : by their names in `networks.py`; sizes : of `net_sizes`"""
     data = to_safetensors(tensors)
     write_bytes(folder / f"{net}.safetensors", data)
     shapes = {name: list(array.shape) for name, array in sorted(tensors.items())}

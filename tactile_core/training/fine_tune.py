@@ -98,7 +98,8 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (F, 2) on the gel's lattice, in its units, of contacts (F, 3) m; and which (F,) are off the pad."""
+    """Return places (F, 2) on the gel's lattice, in its units, and which (F,) of the contacts are off the pad.
+    position : (F, 3) of the contacts, in SynTouch's frame, m or mm; path : of the file, for errors"""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
@@ -123,7 +124,8 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
 
 
 def _presses(used: np.ndarray) -> np.ndarray:
-    """Return the press number (F,) of each frame: runs of contact, or equal parts where runs are too few."""
+    """Return the press number (F,) of each frame: runs of contact, or equal parts where runs are too few.
+    used : (F,) int, rising numbers in the recording of the frames that are kept"""
     runs = np.cumsum(np.diff(used, prepend=used[0]) > 1)
     return runs if runs[-1] + 1 >= BLOCKS else np.arange(len(used)) * BLOCKS // len(used)
 
@@ -176,7 +178,8 @@ def fine_tune(
 def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
-    """Return the network's tensors, rounded as they are written, of the best epoch on the validation presses."""
+    """Return the tensors of `net`, rounded as they are written, of the best epoch on the validation presses.
+    typical : (P, 19) counts, signals of simulated contacts, whose posteriors are to stay as they were"""
     sizes = nets.sizes[net]
     module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
     module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
@@ -241,7 +244,8 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
-    """Write the weights folder: all files of the source but the tuned one, and last the card with a note on it."""
+    """Write the weights folder: all files of the source but the tuned network's, and last the card with a note on it.
+    card : of the source; state : the tuned network's tensors; note : entry "fine_tuned" of the new card"""
     for name in [*(f"{net}.safetensors" for net in card["nets"] if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)

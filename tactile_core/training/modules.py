@@ -160,7 +160,7 @@ class MeshVae(Vae):
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
     def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute `SurfaceCodec.loss` of the decoded latent (B, L) against the contacts of these rows."""
+        """Compute `SurfaceCodec.loss` of the decoded latent (B, L) against the contacts of rows (B,)."""
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
@@ -169,7 +169,8 @@ class MeshVae(Vae):
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Mean distance, in cells of the surface, from the places that begin latents (B, L) to the true ones."""
+        """Return the mean distance, in cells, from the places that begin latent (B, L) to those of contacts rows
+        (B,)."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:

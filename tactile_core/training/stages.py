@@ -205,7 +205,7 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """Return the largest node error (B,) m of a decoded latent (B, L), at least ERROR_FLOOR."""
+    """Return the largest node error (B,) m of the decoded latent (B, L) against rows (B,), at least ERROR_FLOOR."""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 

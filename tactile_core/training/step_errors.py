@@ -35,14 +35,14 @@ def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """Return the displacement (B, n, 3) float32 m of the contacts in these rows."""
+    """Return the displacement (B, n, 3) float32 m of a sensor's nodes in the pairs' contacts with numbers rows (B,)."""
     return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
         getattr(pairs, f"scale_{sensor}")
     )
 
 
 def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return the errors of every step for the contacts in these rows, read as ``change`` (C, 19) counts.
+    """Return the errors of every step for the pairs' contacts rows (C,), read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
@@ -109,6 +109,7 @@ def error_columns(
     rectified: bool = False,
 ) -> Columns:
     """Return columns (B,): largest node errors, m, of BioTac and DIGIT meshes from signals, and the head's estimates.
+    rows : (B,) numbers of the pairs' contacts; change : (B, 19) counts, as they are read
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
@@ -125,7 +126,8 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """Return errors of displacements (C, n, 3) m: moving nodes' rms, largest, core's height (um), and peak (%)."""
+    """Return errors of displacement found (C, n, 3) m against the true one: moving nodes' rms, largest, core's height
+    (um), and peak (%; NaN where the true one is below PEAK_FROM). name : before each column's"""
     metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     metrics["peak_depth_percent"] = np.where(deep, metrics["peak_depth_percent"], np.nan)
@@ -133,7 +135,8 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
-    """Return the intersection over union of found gels' (C, M, 3) m and true patches (C, M), middles' distance, mm."""
+    """Compare the contact patch of gels found (C, M, 3) m with the true patch (C, M) bool: intersection over union (NaN
+    for true ones below LEAST_PATCH nodes), and distance of their middles, mm. name : before each column's"""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)
@@ -147,7 +150,7 @@ def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodie
 
 
 def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndarray:
-    """Distance (C,) m between the middles of two dents of the BioTac on the unrolled pad."""
+    """Return the distance (C,) m, on the unrolled pad, between the dents' middles of skins found, true (C, N, 3) m."""
     on_pad = np.isfinite(bodies.unrolled[:, 0])
     places = bodies.unrolled[on_pad]
     first, second = (accuracy.core_center(accuracy.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))
@@ -162,7 +165,7 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
     """Return the mean over bins of depth of the mean over indenters of the mean (or median) of values; None for none.
-    values : (C,), NaN left out; depth : (C,) m; indenter : (C,) numbers"""
+    values : (C,), NaN left out; depth : (C,) m; indenter : (C,) int, number of each contact's indenter"""
     middle = np.median if median else np.mean
     bins = []
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):
@@ -176,7 +179,8 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """Rows of each metric over the contacts in these rows that press without sliding, averaged as `in_bins`."""
+    """Return rows of each metric over the contacts rows (C,) that press without sliding, averaged as `in_bins`.
+    columns : metric -> (C,); targets : metric -> limit, in the metric's unit; set_name : of these contacts"""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []
@@ -203,7 +207,8 @@ def _baseline(columns: Columns, name: str) -> np.ndarray:
 
 
 def metric_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
-    """Make one row of a report; the unit is the name's last word. Larger is better for an intersection over union."""
+    """Make one row of a report; the unit is the last word of name. Larger is better for an intersection over union.
+    value, baseline, target : the metric, that without a translation, and its limit; None where there is none"""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target
     return row(name, value, unit, target, baseline=baseline, of=set_name, at_least=name.endswith("iou"))

@@ -65,7 +65,8 @@ class SurfaceCodec:
         ``wide``
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
-    baseline : m, loss of no displacement, mean over training contacts"""
+    baseline : m, loss of no displacement, mean over training contacts
+    In the methods, rows (B,) are contact numbers 0 to C - 1, or SILENT for a sample without contact"""
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,
@@ -95,7 +96,7 @@ class SurfaceCodec:
         return self.data.shape[1]
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
-        """Displacements (B, n, 3) float32 of contacts, in ``unit`` m and in the nodes' own frames."""
+        """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m and in the nodes' own frames."""
         values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
@@ -114,7 +115,8 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """Return the near basis's input, faded toward the window's edge, where decoded gel would have a step."""
+        """Return the near basis's input of rows (B,), faded toward the window's edge, where decoded gel would have a
+        step."""
         fade = torch.from_numpy(self.frame.fade())
         return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
 
@@ -126,7 +128,7 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """Return the encoder's input (B, K + K' + 4): coefficients, place, remainder; zero for silent ones."""
+        """Return the encoder's input (B, K + K' + 4) of rows (B,): coefficients, place, remainder; zero if silent."""
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
@@ -140,17 +142,17 @@ class SurfaceCodec:
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """Return the places (B, 2) of the contacts' dents; 0 for silent ones."""
+        """Return the places (B, 2) of the dents of contacts rows (B,); 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, from places (B, 2) to the true ones; silent samples count LEAST_AWAY."""
+        """Return the mean distance, cells, from place (B, 2) to that of rows (B,); silent samples count LEAST_AWAY."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean error of contacts, rms over moving nodes, 1 for no displacement, of coefficients (B, K + K')
-        around cells (B, 2).
+        """Return the mean error of modes (B, K + K'), over ``scale``, around cell (B, 2) against contacts rows (B,):
+        rms over moving nodes, 1 for no displacement.
 
         The root is taken contact by contact, as in the reported metric, so that deep contacts do not dominate shallow
         ones. The bases are orthonormal, so an error in coefficients is one of nodes; the part outside both bases is
@@ -164,19 +166,19 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Decode coefficients (B, K + K') around cells (B, 2) to displacement (B, n, 3) m in nodes' frames, on host."""
+        """Decode modes (B, K + K') around cell (B, 2) to displacement (B, n, 3) m in nodes' own frames, on host."""
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
         return torch.from_numpy(self.frame.add(whole, near, cell.cpu().numpy()))
 
     def true(self, rows: np.ndarray) -> Tensor:
-        """Return the true displacements (B, n, 3) m of contacts, in the nodes' own frames."""
+        """Return the true displacements (B, n, 3) m of rows (B,), in the nodes' own frames; zero if silent."""
         values = torch.from_numpy(self._local(np.maximum(rows, 0)))
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
-        """Coefficients (B, K + K') m of contacts in windows around cells (B, 2) other than their own."""
+        """Return coefficients (B, K + K') m of contacts rows (B,) in windows around cells (B, 2), not their own."""
         metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
@@ -189,7 +191,7 @@ class SurfaceCodec:
 
 
 def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Rotate displacements (C, n, 3) int16 into the nodes' own frames; no copy where nothing rotates."""
+    """Rotate data (C, n, 3) int16, displacements, into the nodes' own frames; no copy where nothing rotates."""
     if not frame.turn.any():
         return data
     local = np.empty_like(data)
@@ -214,7 +216,7 @@ def _parts(count: int) -> list[slice]:
 
 
 def touching(rows: np.ndarray) -> Tensor:
-    """Return the mask (B, 1): 1 for contacts, 0 for silent samples."""
+    """Return the mask (B, 1) of rows (B,): 1 for contacts, 0 for silent samples."""
     return torch.from_numpy((rows != SILENT).astype(np.float32))[:, None]
 
 

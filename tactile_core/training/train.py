@@ -90,7 +90,7 @@ def train(
 
 
 def quiet(share: float, text: str) -> None:
-    """Log progress: the default callback."""
+    """Log progress, the share done (0 to 1) and a line of text: the default callback."""
     log.info("%3.0f %% %s", 100 * share, text)
 
 

@@ -44,7 +44,8 @@ def train_parts(
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Train on the split's training presses; returns tensors as `networks.py` names them.
-    rest : (e,) counts of the unit that changes are from. The same arguments give the same numbers."""
+    rest : (e,) counts of the unit that changes are from. The same arguments give the same numbers.
+    progress : called now and then with the share done (0 to 1) and a line of text"""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)
     initialise(network, generator)
@@ -96,7 +97,8 @@ def _drawn(
     presses: Presses, rows: np.ndarray, options: Options, rest: np.ndarray, image: np.ndarray,
     random: np.random.Generator,
 ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
-    """Draw a batch, half of it sums of two contacts: the readings, and the true changes of both."""
+    """Draw a batch of contacts rows, half of it sums of two: the readings (B, e), and the true changes of both, counts.
+    rest : (e,) counts of the unit; image : (e,) int, the electrode that mirrors each"""
     first, second = random.choice(rows, (2, TRIES * BATCH // 2))
     apart = np.linalg.norm(presses.place[first] - presses.place[second], axis=1)
     ratio = presses.force[first] / presses.force[second]
