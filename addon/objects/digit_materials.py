@@ -86,7 +86,8 @@ def acrylic() -> bpy.types.Material:
 
 
 def of_body(name: str, colour: list[float], roughness: float, metallic: float = 0.0) -> bpy.types.Material:
-    """Make a body's material, or find it; the arguments are a row of ``materials`` in ``sensor_bodies.toml``."""
+    """Make or find the material ``name`` of a body: colour (3,) linear RGB, roughness and metallic, all 0 to 1, as in
+    ``materials`` of ``sensor_bodies.toml``."""
     label = f"Tactile {name}"
     found = bpy.data.materials.get(label)
     if found is not None:

@@ -22,7 +22,8 @@ def add_gel(
     beside: bpy.types.Object | None = None,
     sensor: str = sensors.TARGET,
 ) -> bpy.types.Object:
-    """Add the resting gel of a sensor and return it: beside a skin if given, and toward -x of the collection's gels."""
+    """Add the resting gel of a sensor to a collection, ``per_metre`` units a metre, and return it: beside a skin if
+    given, and toward -x of the collection's gels."""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} gel"
     gel = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)

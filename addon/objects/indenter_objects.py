@@ -86,7 +86,8 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return triangles (m, 3, 3), Blender units, modifiers applied, in the sensor's axes, from the object's origin."""
+    """Return triangles (m, 3, 3), Blender units, modifiers applied, from the object's origin, in the sensor's axes.
+    relative : (3, 3), of ``world_axes``"""
     nodes, corners = surfaces.triangles_of(thing.evaluated_get(depsgraph).data)
     if not len(corners):
         raise TactileError(thing.name, "no faces", "a closed mesh", "Select a mesh with a surface")
@@ -102,7 +103,8 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return the vector (3,), Blender units, from the object's origin to its first touch; zero for a spec's body."""
+    """Return the vector (3,), Blender units, from the object's origin to its first touch; zero for a spec's body.
+    relative : (3, 3), of ``world_axes``"""
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
@@ -116,6 +118,6 @@ def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
-    """Return the point where the indenter touches, (3,) m in the sensor's frame."""
+    """Return the point where the indenter touches, (3,) m in the sensor's frame. foot : (3,), of ``foot_of``"""
     origin = np.array((axes.from_world(sensor) @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)

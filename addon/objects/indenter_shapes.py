@@ -24,7 +24,8 @@ def shape_of(spec: Any) -> Surface:
 
 
 def _hull(support: Callable[[np.ndarray], np.ndarray]) -> Surface:
-    """Convex hull of a body's farthest points in evenly spread directions (Fibonacci's spiral)."""
+    """Return the convex hull of a body's farthest points in evenly spread directions (Fibonacci's spiral).
+    support : returns the body's point (3,) m that lies farthest along a unit vector (3,)"""
     k = np.arange(_DIRECTIONS) + 0.5
     polar, turn = np.arccos(1 - 2 * k / _DIRECTIONS), np.pi * (1 + 5**0.5) * k
     directions = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], -1)

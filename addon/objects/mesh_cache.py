@@ -37,7 +37,7 @@ class Motion:
 
 
 def in_memory(displacement: np.ndarray, sensor: str) -> Motion:
-    """Return the movement of a sensor's surface by displacements (T, n, 3) m."""
+    """Return the movement of a sensor's surface by displacement (T, n, 3) m."""
     return Motion(_dent(displacement), _patch(displacement, sensor), displacement)
 
 
@@ -54,7 +54,7 @@ class Writer:
         self._patch: list[np.ndarray] = []
 
     def add(self, displacement: np.ndarray) -> None:
-        """Write the next frames (T, n, 3) m."""
+        """Write the next frames' displacement (T, n, 3) m."""
         nodes = self._rest + axes.to_blender(displacement, self._per_metre)
         self._file.write(np.ascontiguousarray(nodes, "<f4").data)
         self._dent.append(_dent(displacement))
@@ -69,7 +69,8 @@ class Writer:
 
 @contextlib.contextmanager
 def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[Writer]:
-    """Yield the writer of a file that appears whole or not at all. Raises TactileError where there is no room."""
+    """Yield the writer of a file of ``frames`` frames, ``per_metre`` Blender units a metre, that appears whole or not
+    at all. Raises TactileError where there is no room."""
     room = atomic.writing(file, "room in a writable folder", "Save the .blend elsewhere")
     with room, atomic.new_file(file) as partial, open(partial, "wb") as stream:
         yield Writer(stream, sensor, per_metre, frames)

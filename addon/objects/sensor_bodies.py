@@ -76,7 +76,8 @@ def stack(part: dict[str, Any], middle: list[float], border: np.ndarray) -> tupl
 
 
 def _rectangle(half: float, other: float | None = None, corner: float | None = None) -> np.ndarray:
-    """Outline (n, 2) mm of a rectangle with round corners, counter-clockwise; of one number a circle."""
+    """Return the outline (n, 2) mm, counter-clockwise, of a rectangle of half sides ``half``, ``other`` whose corners
+    are round by the radius ``corner``; of ``half`` alone a circle."""
     other, corner = half if other is None else other, half if corner is None else corner
     turn = (np.arange(_ROUND) + 0.5) * 2 * np.pi / _ROUND
     way = np.stack([np.cos(turn), np.sin(turn)], -1)

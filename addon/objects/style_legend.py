@@ -120,7 +120,8 @@ def _patch(left: float, right: float, low: float, high: float, colour: tuple[flo
 
 
 def _letters(text: str, x: float, y: float, align: str = "LEFT") -> _Part:
-    """Text as a mesh: text objects have no colours of their own, and are black in Solid views that show them."""
+    """Make text a mesh at x, y mm on the card; align : "LEFT" or "RIGHT", the side at x. Text objects have no colours
+    of their own, and are black in Solid views that show them."""
     curve = bpy.data.curves.new("legend", "FONT")
     curve.body, curve.size, curve.align_x, curve.resolution_u = text, _LETTERS, align, 2
     thing = bpy.data.objects.new("legend", curve)

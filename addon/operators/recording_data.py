@@ -136,9 +136,9 @@ def load(
 ) -> Translated:
     """Read, tare and translate a recording; repeats return the result kept.
 
+    progress : called with the share done, 0 to 1
     motion : one of ``properties.MOTIONS``; "" stores displacements in mesh caches (files) above ``LONG`` frames
-    per_metre : units a metre of such files. Raises TactileError for unreadable files and missing frames.
-    """
+    per_metre : units a metre of such files. Raises TactileError for unreadable files and missing frames."""
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)
@@ -198,7 +198,7 @@ def _translated(
 def _with_progress(
     parts: Iterator[Translation], frames: int, progress: Callable[[float], None]
 ) -> Iterator[Translation]:
-    """Yield the parts, and say what share of the frames is done."""
+    """Yield the parts, and call ``progress`` with the share of ``frames`` that is done, 0 to 1."""
     done = 0
     for part in parts:
         yield part

@@ -71,10 +71,10 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         self.update_progress(1.0)
 
     def _show(self, found: dict[str, np.ndarray], render: bpy.types.RenderSettings, layer: str) -> None:
-        """Put passes (H, W, channels), first row first, into the result: into the region that is rendered, each eye's.
+        """Put passes ``found``, by name (H, W, channels), first row first, into the result: into the region that is
+        rendered, each eye's. layer : its name
 
-        The sensor has one camera, which is both eyes'.
-        """
+        The sensor has one camera, which is both eyes'."""
         left, low = 0, 0
         if render.use_border:  # as Blender rounds it, in float32
             left, low = (int(np.float32(share) * np.float32(whole)) for share, whole in (

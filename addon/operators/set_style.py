@@ -52,7 +52,8 @@ class TACTILE_OT_set_style(TactileOperator):
 
 
 def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
-    """Give a sensor a style that it can show; largest : mm, or counts; 0 for the animation's."""
+    """Give a sensor a style that it can show. largest : mm, or counts, at the colours' end; 0 for the animation's;
+    exaggeration : how many times the dent is drawn"""
     style = style if styles.can_show(thing, style) else "NONE"
     unit = thing.tactile.per_metre * 1e-3
     if style == "ELECTRODES":
@@ -112,7 +113,7 @@ def _largest_mm(largest: float) -> float:
 
 
 def _two_digits(value: float) -> str:
-    """Write a positive number with two digits or more: "1.0", as a legend's 1 alone looks like an l."""
+    """Write a positive value with two digits or more: "1.0", as a legend's 1 alone looks like an l."""
     return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 

@@ -80,7 +80,8 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
 
 
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
-    """A solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires."""
+    """Add a solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires.
+    frames : (F,) of the scene; sample : (F,) int, the moment of the result that each shows"""
     sensor = sensor_of(context)
     name = STANDING.format(thing.name)
     twin = context.scene.objects.get(name)

@@ -42,7 +42,8 @@ def _place(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.typ
 
 @functools.lru_cache(maxsize=64)  # a panel asks at each redraw
 def _touch(sensor: str, spec: str, x: float, z: float, tilt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Point of first touch (3,) m and direction of the press (3,) of a body of a spec."""
+    """Return the point of first touch (3,) m and the direction of the press (3,) of the body of ``spec``, a JSON text.
+    x, z : m, on the sensor; tilt : rad, see ``Placement``"""
     import msgspec
 
     from ...tactile_core.simulation.indenter_specs import IndenterSpec

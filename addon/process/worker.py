@@ -78,7 +78,8 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def _stages(used: tuple[str, ...], by_height: bool, um: float | None) -> Iterator[None]:
-    """Name each stage of a simulation at each step, with its number: "Solving the contacts, 3 of 3"."""
+    """Name each stage of a simulation at each step, with its number: "Solving the contacts, 3 of 3".
+    used : sensors; by_height : true if heights are given in place of forces; um : largest error asked for, or None"""
     names = [_preparing(sensor) for sensor in used if um is None]
     names += ["Finding the forces of the heights"] * by_height + ["Choosing the tiers"] * (um is not None)
     names.append("Solving the contacts")
@@ -145,7 +146,8 @@ def _at_frame(indenter: str, job: dict, k: int, found: str, expected: str, advic
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
-    """Return the same error in the words of the scene, where it is of a moment."""
+    """Return the same error in the words of the scene, where it is of a moment.
+    depths : m, by the scene's points, where heights were given in place of forces; else None"""
     from tactile_core.simulation.scene import load_scene
 
     if error.second is None:

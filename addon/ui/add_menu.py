@@ -108,7 +108,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
 
 
 def _as_typed(value: float) -> float:
-    """Return a size as it was typed: Blender's float32 makes 0.4 to 0.4000000059604645."""
+    """Return a size as it was typed, from the value that Blender stores: float32 makes 0.4 to 0.4000000059604645."""
     return round(value, 5)
 
 

@@ -23,7 +23,7 @@ class EvenSpline:
 
     @classmethod
     def through(cls, nodes: np.ndarray) -> EvenSpline:
-        """Make the spline of evenly spaced positions (count,)."""
+        """Make the spline through evenly spaced positions ``nodes`` (count,)."""
         return cls(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
 
     @property
@@ -42,7 +42,8 @@ class EvenSpline:
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Return the matrix (n, count) from values at nodes to the spline, or its derivative, at positions (n,)."""
+        """Return the matrix (n, count) from values at nodes to the spline at position (n,), or its derivative 1
+        there."""
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)
@@ -93,7 +94,8 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return the 4 x 4 nodes (4, 4, n), row * columns + column, whose weighted sum is each place (2, n); weights."""
+    """Return, for places (2, n) as (row, column) of a grid of ``shape`` (rows, columns), the 4 x 4 nodes (4, 4, n)
+    around each, as row * columns + column, and their Catmull-Rom weights. closed : the last column joins the first"""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)

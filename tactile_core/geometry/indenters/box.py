@@ -30,11 +30,13 @@ class Box(Indenter):
             raise TactileError("box, edge", f"{self.edge * 1e3:g} mm", "less than half of the smallest size")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the exact distance (n,) m, that of a box smaller by the edge radius less the radius, and gradient."""
+        """Return the exact distance (n,) m of points (n, 3) m, a smaller box's less the edge radius, and gradient (n,
+        3)."""
         return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Return (n, 3, 3) 1/m: 0 at faces, 1 / arm across round edges and along all tangents of round corners."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m at points (n, 3) m: 0 at faces, 1 / arm across round
+        edges and along all tangents of round corners."""
         arm = points - self._middle
         out = np.abs(arm) - self._inner
         beyond = np.copysign(np.maximum(out, 0), arm)

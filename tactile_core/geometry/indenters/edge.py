@@ -36,7 +36,8 @@ class Edge(Indenter):
             raise TactileError("edge, radius", f"{self.radius * 1e3:g} mm", "less than half of length and height")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the exact distance (n,) m, that of a wedge smaller by the radius less the radius, and gradient."""
+        """Return the exact distance (n,) m of points (n, 3) m, a smaller wedge's less the radius, and gradient (n,
+        3)."""
         distance, gradient = extrusion.distance(*self._prism(points), self.radius)
         return distance, gradient[:, _OWN]
 
@@ -64,7 +65,7 @@ class Edge(Indenter):
 
 
 def _polygon(across: np.ndarray, corners: np.ndarray) -> extrusion.Outline:
-    """The outline of a convex polygon with counterclockwise corners (k, 2) m at places (n, 2) m."""
+    """Return the outline, at places ``across`` (n, 2) m, of a convex polygon with counterclockwise corners (k, 2) m."""
     side = np.roll(corners, -1, axis=0) - corners
     length = np.linalg.norm(side, axis=1)
     normals = np.column_stack([side[:, 1], -side[:, 0]]) / length[:, None]

@@ -25,7 +25,7 @@ class Outline(NamedTuple):
 
 
 def disc(across: np.ndarray, radius: float) -> Outline:
-    """Return the outline of a disc about the origin at places (n, 2) m; radius 0 is a point."""
+    """Return the outline of a disc of radius m about the origin, at places ``across`` (n, 2) m; radius 0 is a point."""
     length = np.sqrt(np.einsum("ni,ni->n", across, across))
     centre = length < NEAREST
     length = np.maximum(length, NEAREST)
@@ -56,7 +56,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, with its arguments and order of components."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``; for along and half_span see there."""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

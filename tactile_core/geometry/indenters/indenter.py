@@ -34,10 +34,8 @@ class Indenter(Protocol):
         """
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """Return the point (3,) m of the body's convex hull farthest along a unit vector (3,), in the own frame.
-
-        Where a whole flat, circle or line lies farthest, its middle.
-        """
+        """Return the point (3,) m of the body's convex hull farthest along a unit vector ``direction`` (3,), own frame.
+        Where a whole flat, circle or line lies farthest, its middle."""
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and upper corner (3,) m of the smallest box along the own axes that holds the body."""
@@ -78,7 +76,7 @@ def check_length(kind: str, name: str, value: float) -> None:
 
 
 def sign_of(component: np.ndarray | float) -> np.ndarray:
-    """Return the signs -1, 0, 1 (...) of a direction's components (...), 0 for those that are zero up to rounding."""
+    """Return the signs -1, 0, 1 (...) of a direction's component (...), 0 for those that are zero up to rounding."""
     return np.where(np.abs(component) > SQUARE, np.sign(component), 0.0)
 
 
@@ -137,12 +135,13 @@ class Pose:
         return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
 
     def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
-        """Return the placed indenter's farthest point (3,) m along a unit vector (3,) of the sensor."""
+        """Return the placed indenter's farthest point (3,) m along a unit vector ``direction`` (3,) of the sensor."""
         return self.apex + self.axes @ indenter.support(direction @ self.axes)
 
 
 def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the unit tangents (..., 3) of a surface with normals (..., 3): along +x, and aside (pad: toward -z)."""
+    """Return two unit tangents (..., 3) of a surface whose normals are ``outward`` (..., 3): along +x, and aside, along
+    x outward (on the pad toward -z)."""
     along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     return along, np.cross(along, outward)

@@ -76,16 +76,16 @@ class NearTriangles:
 
 
 def _sides(corners: np.ndarray) -> np.ndarray:
-    """Lengths (k, n) of the edges of polygons (k, n, 3)."""
+    """Return the lengths (k, n) of the edges of k polygons with n corners (k, n, 3)."""
     return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
 
 
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cut triangles until each edge is short; returns four-sided pieces (k, 4, 3) and their triangles (k,).
+    """Cut triangles (m, 3, 3) until no edge is above ``longest``; returns four-sided pieces (k, 4, 3), their triangles
+    (k,).
 
     Two opposite edges are halved at a time, first the two beside a triangle's shortest: the number of pieces of a
-    slender one then grows as its length, not its square.
-    """
+    slender one then grows as its length, not its square."""
     order = (_sides(triangles).argmin(axis=1)[:, None] + [0, 1, 2, 2]) % 3  # the last edge but one has no length
     whole, owner, pieces, owners = np.take_along_axis(triangles, order[:, :, None], 1), np.arange(len(order)), [], []
     while len(whole):

@@ -44,7 +44,8 @@ def finest(extent: np.ndarray, spacing: float = _FINEST) -> float:
 
 
 def _shape(extent: np.ndarray, spacing: float) -> tuple[int, ...]:
-    """Nodes along x, y and z of the grid of a body of extent (3,) m while its spline is fitted."""
+    """Return the number of nodes along x, y, z, spacing m apart, of a body of extent (3,) m while its spline is
+    fitted."""
     return tuple(int(n) + 3 + 2 * _SPARE for n in np.ceil((extent + 2 * MARGIN) / spacing))
 
 
@@ -65,7 +66,7 @@ def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid | T
 
 
 def _grid(mesh: Any, where: str | os.PathLike, spacing: float, extent: np.ndarray) -> SplineGrid:
-    """Build the grid of what lies in the extent (3,) m above the mesh's lower bounds."""
+    """Build the grid, spacing m, of what lies in the extent (3,) m above the mesh's lower bounds. where : its file"""
     import scipy.ndimage
 
     shape = _shape(extent, spacing)
@@ -89,7 +90,7 @@ def _check_memory(where: str | os.PathLike, shape: tuple[int, ...], spacing: flo
 def _signed(
     mesh: Any, where: str | os.PathLike, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
 ) -> np.ndarray:
-    """Signed distance (shape) mm at the nodes of a grid, mm."""
+    """Return the signed distance (shape) mm at nodes ``origin`` + spacing * (i, j, k), mm. where : the mesh's file"""
     try:
         within = inside(mesh.triangles, origin, spacing, shape)
     except OverlapError as overlap:
@@ -155,11 +156,11 @@ def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np
 
 
 def _coarse(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
-    """Signed distance, mm, at every fourth node and those beyond the grid's end.
-
+    """Return the signed distance, mm, at every fourth node of a grid from ``origin`` (3,), ``spacing`` mm, and beyond
+    its end.
+    within : bool (shape of the grid), true for nodes inside
     Near the surface it is exact; up to ``_FAR`` spacings that to the middle of the nearest piece; farther off that to
-    the piece of the nearest such node, as a search is slow where many pieces are equally near (the middle of a ball).
-    """
+    the piece of the nearest such node, as a search is slow where many pieces are equally near (a ball's middle)."""
     import scipy.ndimage
     import scipy.spatial
 
@@ -214,7 +215,8 @@ def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tup
 def _crossings(
     triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Crossings of columns and triangles: column (k,) int, height (k,), true (k,) where going up enters the body."""
+    """Return where columns of nodes, at ``origin`` + spacing * (i, j), cross triangles (m, 3, 3): column (k,) int, i *
+    shape[1] + j; height (k,); true (k,) where going up enters the body."""
     flat = (triangles[:, :, :2] - origin[:2]) / spacing
     low = np.clip(np.ceil(flat[:, :, 0].min(axis=1)), 0, None).astype(int)
     rows = np.maximum(np.minimum(np.floor(flat[:, :, 0].max(axis=1)).astype(int), shape[0] - 1) - low + 1, 0)
@@ -242,7 +244,8 @@ def _crossings(
 
 
 def _counted(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Repeat each index as often as its count says; returns indices (n,) and the repetition's number (n,)."""
+    """Repeat each index of counts (k,) as often as its count; returns indices (n,) and each repetition's number
+    (n,)."""
     index = np.repeat(np.arange(len(counts)), counts)
     return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 

@@ -103,7 +103,8 @@ class MeshIndenter(Summary, Indenter):
 
     @classmethod
     def _cached(cls, digest: str, make: Callable[[], Any], where: str | os.PathLike, spacing: float) -> MeshIndenter:
-        """Return the indenter of a mesh (mm) that ``make`` builds, from the cache where its grid is there already."""
+        """Return the indenter of a mesh (mm) that ``make`` builds, from the cache where its grid is there already.
+        digest : of the mesh, names the cache's folder; where : the mesh's file, for errors; spacing : m, of the grid"""
         folder = cache_folder() / f"indenter-{digest[:16]}"
         try:
             arrays = _load(folder)
@@ -147,7 +148,8 @@ class MeshIndenter(Summary, Indenter):
 
 
 def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what the cache keeps, by its names. stem_place : the coarse grid's origin and spacing, the tip's top"""
+    """Return what the cache keeps, by its names. error : rms and largest, m; stem_place : coarse grid's origin,
+    spacing, top"""
     grid, stem, place = built.grid, np.zeros((0, 0, 0), np.float32), np.zeros(0)
     fine = grid.fine if isinstance(grid, TipGrid) else grid
     if isinstance(grid, TipGrid):
@@ -157,7 +159,7 @@ def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Length (n,) of slopes (n, 3), and unit normals (n, 3) along them."""
+    """Return the length (n,) of each slope (n, 3), and unit normals (n, 3) along them; (0, 0, -1) where it is zero."""
     length = lengths(slope)
     if length.min(initial=1) < 1e-6:
         flat = length < 1e-6

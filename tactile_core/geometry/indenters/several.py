@@ -60,7 +60,8 @@ class Several(Indenter):
         return joined(self.parts, hull)
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Distance (n,) m and gradient (n, 3) of the nearest part, and that part's index (n,)."""
+        """Return the distance (n,) m of points (n, 3) m to the nearest part, its gradient (n, 3), the part's index
+        (n,)."""
         answers = [pose.distance(indenter, points) for indenter, pose in self.parts]
         nearest = np.argmin([distance for distance, _ in answers], axis=0)
         row = np.arange(len(points))

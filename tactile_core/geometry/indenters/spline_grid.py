@@ -136,7 +136,7 @@ class TipGrid(Summary):
         return _mixed_gradient(along, beyond, share, slope * apart), hessian
 
     def _share(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Share (n,) of the coarse grid at heights (n,) m, and its derivatives: a polynomial of degree five."""
+        """Return the coarse grid's share (n,) at height z (n,) m, and two derivatives: a polynomial of degree five."""
         t = np.clip((height - self.top) / BAND, 0, 1)
         slope, bend = 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)
         return t**3 * (10 - 15 * t + 6 * t**2), slope / BAND, bend / BAND**2
