@@ -19,7 +19,7 @@ from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.press import FastContact
 from tactile_core.mechanics.finite_strain.body import graded_body
 from tactile_core.mechanics.placement import DEPTH_LIMIT, pose_at, thickness_under
-from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, NeoHookean, SplitBulkModulus, State
+from tactile_core.mechanics.solids.finite_strain import FiniteStrainSolid, NeoHookean, State
 from tactile_core.mechanics.solve import Step, solve, solve_path
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.sensors import Material
@@ -52,9 +52,7 @@ def test_gel_full(poisson: float) -> Found:
     """The gel itself, made of another material, 0.6 mm deep in one step from rest."""
     pose = pose_at("digit", BALL, MIDDLE)
     body = graded_body("digit", BALL, pose, 0.6e-3)
-    law = SplitBulkModulus.from_law(
-        NeoHookean.from_material(Material(sensors.describe("digit").material.youngs, poisson))
-    )
+    law = NeoHookean.from_material(Material(sensors.describe("digit").material.youngs, poisson), split=True)
     body = dataclasses.replace(body, solid=FiniteStrainSolid(body.solid.mesh, law, body.graded.pattern))
     problem = body.contact(BALL, pose, 0.6e-3, 0.0)
     touch = problem.move(pose.moved(0.6e-3), problem.start(), 5e-3)

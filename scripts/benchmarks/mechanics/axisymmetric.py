@@ -18,7 +18,7 @@ from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact
 from tactile_core.mechanics.finite_strain.solved_contact import ContactState, Tolerance
 from tactile_core.mechanics.solids.block_pattern import BlockPattern
 from tactile_core.mechanics.solids.elasticity import quadratic
-from tactile_core.mechanics.solids.finite_strain import Law, Linearised, NeoHookean, State
+from tactile_core.mechanics.solids.finite_strain import Linearised, NeoHookean, State
 from tactile_core.sensors import Material
 
 _POINT, _WEIGHT = np.polynomial.legendre.leggauss(3)
@@ -79,7 +79,7 @@ def graded(even: float, spacing: float, end: float, growth: float) -> np.ndarray
 class AxisymmetricSolid:
     """Residual and tangent of a ``QuadMesh`` of one material; the counterpart of ``FiniteStrainSolid``."""
 
-    def __init__(self, mesh: QuadMesh, law: Law) -> None:
+    def __init__(self, mesh: QuadMesh, law: NeoHookean) -> None:
         self.mesh, self.law = mesh, law
         points, weights, shape, slopes = _reference()
         corners = mesh.nodes[mesh.cells][..., :2]

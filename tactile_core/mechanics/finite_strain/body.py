@@ -11,7 +11,7 @@ from ... import sensors
 from ...geometry.indenters import Indenter, Pose
 from ..penetration import BENDS, BLUNT, check_follows, penetration_between, sharpest
 from ..solids.biotac_core import Core, facing_core
-from ..solids.finite_strain import FiniteStrainSolid, NeoHookean, SplitBulkModulus
+from ..solids.finite_strain import FiniteStrainSolid, NeoHookean
 from ..solids.fluid_cavity import FluidCavity
 from ..solids.graded_mesh import Footprint, GradedMesh, graded
 from ..solids.hex_mesh import inner_faces, outer_faces
@@ -109,7 +109,7 @@ def graded_body(
     fine = graded(sensor, footprint)
     mesh, material = fine.mesh, sensors.describe(sensor).material
     if sensors.is_gel(sensor):
-        solid = FiniteStrainSolid(mesh, SplitBulkModulus.from_law(NeoHookean.from_material(material)), fine.pattern)
+        solid = FiniteStrainSolid(mesh, NeoHookean.from_material(material, split=True), fine.pattern)
         return Body(sensor, tier, solid, None, np.empty(0, int), fine)
     solid = FiniteStrainSolid(mesh, material, fine.pattern)
     free = mesh.inner[~mesh.clamped[mesh.inner]]
