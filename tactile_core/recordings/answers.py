@@ -31,7 +31,7 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
 
 
 def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> Signals:
-    """Prepare frames with a response; silent ones get no change and a flag. Raises TactileError for a tare in those."""
+    """Prepare frames with a response; those marked silent (T,) bool get no change and a flag. No tare may lie there."""
     heard = np.flatnonzero(~silent)
     first = np.flatnonzero(silent)[0]
     where = f"{recording.row_word} {recording.rows[first]}"
@@ -66,7 +66,7 @@ def unanswered(signals: Signals) -> np.ndarray:
 
 
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:
-    """Return the options with the tare's frames renumbered among the frames with a response."""
+    """Return the options with the tare's frames renumbered among those with a response, not silent (T,) bool."""
     if options.tare in (None, "none"):
         return options
     frames = tare_frames(options.tare, len(silent))

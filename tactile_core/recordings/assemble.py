@@ -98,8 +98,9 @@ def assemble(
     """Check the columns and make a Recording of them.
 
     electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
+    rows : (T,) int, the file's line or row of each frame, `row_word` for messages; None: frames count from 0
     names : of the electrodes' columns in the file; an empty one is a missing column, a dead channel
-    snapshots : true where frames do not follow each other in time
+    snapshots : true where frames do not follow each other in time; labels : name -> (T,) texts
     channels : pdc, tac, tdc, pac, position, force
     Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad."""
     frames = len(electrodes)
@@ -140,7 +141,7 @@ def assemble(
 
 
 def _refuse_turns(path: str, electrodes: np.ndarray) -> None:
-    """Raise TactileError where fingers take turns: a row of readings (T, e) is like one some rows before, and unlike
+    """Raise TactileError where fingers take turns: a row of electrodes (T, e) is like one some rows before, and unlike
     the one before. Changes are not judged: all fingers rest at 0, and any hum would stand out."""
 
     def change(rows: int) -> float:
@@ -200,7 +201,8 @@ def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
 def _unreadable(
     electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
 ) -> list[Problem]:
-    """Find electrode cells that are no possible reading and that no reader has reported; bad : (T, 19) bool."""
+    """Find electrode cells that are no possible reading and that no reader has reported (`known`).
+    electrodes, bad : (T, 19), readings and which are impossible; rows : (T,) int, row of each frame in the file"""
     known_places = {(p.frame, "" if p.field == "row" else p.field) for p in known}
     found = []
     for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:

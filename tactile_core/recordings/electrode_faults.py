@@ -85,7 +85,7 @@ def alike(electrodes: np.ndarray) -> np.ndarray:
 
 
 def _lasting(same: np.ndarray) -> np.ndarray:
-    """Return the frames (T,) bool of runs that are longer than a glitch may be."""
+    """Return the frames (T,) bool of runs in same (T,) bool that are longer than a glitch may be."""
     found = same.copy()
     for first, last in runs(same):
         longest = END if first == 0 or last == len(same) else SHORT
@@ -100,7 +100,8 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) of long runs without any change (T - 1, e), in a recording that is noisy elsewhere."""
+    """Mark the frames (T,) bool of long runs in which no electrode changes, in a recording that is noisy elsewhere.
+    electrodes : (T, e); change : (T - 1, e), of each frame from the one before"""
     still = np.r_[False, ~change.any(axis=1)]
     found = np.zeros(len(still), bool)
     for first, last in runs(still):
@@ -109,7 +110,7 @@ def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def _noisy(electrodes: np.ndarray) -> bool:
-    """Return true if no reading (T, e) equals the one before, and readings rise and fall as noise does."""
+    """Return true if no row of electrodes (T, e) equals the one before, and readings rise and fall as noise does."""
     moves = np.diff(electrodes, axis=0)
     return len(moves) > 1 and bool(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0)) >= TURNS)
 
@@ -163,7 +164,7 @@ def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) ->
 
 
 def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Mark samples (T, 19) bool to repair, and report them in the warnings."""
+    """Mark samples (T, 19) bool of readings (T, 19) counts to repair, and report them in the warnings."""
     found = find_glitches(readings)
     if not is_time_series(found):
         warnings.append(
@@ -184,7 +185,7 @@ def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -
 
 
 def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
-    """Return true, and add a warning, if no unit of the sensor rests at counts (e,)."""
+    """Return true, and add a warning, if no unit of the sensor rests at the counts rest (e,)."""
     typical = typical_rest(sensor)
     if typical is None:
         return False

@@ -71,7 +71,7 @@ def _table(path: str, names: list[str] | None) -> Table:
 
 
 def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Return the magnitude (n,) N of a force in one column or three (n, c)."""
+    """Return the magnitude (n,) N of a force, columns (n, 1) or (n, 3) N; lines : (n,) rows in the file, for errors"""
     if columns.shape[1] not in (1, 3):
         raise TactileError(where, f"{columns.shape[1]} columns", COLUMNS, ADVICE)
     size = np.linalg.norm(columns, axis=1)

@@ -25,7 +25,7 @@ def _plain(text: str) -> str:
 
 
 def summary(labels: Mapping[str, np.ndarray]) -> dict[str, dict[str, int]]:
-    """Return label -> text -> number of frames, from label -> (T,) texts; rare texts are counted together."""
+    """Return label -> text -> number of frames, from labels, name -> (T,) texts; rare texts are counted together."""
     found = {}
     for name, column in labels.items():
         counts = Counter(column.tolist()).most_common()

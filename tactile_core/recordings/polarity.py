@@ -85,7 +85,8 @@ class Polarity:
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
-    """Choose the user's, else the file's, else the shown polarity; one that the recording contradicts is not sure."""
+    """Choose the user's polarity (given), else the file's, else the shown one; not sure if the recording denies it.
+    given, of_file : "falls" or "rises"; any other text is none"""
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
             against = shown.sure and shown.name != stated
@@ -133,21 +134,22 @@ def polarity_of(
 
 
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float, sensor: str) -> Polarity:
-    """Decide by the electrodes' change (19,) counts that goes with a swing of the fluid's pressure, counts."""
+    """Decide by the change (19,) counts of electrodes (T, 19) that goes with a swing, counts, of pdc (T,) counts."""
     centred = pdc - pdc.mean()
     slope = np.array([(column - column.mean(dtype=float)) @ centred for column in electrodes.T]) / (centred @ centred)
     return _decided(slope[None] * swing, "the change that goes with the fluid's pressure", sensor)
 
 
 def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
-    """Decide by changes in contact (n, 19) counts against a known rest; None if there are too few."""
+    """Decide by touches (n, 19) counts, changes in contact against a known rest; None if there are too few."""
     if len(touches) < FEWEST:
         return None
     return _decided(touches[spread_out(len(touches), MOST)], "the change in contact", sensor)
 
 
 def _as_drift(change: np.ndarray, electrodes: np.ndarray) -> bool:
-    """Return true if a change of the fluid's conductivity explains all but `DRIFT_LEFT` of changes (n, 19) counts."""
+    """Return true if a change of the fluid's conductivity explains all but `DRIFT_LEFT` of change (n, 19) counts, the
+    difference of electrodes (n, 19) counts to rest."""
     rest = np.median(electrodes - change, axis=0)
     drift = divider.of_films(1.1, rest) - rest
     drift /= np.linalg.norm(drift)
@@ -178,7 +180,7 @@ def _decided(changes: np.ndarray, what: str, sensor: str) -> Polarity:
 
 
 def _apart(less: float, more: float) -> bool:
-    """Return true if the likeness of one sign is clearly larger than the other's."""
+    """Return true if the likeness (a cosine) of one sign, `more`, is clearly larger than that of the other, `less`."""
     return more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
 
 

@@ -97,7 +97,8 @@ def _film(
     recording: Recording, change: Changes, rest: Baseline, pressure: np.ndarray, options: PrepareOptions, *,
     own_rest: bool,
 ) -> film.Film | None:  # fmt: skip
-    """Estimate the film of a raw recording whose rest is known; without simulated contacts, the given one or None."""
+    """Estimate the film of a raw recording whose rest is known; without simulated contacts, the given one or None.
+    change, rest : (T, e) counts; pressure : (T,) Pa over rest, NaN for none; own_rest : rest is of this recording"""
     if contacts_of(recording.sensor) is None:
         return None if options.film is None else film.Film.given(options.film)
     return film.find(
@@ -130,7 +131,8 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
 def _unit_rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Rest | None:
-    """Return the unit's known rest, since a calm level may be a steady grip; None if a calm level lies near it."""
+    """Return the unit's known rest, since a calm level may be a steady grip; None if a calm level lies near it, and
+    where none is known or wanted. readings : (T, e) counts; kind, quiet : as found of the recording"""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
     reason = "no quiet part"
@@ -146,7 +148,7 @@ def _unit_rest(
 
 
 def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: Rest | None) -> np.ndarray:
-    """PDC (T,) counts over its level at rest; NaN where there is none."""
+    """Return PDC (T,) counts over its level at rest; NaN where there is none."""
     if recording.pdc is None:
         return np.full(len(recording), np.nan)
     if unit_rest is not None and unit_rest.pdc is not None and not _is_tared(recording.pdc, unit_rest.pdc):
@@ -155,7 +157,7 @@ def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: R
 
 
 def _is_tared(pdc: np.ndarray, rest: float) -> bool:
-    """Return true if PDC was tared: it lies further below the unit's rest than any pressure."""
+    """Return true if pdc (T,) counts was tared: it lies further below the unit's rest, counts, than any pressure."""
     finite = pdc[np.isfinite(pdc)]
     return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
 
@@ -175,7 +177,7 @@ def _polarity(
 def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
-    """Return the factor to counts: 1, the user's, or for a scaled recording one that gives a usual press (assumed)."""
+    """Return the factor to counts: 1, the user's, or for scaled readings (T, e) one of a usual press (assumed)."""
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
     if kind == "raw" and (found := full_scale(readings)):
@@ -219,7 +221,7 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Baseline:
-    """Return the rest to subtract."""
+    """Return the rest to subtract from readings (T, e) counts: of quiet parts, else zero or a guess, with a warning."""
     if quiet.parts:
         # drift of a rectified signal has no sign
         return baseline(readings, quiet, options.drift and kind != "rectified")

@@ -96,7 +96,8 @@ class Preparer:
     def _carried(
         self, part: Recording, signals: Signals, rest: np.ndarray, rows: slice | np.ndarray, *, given: bool
     ) -> Signals:
-        """Return the signals of a part without a rest of its own, from the rest (19,) and PDC of the part before."""
+        """Return the signals of a part without a rest of its own, from the rest (19,) and PDC of the part before.
+        rows : frames of the part whose signals these are; given : the user chose the tare"""
         warnings = without(signals.warnings, REST)
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
@@ -115,7 +116,7 @@ class Preparer:
     def _of_typical_film(
         self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str
     ) -> tuple[film.Film, np.ndarray]:
-        """Return the film, and changes (T, 19) counts from rest (19,) at times (T,) s, converted to a typical one."""
+        """Return the film, and change (T, 19) counts from rest (19,) at time (T,) s converted to a typical film."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
@@ -125,7 +126,8 @@ class Preparer:
         return found, found.changes(whole, level)[EVERY]
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
-        """Keep the rest at the part's end: a calm level of the next part is rest only near it; a grip is calm, too."""
+        """Keep the rest at the part's end: a calm level of the next part is rest only near it; a grip is calm, too.
+        rows : frames of the part whose signals these are"""
         rest = self._rest = signals.rest + signals.drift * part.duration
         self._rest_pdc = _rest_pdc(part, signals, rows)
         pdc = self._rest_pdc if np.isfinite(self._rest_pdc) else None
@@ -133,5 +135,5 @@ class Preparer:
 
 
 def _rest_pdc(part: Recording, signals: Signals, rows: slice | np.ndarray) -> float:
-    """Return the PDC, counts, of zero pressure in a part; NaN where there is none."""
+    """Return the PDC, counts, of zero pressure in a part; NaN where there is none. rows : frames of these signals"""
     return np.nan if part.pdc is None else float(part.pdc[rows][0] - signals.pdc[0])

@@ -47,8 +47,8 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all windows of n frames, by first frame: sums (19, W) of counts, calm (W,), pdc (W,) or None,
-    middle (W,) s. Sums are in single precision where that is exact, as for counts: in double they take twice the
+    """Statistics of all W windows of n frames, by first frame: sums (19, W) of counts, calm (W,) bool, pdc (W,) mean or
+    None, middle (W,) s. Sums are in single precision where that is exact, as for counts: in double they take twice the
     recording."""
 
     n: int
@@ -58,7 +58,7 @@ class _Windows:
     middle: np.ndarray
 
     def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return the largest (W,) over electrodes of a function of each one's window means (W,)."""
+        """Return the largest (W,) over electrodes of change, a function of each one's window means (W,) counts."""
         found = change(self.sums[0].astype(float) / self.n)
         for sums in self.sums[1:]:
             np.maximum(found, change(sums.astype(float) / self.n), out=found)
@@ -113,13 +113,14 @@ def _sums(values: np.ndarray, n: int) -> np.ndarray:
 
 
 def _spread(centred: np.ndarray, n: int) -> np.ndarray:
-    """Standard deviation (..., W) within each window of values (..., T) about 0, which keeps their squares small."""
+    """Return the standard deviation (..., W) in each window of n values; centred : (..., T), about 0: small squares"""
     mean = _sums(centred, n) / n
     return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
 
 
 def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
-    """Estimate the noise (19,) counts from differences of frames APART apart, in the calmer windows of n frames."""
+    """Estimate the noise (19,) of electrodes (T, 19) counts by steps over APART frames, in the calmer windows of n
+    frames."""
     starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
     windows = (electrodes[start : start + n].astype(float) for start in starts)
     steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])
@@ -128,7 +129,8 @@ def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
 
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
     """Return the statistics of all windows of n frames. A window is calm if in every electrode the standard deviation
-    and the difference between the means of its halves are below CALM_STD and CALM_TREND times the noise."""
+    and the difference between the means of its halves are below CALM_STD and CALM_TREND times the noise.
+    electrodes : (T, 19), pdc : (T,) counts, or None; rate : Hz"""
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
     medians = np.array([[median(column)] for column in electrodes.T])
@@ -159,7 +161,7 @@ def _rest_rectified(windows: _Windows) -> np.ndarray:
 
 
 def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
-    """Mark windows (W,) bool at rest: one chosen calm window, and all calm ones that agree with it."""
+    """Mark windows (W,) bool at rest: one calm window, and all calm ones that agree with it. duration : s, in all"""
     possible = windows.calm
     if kind != "raw":
         possible = possible & (windows.largest(np.abs) <= TARED_LEVEL)
@@ -184,7 +186,8 @@ def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
     """Mark windows (W,) bool with means, sums (C, W) over n, within ``level`` of a level that follows them.
-    It starts at the window ``anchor`` and moves by at most ``rate`` a second: drift over an hour can exceed a press."""
+    It starts at the window ``anchor`` and moves by at most ``rate`` a second: drift over an hour can exceed a press.
+    middle : (W,) s, of the windows; possible : (W,) bool, those that the level may follow"""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)
     near = level + rate * TRACKED
@@ -206,8 +209,9 @@ def _tracked(
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
-    """Choose the calm window that is taken for rest: among those of lowest PDC, the first near the recording's start
-    or the last near its end; of a recording that is not raw, the one nearest to zero."""
+    """Choose the calm window (its number) that is taken for rest: among those of lowest PDC, the first near the
+    recording's start or the last near its end; of a recording that is not raw, the one nearest to zero.
+    calm : (n,) int, numbers of the windows to choose from; duration : s, of the recording"""
     if windows.pdc is not None:
         low = windows.pdc[calm]
         calm = calm[low <= low.min() + 0.5 * QUIET_PDC]

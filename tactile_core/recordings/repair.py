@@ -77,7 +77,8 @@ def _jumping(values: np.ndarray) -> np.ndarray:
 
 
 def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool glitches of 1 to 5 samples, a column at a time, which bounds the memory of a long recording."""
+    """Mark (T, C) bool glitches of 1 to 5 samples in values (T, C), a column at a time, which bounds the memory of a
+    long recording. jumping : (k,) int, columns to search"""
     frames = len(values)
     found = np.zeros(values.shape, bool)
     for length in range(1, min(SHORT, frames - 2) + 1):
@@ -116,7 +117,8 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if a run leaves the level of the second around it; a gap between two glitches does not."""
+    """Return true if the run after sample `first` and before `last` of column (T,) leaves the level of the second
+    around it; a gap between two glitches does not."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])
@@ -124,7 +126,7 @@ def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
 
 
 def _end_runs(values: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool the glitches of 1 to 3 samples at the first and the last sample."""
+    """Mark (T, C) bool the glitches of 1 to 3 samples at the first and the last sample of values (T, C) counts."""
     found = np.zeros(values.shape, bool)
     if len(values) < 2 * END + 2:
         return found
@@ -140,7 +142,8 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
 
 
 def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level."""
+    """Mark (T, C) bool runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level.
+    values : (T, C) counts; jumping : (k,) int, columns to search"""
     found = np.zeros(values.shape, bool)
     large = np.array([np.abs(np.diff(values[:, j].astype(float))) > LIMIT for j in jumping])
     alone = large.sum(axis=0) <= ALONE
@@ -155,9 +158,9 @@ def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 
 def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, int, float]]:
-    """Return pairs of opposite jumps that may begin and end a stuck run, in order, with the calmer of the steps just
-    outside. edges : samples before large steps. (A noisy electrode has millions of pairs, so all are checked at
-    once.)"""
+    """Return pairs of opposite jumps in column (T,) that may begin and end a stuck run, in order, as
+    (start, end, step): samples before them, and the calmer of the steps just outside.
+    edges : (n,) int, samples before large steps. (A noisy electrode has millions of pairs: all are checked at once.)"""
     steps = np.diff(column)
     beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
     pairs: list[tuple[int, int, float]] = []

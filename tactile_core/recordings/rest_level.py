@@ -74,9 +74,9 @@ Framewise = np.ndarray | Changes
 
 
 def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
-    """Estimate the readings (T, 19) counts without contact. Level of each quiet part, linear between their middles,
-    constant before the first and after the last: nothing is known there, and contact is never taken for drift. Without
-    drift: one level over all quiet frames."""
+    """Estimate what electrodes (T, 19) counts read without contact. Level of each quiet part, linear between their
+    middles, constant before the first and after the last: nothing is known there, and contact is never taken for drift.
+    Without drift: one level over all quiet frames."""
     if not drift or len(quiet.parts) < 2:
         return Baseline.constant(level(electrodes[quiet.mask]))
     middles = np.array([0.5 * (a + b - 1) for a, b in quiet.parts])

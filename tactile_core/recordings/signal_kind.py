@@ -25,8 +25,8 @@ MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assu
 
 
 def counted(columns: np.ndarray) -> np.ndarray | None:
-    """Histogram (e, 65536) int of columns (T, e) of whole numbers from -32,768 on; None for other numbers and short
-    columns. (Sorting long columns takes twice their memory and most of the time of reading.)"""
+    """Return a histogram (e, 65536) int of columns (T, e) of whole numbers from -32,768 on; None for other numbers and
+    short columns. (Sorting long columns takes twice their memory and most of the time of reading.)"""
     if len(columns) < len(WHOLE):
         return None
     counts = np.empty((columns.shape[1], len(WHOLE)), int)
@@ -39,7 +39,7 @@ def counted(columns: np.ndarray) -> np.ndarray | None:
 
 
 def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Return percentiles as numpy's, of numbers given as their histogram (65536,) over `WHOLE`."""
+    """Return percentiles as numpy's, shares in per cent, of numbers given by their histogram, counts (65536,)."""
     place = np.array(shares) / 100 * (counts.sum() - 1)
     below = np.floor(place)
     low, high = (WHOLE[np.searchsorted(np.cumsum(counts), rank, "right")] for rank in (below, np.ceil(place)))
@@ -67,7 +67,8 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:
-    """Return kind and the evidence for it in words. electrodes : (T, 19) float, finite, as in the file."""
+    """Return kind ("raw", "tared", "scaled" or "rectified") and the evidence for it in words.
+    electrodes : (T, 19) float, finite, as in the file"""
     counts = counted(electrodes)
     if counts is not None:
         levels = np.array([percentiles(each, [50])[0] for each in counts])

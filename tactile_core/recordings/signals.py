@@ -34,8 +34,8 @@ class Rest:
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a quiet level (19,) counts is this unit at rest, judged by PDC, counts. If either has no PDC,
-        or PDC has another zero, the level must be near the unit's counts at rest."""
+        """Return true if a quiet level (19,) counts is this unit at rest, judged by pdc, counts, there. If either has
+        no PDC (NaN), or PDC has another zero, the level must be near the unit's counts at rest."""
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
         return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())
@@ -135,23 +135,24 @@ class Signals:
         return Changes(len(self.change), self.typical_of)[EVERY]
 
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
-        """Change (T, e) counts, of raw readings converted to a unit that rests at counts (e,)."""
+        """Return change (T, e) counts, of raw readings converted to a unit that rests at counts rest (e,)."""
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
-        """Convert changes (T, e) counts of a typical unit at rest counts (e,) to this unit's raw readings. The unit's
-        gains and the fluid's drift are not put back; changes that are not raw stay as they are."""
+        """Convert change (T, e) counts of a typical unit, at rest counts `at` (e,), to this unit's raw readings. The
+        unit's gains and the fluid's drift are not put back; changes that are not raw (or without `at`) stay as they
+        are."""
         if self.kind != "raw" or at is None:
             return change
         own = divider.of_unit(change, self.rest, at)
         return own if self.film == 1 else divider.of_typical_film(own, self.rest, 1 / self.film)
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
-        """Change (n, 19) counts of some frames alone, as ``typical`` has them."""
+        """Return change (n, 19) counts of frames rows (n,) or a slice alone, as ``typical`` has them."""
         return typical(self.change[rows], self.kind, self.rest, self.sensor)
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Convert raw changes (n, 19) counts of a unit at rest counts (19,) to a typical unit's; others stay."""
+    """Convert change (n, 19) counts of a unit at counts rest (19,) to a typical unit's; kinds other than "raw" stay."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

@@ -91,8 +91,8 @@ def _write_whole(
     forces: dict[str, np.ndarray],
     tractions: dict[str, np.ndarray],
 ) -> None:
-    """Write the file whole or not at all, equal arrays to equal bytes; built in memory, as HDF5 crashes on a full
-    disk."""
+    """Write the file whole or not at all, equal arrays to equal bytes; built in memory, as HDF5 crashes on a full disk.
+    plain, forces, tractions : name -> array, tractions in Pa; steps : name in truth -> displacements in SCALE m"""
     import h5py
 
     memory = io.BytesIO()

@@ -22,7 +22,8 @@ MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
 def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
-    """Return times (T,) s and start, s, as `seconds_of`, frames where stamps (T,) jump, and sentences on them."""
+    """Return time (T,) s and start, s, as `seconds_of`, frames where stamps (T,) jump, and sentences on them.
+    rows : (T,) int, the frames' rows in the file, called by row_word in the sentences"""
     seconds, start, notes = seconds_of(stamps)
     jumps, found = time_jumps(seconds, rows, row_word)
     return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
@@ -58,7 +59,7 @@ def unit_of(stamps: np.ndarray) -> Unit:
 
 
 def is_likely(values: np.ndarray) -> bool:
-    """Return true for a column (T,) that never falls and rises as a sensor's time may, in any unit."""
+    """Return true if values (T,) of a column never fall, and rise as a sensor's time may, in any unit."""
     steps = np.diff(values)
     if not len(steps) or not (steps >= 0).all() or not (steps > 0).any():
         return False
@@ -70,7 +71,7 @@ def is_likely(values: np.ndarray) -> bool:
 
 
 def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Spread frames (T,) that share a stamp evenly up to the next, the last by the usual step; and say so."""
+    """Spread frames that share a stamp, seconds (T,), evenly up to the next, the last by the usual step; say so."""
     steps = np.diff(seconds)
     if len(steps) < FEWEST or not (steps >= 0).all() or (steps == 0).mean() < SHARED:
         return seconds, []
@@ -88,7 +89,7 @@ def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def tell_rate(seconds: np.ndarray) -> list[str]:
-    """Return a sentence if frames at times (T,) s come much faster or slower than the filters were made for."""
+    """Return a sentence if frames at seconds (T,) come much faster or slower than the filters were made for."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     if not len(forward):
@@ -104,7 +105,7 @@ def tell_rate(seconds: np.ndarray) -> list[str]:
 
 
 def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
-    """Interpolate missing stamps; at the ends, extrapolate by the median step."""
+    """Interpolate missing stamps (T,), NaN; at the ends, extrapolate by the median step."""
     good = np.flatnonzero(np.isfinite(stamps))
     if len(good) == len(stamps):
         return stamps
@@ -119,7 +120,8 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
 
 
 def time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Return the frames (n,) before which the stamp went back, stood still or left a gap, and sentences on them."""
+    """Return the frames (n,) before which seconds (T,) go back, stand still or leave a gap, and sentences on them.
+    rows : (T,) int, the frames' rows in the file, called by row_word in the sentences"""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE

@@ -64,12 +64,12 @@ class Words:
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object of indices (T,) float; empty where a row had no such cell."""
+        """Return the texts (T,) object of numbers (T,) float, their indices; empty where NaN (no such cell)."""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
     def values(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts as numbers (T,) float, NaN where they are none."""
+        """Return the texts as numbers (T,) float, NaN where they are none; numbers : (T,) float, the texts' indices"""
         known = [value if (value := number(word)) is not None else np.nan for word in (*self._numbers, "")]
         return np.array(known)[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 

@@ -71,7 +71,8 @@ class Table:
         return found
 
     def _numbers_of(self, name: str, words: Words, values: np.ndarray) -> np.ndarray:
-        """Return the numbers (T,) in a column of texts. Raises TactileError where none of them is a number."""
+        """Return the numbers (T,) in the column `name` of texts. Raises TactileError where none of them is a number.
+        words, values : its distinct texts, and (T,) float, their indices"""
         found, told = words.values(values), [word for word in words if word.lower() not in MISSING]
         if told and not np.isfinite(found).any():
             expected = "numbers, or times as 2012-11-08 17:12:03.45"

@@ -54,7 +54,7 @@ LEAST_APART = 100.0  # counts, norm of a level's difference without conductivity
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return the mean share of changes (n, 19) counts that no simulated contact explains, and the contacts' number."""
+    """Return the mean share of change (n, 19) counts that no simulated contact explains, and the contacts' number."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
@@ -69,7 +69,7 @@ def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, 
 
 
 def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
-    """Rebuild unit vectors (n, 19) from their nearest simulated ones; like : (n, P) cosines to all of these."""
+    """Rebuild unit vectors chosen (n, 19) from the nearest simulated ones; like : (n, P) cosines to all of these"""
     near = patterns(sensor)[np.argpartition(-like, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]]
     products = near @ near.transpose(0, 2, 1) + RIDGE * np.eye(NEIGHBOURS)
     weights = np.linalg.solve(products, (near @ chosen[:, :, None]))
@@ -77,7 +77,7 @@ def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float]:
-    """Fit gains to changes (n, 19) in contact; return the unexplained share's drop, and the gains' spread (log rms)."""
+    """Fit gains to change (n, 19) in contact; return the unexplained share's drop and the gains' spread (log rms)."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     even, log_gain = change, np.zeros(change.shape[1])
     for _ in range(FITS):
@@ -88,7 +88,7 @@ def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float
 
 
 def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tuple[int, int]]:
-    """Find the two electrodes whose exchange reduces the unexplained share of changes (n, 19) counts most; return the
+    """Find the two electrodes whose exchange reduces the unexplained share of change (n, 19) counts most; return the
     reduction and the pair. (The residual of each exchanged electrode correlates with the other's simulated change.)"""
     change = change[spread_out(len(change), MOST_MATCHED)]
     chosen = unit(change)
@@ -106,7 +106,7 @@ def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tu
 
 
 def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
-    """Count the nearest simulated contacts of changes (n, 19) counts that are mutually dissimilar."""
+    """Count the simulated contacts nearest to change (n, 19) counts that are mutually dissimilar."""
     known = patterns(sensor)
     near, counts = np.unique((unit(change[spread_out(len(change), MOST)]) @ known.T).argmax(axis=1), return_counts=True)
     kept: list[int] = []
@@ -147,7 +147,7 @@ def limit(contacts: int) -> float:
 
 
 def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = SOURCE) -> Doubt | None:
-    """Return the doubt of changes in contact (n, 19) counts, of a typical unit; None where there is none.
+    """Return the doubt of change (n, 19) counts in contact, of a typical unit; None where there is none.
     pressure : (n,) Pa, of the fluid over its level at rest, NaN where it was not measured; None without"""
     left, contacts = unexplained_share(change, sensor)
     enough, most = contacts >= FEWEST, limit(max(contacts, 1))
@@ -185,7 +185,7 @@ def flagged(
 
 
 def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt | None:
-    """Return the doubt that explains more than `beyond`: exchanged electrodes or wrong gains; None for neither."""
+    """Return the doubt that explains of change (n, 19) more than `beyond`: exchanged electrodes, wrong gains."""
     less, (first, second) = exchanged_share(change, sensor)
     if less > max(EXCHANGED, beyond):
         return Doubt(Reason.LAW_EXCHANGED, share=less, first=first + 1, second=second + 1, most=EXCHANGED)

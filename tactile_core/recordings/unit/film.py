@@ -140,8 +140,8 @@ class _Seen:
         return divider.typical(change, self.rest, self.typical_rest)
 
     def apart(self, typical: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Squared distance (n,) to the nearest simulated contact, its index (n,), squared length (n,); on an asinh
-        scale."""
+        """Return the squared distance (n,) of typical (n, e) counts, changes of a typical unit, to the nearest
+        simulated contact, its index (n,), and squared length (n,); on an asinh scale."""
         seen = np.arcsinh(typical / SCALE)
         length = np.square(seen).sum(axis=1)
         apart = length[:, None] - 2 * seen @ self._known.T + self._squares
@@ -149,7 +149,8 @@ class _Seen:
         return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
 
     def unexplained(self, typical: np.ndarray) -> np.ndarray:
-        """Share (n,) of squared length that no simulated contact explains, as firm as simulated or lighter."""
+        """Return the share (n,) of the squared length of typical (n, e) counts, on an asinh scale, that no simulated
+        contact explains, as firm as simulated or lighter."""
         seen = np.arcsinh(typical / SCALE)
         along = seen @ self._known.T
         firmness = np.clip(along / self._squares, 0, 1)
@@ -185,26 +186,28 @@ def find(
 
 
 def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
-    """Norm (T,) over electrodes, counts, of what the largest drift leaves of a film; 0 without drift. rest : (T, e)"""
+    """Return the norm (T,) over electrodes, counts, of what the largest drift leaves of a film; 0 without drift.
+    conductivity : (P,) log, thickness : as of `Film`; rest : (T, e) counts"""
     most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
     drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
     return DRIFT_LEFT * np.linalg.norm(drift, axis=1)
 
 
 def _impedance_at_rest(seen: _Seen) -> float:
-    """Impedance at rest over a typical unit's, median of the electrodes."""
+    """Return the impedance at rest over a typical unit's, median of the electrodes."""
     unit, typical = divider.film_impedance(seen.rest[0]), divider.film_impedance(seen.typical_rest)
     return float(np.median(unit / typical))
 
 
 def _doubt_at_rest(impedance: float) -> np.ndarray:
-    """Negative log probability of each thickness, nats, by the impedance at rest (over a typical unit's) alone."""
+    """Return minus the log probability of each thickness, nats, by impedance at rest (over a typical unit's) alone."""
     of_fluid = np.log(impedance * THICKNESSES) / CONDUCTIVITY_SPREAD
     return (np.square(np.log(THICKNESSES) / THICKNESS_SPREAD) + np.square(of_fluid)) / 2
 
 
 def _believed(doubt: np.ndarray) -> float:
-    """Return the mean thickness by negative log probabilities; 1 (typical) unless another is clearly likelier."""
+    """Return the mean thickness by doubt, minus the log probability of each; 1 (typical) unless another is clearly
+    likelier."""
     if doubt[TYPICAL] < doubt.min() + CLEARLY:
         return 1.0
     likely = np.exp(doubt.min() - doubt)
@@ -212,10 +215,11 @@ def _believed(doubt: np.ndarray) -> float:
 
 
 def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
-    """Most plausible course c (windows,) of the conductivity, log over that at rest, by Viterbi's algorithm.
+    """Return the most plausible course c (windows,) of the conductivity, log over that at rest, by Viterbi's algorithm.
 
-    It minimises the sum over windows of min(distance to a contact, to none)^2 / scale, on average, plus
-    c_0^2 / (2 at_start^2) and, for each step, (c_1 - c_0)^2 / (2 A_SECOND^2 seconds)."""
+    It minimises the sum over windows of min(distance to a contact, to none)^2 / scale, on average, plus c_0^2 /
+    (2 at_start^2) and, for each step, (c_1 - c_0)^2 / (2 A_SECOND^2 seconds). It is 0 throughout where drift explains
+    too little. thickness : of the film"""
     still = seen.apart(seen.typical(thickness, 1.0))[2]
     scale = 2 * (len(seen.rest[0]) * (NOISE / SCALE) ** 2 + MISFIT**2 * still)
     cost = np.empty((len(seen.windows), len(CONDUCTIVITIES)))
@@ -239,7 +243,8 @@ def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
 
 def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str, bool]:
     """Return the most plausible thickness, its evidence, and whether the fluid's pressure is part of that, beside the
-    counts at rest and enough different contacts."""
+    counts at rest and enough different contacts.
+    conductivity : (n, 1), over that at rest; pressure : (n,) Pa, NaN where it was not measured, or None"""
     impedance = _impedance_at_rest(seen)
     doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
     at_first = seen.typical(_believed(doubt), conductivity)

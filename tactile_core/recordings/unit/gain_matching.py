@@ -62,7 +62,8 @@ def _nearest(frames: np.ndarray, typical: np.ndarray) -> np.ndarray:
 def _log_gain(
     change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return log gains (19,) and contacts behind each: a mean of logarithms is unbiased by noise on both sides."""
+    """Return log gains (19,) and contacts behind each: a mean of logarithms is unbiased by noise on both sides.
+    change, typical, prior : as of `match`; near : (n,) number of each frame's typical signal; before : (19,)"""
     wanted = typical[near]
     size = np.square(wanted * np.exp(before))
     weight = size / (size + SURE**2)
@@ -73,7 +74,8 @@ def _log_gain(
 
 
 def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: float) -> np.ndarray:
-    """Offsets (19,) counts, from readings that should be small: the gain matters little there."""
+    """Return offsets (19,) counts, from readings that should be small: the gain matters little there.
+    change, typical, near, prior : as of `_log_gain`"""
     wanted = typical[near]
     weight = SURE**2 / (np.square(wanted) + SURE**2)
     return _over_contacts(change - wanted, weight, near, prior)[0]
@@ -82,8 +84,9 @@ def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: fl
 def _over_contacts(
     values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Weighted means (19,) of (n, 19), shrunk towards 0 by `prior`, and the weights' sums. All frames with the same
-    match count as one contact, so a finger that rests on a table for a minute counts as much as for a second."""
+    """Return the weighted means (19,) of values (n, 19), shrunk towards 0 by `prior`, and the sums of weight (n, 19).
+    All frames with the same match, near (n,) int, count as one contact, so a finger that rests on a table for a minute
+    counts as much as for a second."""
     groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
     weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))
     np.add.at(weights, index, weight)

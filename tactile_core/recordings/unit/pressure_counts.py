@@ -17,7 +17,7 @@ MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Return PDC (T,) in counts, or None if its unit is unknown; unit : counts a unit of the electrodes."""
+    """Return pdc (T,), as in the file, in counts; None if its unit is unknown. unit : counts a unit of electrodes"""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -31,7 +31,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return counts a unit of PDC (T,), 0 if unknown; and a pressure unit's name, else ""; unit : as `in_counts`"""
+    """Return counts a unit of pdc (T,), 0 if unknown; and a pressure unit's name, else ""; unit : as of `in_counts`"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):
