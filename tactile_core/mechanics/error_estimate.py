@@ -64,7 +64,7 @@ def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hid
 
 
 def _of_nothing(depth: float) -> Errors:
-    """Errors (shape m, force relative) where no node touches: a body deeper than first touch lies between nodes."""
+    """Return errors (shape m, force relative) at depth m where no node touches: a deeper body lies between nodes."""
     return (depth, 1.0) if depth > _ROUNDING else (0.0, 0.0)
 
 

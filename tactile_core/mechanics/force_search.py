@@ -73,14 +73,15 @@ def unreachable(where: str, force: float, limit: float) -> UnreachableError:
 
 
 def _root(force: float) -> float:
-    """F^(2/3), which is nearly linear in depth (Hertz)."""
+    """Return force^(2/3), force in N, 0 for a negative one, which is nearly linear in depth (Hertz)."""
     return max(float(force), 0.0) ** (2 / 3)
 
 
 def _next_depth(
     low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
 ) -> float:
-    """Return the depth, m, to try next for F^(2/3) = goal, from the (depth, F^(2/3)) known below and above it."""
+    """Return the depth, m, to try next for F^(2/3) = goal, from (depth, F^(2/3)) known ``low``, below it, and ``high``,
+    above it, None so far. limit : m, greatest depth, a quarter of which is the longest step up; halve : bisect"""
     if high is None:
         slope = low[1] / low[0] if low[0] else 0.0
         return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)

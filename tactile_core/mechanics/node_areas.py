@@ -34,10 +34,9 @@ def node_areas(sensor: str) -> np.ndarray:
 
 
 def traction(sensor: str, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the traction (n, 3) Pa on a resting surface with forces (k, 3) N on ``nodes`` (k,); zero elsewhere.
+    """Return the traction (n, 3) Pa on a resting surface with force (k, 3) N on ``nodes`` (k,); zero elsewhere.
 
-    Its sum, weighted by ``node_areas``, is the sum of the forces.
-    """
+    Its sum, weighted by ``node_areas``, is the sum of the forces."""
     areas = node_areas(sensor)
     found = np.zeros((len(areas), 3))
     found[nodes] = force / areas[nodes, None]

@@ -35,10 +35,11 @@ class PenetrationError(TactileError):
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """Return the largest penetration, m, of a body under a surface (rows, columns, 3) m at nodes and halfway between.
+    """Return the largest penetration, m, of a body under a surface grid (rows, columns, 3) m at nodes and halfway
+    between.
 
-    Raises PenetrationError if it is over 0.1 mm and over ``share`` of the body's ``depth``, m.
-    """
+    closed : the last column joins the first; where : begins the error's text
+    Raises PenetrationError if it is over 0.1 mm and over ``share`` of the body's ``depth``, m."""
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
     near = np.array(np.divmod(np.flatnonzero(gap < _CLOSE), columns), float)
@@ -54,7 +55,8 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """Return the depth, m, of a body's foremost point under a surface (rows, columns, 3) m; 0 if it lies apart."""
+    """Return the depth, m, of a body's foremost point under a surface ``grid`` (rows, columns, 3) m; 0 if it lies
+    apart. closed : true if the grid's last column joins the first"""
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:

@@ -134,7 +134,8 @@ def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
 
 
 def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates (n,) m of points (n, 3) m along a line, and their distances (n,) m from it."""
+    """Return coordinates (n,) m of points (n, 3) m along a line, and their distances (n,) m from it.
+    start : (3,) m, a point of the line; direction : (3,), its unit vector"""
     arm = points - start
     along = arm @ direction
     return along, np.linalg.norm(arm - along[:, None] * direction, axis=1)
@@ -173,7 +174,8 @@ def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose
 
 
 def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, reach: float) -> tuple:
-    """Nodes (k,) and points after them that lie less than ``reach`` m outside an indenter, and distances (k,) m."""
+    """Return nodes (k,) less than ``reach`` m outside an indenter, and distances (k,) m. Points ``more`` (p, 3) m
+    follow, near or not, numbered from the lattice's last node on."""
     nodes, gap = lattice.blocks.near(indenter, pose, reach)
     if len(more):
         nodes = np.concatenate([nodes, len(lattice.rest) + np.arange(len(more))])

@@ -65,7 +65,8 @@ def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, col
 
 
 def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> None:
-    """Write a surface, binary STL: triangles and their unit normals, float32, m. Raises what ``write_ply`` raises."""
+    """Write a surface, binary STL: triangles ``faces`` (m, 3) of nodes (n, 3) m and their unit normals, float32, m.
+    Raises what ``write_ply`` raises."""
     corners = _checked(path, "nodes", nodes, len(nodes))[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
@@ -136,7 +137,8 @@ def write_cells(
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """Format one DataArray; VTK wants the number of bytes before them, inside the same base64."""
+    """Format values (n,) or (n, k) as one DataArray; VTK wants their number of bytes before them, in the same
+    base64."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
@@ -228,7 +230,7 @@ def write_surface(
 
 
 def _write_triangles(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data) -> None:
-    """Write a surface as PLY, or as STL, which has no room for columns."""
+    """Write a surface, nodes, faces, columns as in ``write_ply``, as PLY, or as STL, which has no room for columns."""
     if Path(path).suffix.lower() == ".stl":
         write_stl(path, nodes, faces)
     else:

@@ -36,11 +36,10 @@ _LAYER = 1e-3
 
 
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
-    """Return the traction (n, 3) Pa on a resting surface displaced by (n, 3) m and touched in ``patch`` (n,) bool.
+    """Return the traction (n, 3) Pa on a resting surface under displacement (n, 3) m, touched in ``patch`` (n,) bool.
 
-    sensor : its name; nodes of the patch that cannot be touched carry none. Linear elasticity, the
-    BioTac's fluid included, its core left out.
-    """
+    sensor : its name; nodes of the patch that cannot be touched carry none. Linear elasticity, the BioTac's fluid
+        included, its core left out."""
     compliance, areas = compliance_of(sensor), node_areas(sensor)
     outward = sensors.rest_normals(sensor)
     nodes = np.flatnonzero(patch[compliance.touchable])
@@ -58,10 +57,9 @@ def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) 
 
 
 def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Traction (k, 3) Pa of nodes with areas (k,) m2 that are displaced by (k, 3) m.
+    """Return the traction (k, 3) Pa of nodes with areas (k,) m2 under displacement (k, 3) m.
 
-    block : (3 k, 3 k) m/N. Scaled by the areas' square roots, the system is symmetric and the layer uniform.
-    """
+    block : (3 k, 3 k) m/N. Scaled by the areas' square roots, the system is symmetric and the layer uniform."""
     material, thickness = sensors.describe(sensor).material, sensors.thickness(sensor)
     root = np.repeat(np.sqrt(areas), 3)
     matrix = block.astype(float) * root[:, None] * root

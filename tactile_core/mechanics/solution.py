@@ -108,6 +108,6 @@ class Solution(Summary):
 
 
 def centre_of_pressure(places: np.ndarray, nodal_force: np.ndarray) -> np.ndarray:
-    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by forces (k, 3) N; NaN without any."""
+    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by nodal_force (k, 3) N; NaN without any."""
     weight = np.linalg.norm(nodal_force, axis=1)
     return weight @ places[:, [0, 2]] / weight.sum() if weight.any() else np.full(2, np.nan)

@@ -134,7 +134,8 @@ def _check(step: Step, limit: float) -> None:
 def _guessed_depths(
     sensor: Sensor, indenter: Indenter, pose: Pose, steps: list[Step], limit: float, friction: float
 ) -> list[float]:
-    """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces, else the limit."""
+    """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces, else the limit, m.
+    friction : Coulomb's coefficient"""
     if not any(step.force for step in steps):
         return [step.depth or 0.0 for step in steps]
     fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)

@@ -59,7 +59,8 @@ class BiotacSheet:
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m at the sheet's nodes, from the changes (f,) m of the gaps at all f ``sensing_nodes``."""
+        """Return the film's thickness (k,) m at the sheet's nodes, by the change (f,) m of all f sensing nodes'
+        gaps."""
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
@@ -72,7 +73,7 @@ class BiotacSheet:
         return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
     def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-        """Ratio (e,) of each electrode's impedance to that at rest, from both resistances (e,) ohm."""
+        """Return each electrode's impedance over that at rest, (e,), by resistance and at_rest, both (e,) ohm."""
         return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 
@@ -112,7 +113,8 @@ def sensing_films(contact: Contact) -> np.ndarray:
 
 
 def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Values (n,) at points (n, 3) from those at places (k, 3), weighted by 1 / distance^3 (Shepard)."""
+    """Return values (n,) at points (n, 3) m from values (k,) at places (k, 3) m, by weights 1 / distance^3
+    (Shepard)."""
     weights = 1 / (np.linalg.norm(points[:, None] - places, axis=2) ** 3 + 1e-15)
     return weights @ values / weights.sum(1)
 
@@ -131,7 +133,7 @@ def _mirrored_faces(inner: Lattice) -> np.ndarray:
 
 
 def _connected(faces: np.ndarray) -> np.ndarray:
-    """The largest connected piece of a surface."""
+    """Return those of the triangles ``faces`` (m, 3) that belong to the surface's largest connected piece."""
     import scipy.sparse.csgraph
 
     size = faces.max() + 1
@@ -188,7 +190,7 @@ def reduced_sheet(sensor: str = sensors.SOURCE) -> ReducedSheet:
 
 
 def _potentials(sheet: BiotacSheet, films: np.ndarray) -> np.ndarray:
-    """Potentials (n - 1, e + 4) of all nodes but the first, for 1 A into each electrode at 1 S/m."""
+    """Return potentials (n - 1, e + 4) of nodes 1 to n, 1 A into each electrode at 1 S/m. films : (n,) m, thickness"""
     return factor(sheet.sheet.matrix(films)[1:, 1:].tocsc())(sheet.sheet.patches[1:])
 
 

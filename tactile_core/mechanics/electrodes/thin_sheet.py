@@ -45,7 +45,8 @@ class ThinSheet:
         return self.patches[1:].T @ answer
 
     def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
-        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j."""
+        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j. film :
+        (n,) m, h at the given nodes; conductivity : S/m, sigma"""
         if not (film > 0).all():  # false for NaN too
             raise ValueError("a film without thickness does not conduct")
         thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle
@@ -54,7 +55,7 @@ class ThinSheet:
         return matrix
 
     def mean_over_electrodes(self, film: np.ndarray) -> np.ndarray:
-        """Return the mean (k,) over each electrode of values (n,) at the nodes."""
+        """Return the mean (k,) over each electrode of a film (n,), or any other values, at the given nodes."""
         return (self.prolong @ film) @ self.patches
 
     def unresolved(self, refine: int) -> np.ndarray:
@@ -98,14 +99,15 @@ def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
 
 
 def _gradient_products(corners: np.ndarray) -> np.ndarray:
-    """Area times grad N_i . grad N_j, (m, 3, 3), of triangles (m, 3, 3) m."""
+    """Return area times grad N_i . grad N_j, (m, 3, 3), of triangles with corners (m, 3, 3) m."""
     edges = np.roll(corners, -2, 1) - np.roll(corners, -1, 1)  # the edge across from each corner
     area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2
     return np.einsum("fik,fjk->fij", edges, edges) / (4 * area[:, None, None])
 
 
 def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, object]:
-    """Nodes and faces with a node on every edge, and the sparse matrix that interpolates linearly onto them."""
+    """Cut each of triangles faces (m, 3) on nodes (n, 3) m into four: nodes and faces with a node on every edge, and
+    the sparse matrix that interpolates values linearly onto them."""
     import scipy.sparse
 
     ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1).reshape(-1, 2), 1)
@@ -122,12 +124,13 @@ def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _longest_edges(corners: np.ndarray) -> np.ndarray:
-    """Return the longest edge (m,) m of each triangle (m, 3, 3) m."""
+    """Return the longest edge (m,) m of each triangle with corners (m, 3, 3) m."""
     return np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
 
 
 def _disc(nodes: np.ndarray, faces: np.ndarray, size: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
-    """Mean over a disc as weights (n,) of the nodes; they sum to 1. size : (m,) m, the triangles' longest edges."""
+    """Return the mean over a disc of radius m at center (3,) m as weights (n,) of the nodes (n, 3) m; they sum to 1.
+    faces : (m, 3), triangles; size : (m,) m, their longest edges"""
     near = np.flatnonzero(np.linalg.norm(nodes - center, axis=1)[faces].min(1) < radius + size)
     corners = nodes[faces[near]]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

@@ -51,7 +51,7 @@ class Basis(NamedTuple):
 
 
 def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> None:
-    """Transform the rows (n, c) of an array into the wavelet basis, or back, in place."""
+    """Transform the rows of values (n, c) into the wavelet basis, in place; back : true for the way out of it."""
     for first, last, axes, clusters in segments:
         of_points = values[first:last].reshape((last - first) // axes, -1)
         for points, turned in reversed(clusters) if back else clusters:

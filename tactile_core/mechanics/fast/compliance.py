@@ -268,7 +268,7 @@ def _add_outer(rows: np.ndarray, factor: np.ndarray, line: np.ndarray) -> None:
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Return surface nodes (r,) with z >= 0 that stand for the touchable ones (m,): themselves, or their images."""
+    """Return nodes (r,) with z >= 0 that stand for touchable ones (m,): themselves, or their image, of (n,), at -z."""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
 
 

@@ -25,10 +25,12 @@ class Rows(Protocol):
         """Return the compliance (3 k, 3 k) float32 m/N among the points of sorted numbers (k,), all in ``near``."""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of numbers
+        (k,)."""
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the points' displacements (n, 3) m by forces (k, 3) N at sorted nodes, (c,) N at sensing points."""
+        """Return the points' displacements (n, 3) m by force (k, 3) N at sorted nodes (k,) and inner_force (c,) N at
+        sensing points ``inner`` (c,)."""
 
 
 class ComplianceRows:
@@ -50,18 +52,18 @@ class ComplianceRows:
         return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
 
     def sensing_motion(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on touchable nodes (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of nodes (k,)."""
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return near nodes' displacements (n, 3) m by forces (k, 3) N at sorted ``nodes``, (c,) N at ``inner``."""
+        """Return near nodes' displacements (n, 3) m; forces as in ``Rows.moved``."""
         moved = self._under(nodes, force)
         if len(inner):
             moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
         return moved.reshape(-1, 3).astype(float)
 
     def _under(self, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Near nodes' displacements (3 n,) float32, m, by forces (k, 3) N at sorted ones."""
+        """Return near nodes' displacements (3 n,) float32, m, by force (k, 3) N at sorted nodes (k,)."""
         at, (_, _, image) = self._gather(nodes), self.compliance.answers
         none, no_force, inner_move = np.empty(0, int), np.empty(0), self.compliance.inner_move
         straight = np.zeros(len(at), bool)
@@ -114,7 +116,8 @@ class ComplianceBlock:
             self.matrix[size:, size:] = compliance.inner_watch[np.ix_(inner, inner)]
 
     def respond(self, force: np.ndarray, pressing_core: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return displacement (k, 3) m and motion (c,) m of inner points off the core, by forces (k, 3), (c,) N."""
+        """Return the displacement (k, 3) m of the nodes and the motion (c,) m of inner points off the core, by force
+        (k, 3) N on the nodes and pressing_core (c,) N on the points."""
         answer = np.concatenate([force.ravel(), pressing_core]).astype(np.float32) @ self.matrix
         return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
 
@@ -148,7 +151,8 @@ def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.n
 def surface_motion(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
-    """Return the surface's motion (n, 3) float32 m by forces (k, 3) N at sorted ``nodes``, (c,) at sensing points."""
+    """Return the surface's motion (n, 3) float32 m by force (k, 3) N at sorted touchable nodes (k,) and inner_force
+    (c,) N at sensing points ``inner`` (c,)."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     moved = _sum_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)
@@ -158,7 +162,8 @@ def surface_motion(
 def sensing_gaps(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Return the first ``count`` sensing points' gaps (count,) m under the forces of ``surface_motion``."""
+    """Return the first ``count`` sensing points' gaps (count,) m, to electrode or core, under forces as in
+    ``surface_motion``: force (k, 3) N at sorted nodes (k,), inner_force (c,) N at ``inner`` (c,)."""
     gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps

@@ -38,7 +38,7 @@ class Half:
 
 
 def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
-    """Return the node (n,) that is each node's image under z to -z. Raises ValueError where one has none."""
+    """Return each node's image under z to -z, (n,), of nodes (n, 3) m. Raises ValueError where one has none."""
     from scipy.spatial import cKDTree
 
     away, image = cKDTree(nodes).query(nodes * _MIRROR)
@@ -197,11 +197,13 @@ class MirrorSymmetry:
         self._place[axes_of(half)] = np.arange(count)  # after the other: on the mirror plane this one is right
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return motions (w, 3 n) float32 from the halves' (3 k, v): of load ``column[i]``, mirrored if sign is -1."""
+        """Return motions (w, 3 n) float32 from halves even, odd (3 k, v): of load column[i], mirrored if sign[i] is
+        -1."""
         return self._joined(even.T, odd.T, column, sign.astype(np.float32))
 
     def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
-        """Return the motion (3 r, 3 n) float32 under unit forces on the touched nodes, from the halves' (3 r, 3 k)."""
+        """Return the motion (3 r, 3 n) float32 under unit forces on the touched nodes, from the halves' even, odd (3 r,
+        3 k)."""
         return self._joined(even, odd, np.arange(len(even)), np.ones(len(even), np.float32))
 
     def _joined(self, even: np.ndarray, odd: np.ndarray, rows: np.ndarray, sign: np.ndarray) -> np.ndarray:

@@ -116,7 +116,7 @@ class ContactProblem:
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
-        """Solve in one step, or where that does not settle by a detour."""
+        """Solve in one step, or where that does not settle by a detour. axial_force : N, None for the pose's depth"""
         contact = self._solve(pose, axial_force, start)
         for steps in _DETOURS:
             if contact.converged:
@@ -125,7 +125,8 @@ class ContactProblem:
         return contact
 
     def _steps(self, pose: Pose, axial_force: float | None, start: Contact | None, steps: int) -> Contact:
-        """Go from the start to the goal in several steps."""
+        """Go from the start to the goal, a pose or, if not None, an axial_force N along the motion, in several
+        steps."""
         first = contact = start or self._nothing(self.pose)
         for share in np.arange(1, steps + 1) / steps:
             goal = None if axial_force is None else first.axial_force + share * (axial_force - first.axial_force)
@@ -161,7 +162,7 @@ class ContactProblem:
         return bool((self._distance(pose, self.near, np.zeros((len(self.near), 3)))[0] < 0).any())
 
     def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) displaced by (k, 3) m."""
+        """Return gaps (k,) m and normals (k, 3) of the indenter at nodes (k,) that have moved by (k, 3) m."""
         return pose.distance(self.indenter, self._rest[nodes] + moved)
 
     def _moved(self, contact: Contact) -> np.ndarray:
@@ -169,7 +170,9 @@ class ContactProblem:
         return self._rows.moved(contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force)
 
     def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
-        """Solve, look at the whole surface, take in what it shows, until nothing more is found."""
+        """Solve, look at the whole surface, take in what it shows, until nothing more is found.
+        axial_force : N, None for the pose's depth; before, moved : last contact, near nodes' displacement (n, 3) m in
+            it"""
         iterations, shift = 0, 0.0
         contact = self._nothing(pose)  # where every round found creases
         for _ in range(_MOST_ROUNDS):
@@ -219,7 +222,8 @@ class ContactProblem:
         return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
-        """Sticking points (k, 3) m of nodes (k,) in the indenter's frame: the old ones, or where they first meet it."""
+        """Return sticking points (k, 3) m of nodes (k,) in the indenter's frame: the old ones, or where they first meet
+        it. moved : (n, 3) m, displacement of all near nodes in the contact before"""
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
         spots, new = before.pose.to_own(points), ~among(nodes, before.nodes)
         if pose is not before.pose:
@@ -270,16 +274,18 @@ class ContactProblem:
         return contact, _Around(moved, gap, core)
 
     def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> Loads:
-        """The nodes (k,) that carry what touches, (k, 3) N, and whether they slip (k,)."""
+        """Return the nodes (k,) that carry what is touching (j,), force on them (k, 3) N, and whether they are slipping
+        (k,). Here these are the same."""
         return touching, force, slipping
 
     def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """Displacement (n, 3) m of what may touch, from that of the surface there."""
+        """Return the displacement (n, 3) m of all that may touch. moved : (n, 3) m, that of the surface there
+        touching, force : numbers (k,) that touch and forces (k, 3) N on them, unused here"""
         return moved
 
 
 def _single(nodes: np.ndarray, state: Try) -> Loads:
-    """Nodes (k,) that carry force, each once, their forces (k, 3) N, and whether they slip (k,)."""
+    """Return those of nodes (k,) that carry force in a state, each once, forces (j, 3) N, which of them slip (j,)."""
     force, slipping = state.force, state.slipping
     if (nodes[1:] == nodes[:-1]).any():
         first = np.flatnonzero(np.diff(nodes, prepend=-1))
@@ -289,7 +295,7 @@ def _single(nodes: np.ndarray, state: Try) -> Loads:
 
 
 def _way_in(before: Contact, axial_force: float | None) -> float:
-    """Estimate how much deeper, m, an indenter stands when its force grows from that of ``before`` (Hertz)."""
+    """Estimate how much deeper, m, an indenter stands when its force grows from ``before`` to axial_force N (Hertz)."""
     if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
         return 0.0
     return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)

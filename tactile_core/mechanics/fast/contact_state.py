@@ -87,7 +87,7 @@ class Contact:
 
 
 def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
-    """Return the norm of the forces' (k, 3) N parts across the normals (k, 3), over the size of the summed force."""
+    """Return the norm of force (k, 3) N across unit vectors normal (k, 3), over the size of the summed force."""
     size = np.linalg.norm(force.sum(axis=0))
     across = force - np.einsum("ai,ai->a", force, normal)[:, None] * normal
     return float(np.linalg.norm(across) / size) if size else 0.0

@@ -91,7 +91,7 @@ class ContactStiffness:
 
 
 def _among(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Part (j, j) of a compliance, stiffened by the ridge."""
+    """Return the part (j, j) of a compliance matrix (s, s) at rows (j,), its diagonal stiffened by the ridge."""
     part = matrix.take(rows, 0).take(rows, 1)
     part.reshape(-1)[:: len(rows) + 1] *= 1 + RIDGE
     return part
@@ -115,7 +115,8 @@ def _release(inverse: np.ndarray, gone: np.ndarray) -> None:
 
 
 def _admit(inverse: np.ndarray, matrix: np.ndarray, at: np.ndarray, new: np.ndarray) -> None:
-    """Take rows ``new`` (i,), zero so far, into an inverse in place; at : (j,), its rows' places in the compliance."""
+    """Take rows ``new`` (i,), zero so far, into an inverse (j, j) in place.
+    matrix : (s, s), the compliance; at : (j,), places in it of the inverse's rows"""
     if not len(new):
         return
     across = matrix.take(at[new], 0).take(at, 1)

@@ -127,7 +127,8 @@ def squares(features: np.ndarray) -> np.ndarray:
 
 
 def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) -> np.ndarray:
-    """Inverse multiquadric plus linear kernel (n, m) of scaled features (n, f), (m, f); width : in scaled features"""
+    """Return the kernel (n, m), inverse multiquadric plus linear, of scaled features a (n, f) and b (m, f).
+    b_squares : (m,), of ``squares(b)``; width : in scaled features"""
     products = a @ b.T
     apart = squares(a)[:, None] + b_squares - 2 * products
     return 1 / np.sqrt(1 + np.maximum(apart, 0) / width**2) + 0.1 * (products / a.shape[1] + 1)

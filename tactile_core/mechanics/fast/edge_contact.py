@@ -43,7 +43,8 @@ class _Sprung(Frictionless):
     slack: np.ndarray
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return signed distances (k,) m, each larger by the slack, and normals (k, 3)."""
+        """Return signed distances (k,) m, each larger by the slack, and normals (k, 3), as ``Frictionless.distance``:
+        of points under a displacement (k, 3) m, the indenter moved by shift m."""
         gap, normal = super().distance(displacement, shift)
         return gap + self.slack, normal
 
@@ -181,18 +182,19 @@ class SpringRows:
         return block
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points (c,) under forces on numbers (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of numbers
+        (k,)."""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the surface's displacement (n, 3) m at the near numbers; forces as in ``Rows.moved``."""
+        """Return the displacement (n, 3) m at the near numbers; see ``Rows.moved``."""
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sorted nodes (j,) and their forces (j, 3) N, from forces (k, 3) N at sorted, single numbers (k,)."""
+        """Return sorted nodes (j,) and their forces (j, 3) N, from force (k, 3) N at sorted, single numbers (k,)."""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])
@@ -209,7 +211,7 @@ class SpringRows:
 
 
 def _alone(values: np.ndarray) -> np.ndarray:
-    """Values (n,) as the first of 16 columns, zeros after them."""
+    """Return values (n,) as the first of 16 columns (n, 16), zeros after them."""
     columns = np.zeros((len(values), 16), values.dtype)
     columns[:, 0] = values
     return columns

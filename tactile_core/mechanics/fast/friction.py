@@ -41,10 +41,9 @@ class Friction:
         self.indenter, self.pose, self.spots, self.friction = indenter, pose, spots, friction
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
+        """Solve from a first guess for the contact at its depth, or, if not None, at axial_force, N along the motion.
 
-        The result is not ``settled`` where iterations run out or stall. Raises UnsolvedError where a step fails.
-        """
+        The result is not ``settled`` where iterations run out or stall. Raises UnsolvedError where a step fails."""
         k = self.block.k
         force, core, shift = np.ascontiguousarray(begin.force), begin.core_force, begin.shift
         active, slips = begin.active.copy(), begin.slipping.copy()
@@ -93,7 +92,8 @@ class Friction:
         return gap, normal, points - there.from_own(self.spots)
 
     def _bend(self, points: coulomb.Points, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Find the slipping nodes (q,) most affected by the indenter's curvature, and that curvature (q, 3, 3) 1/m."""
+        """Find the slipping nodes (q,) most affected by the indenter's curvature, and that curvature (q, 3, 3) 1/m.
+        place : (k, 3) m, the nodes' displacement; there : the indenter's pose"""
         at = np.flatnonzero(points.slips & points.active[: self.block.k])
         if not len(at):
             return FLAT
@@ -107,7 +107,8 @@ class Friction:
         self, points: coulomb.Points, motion: coulomb.Motion, curves: tuple[np.ndarray, np.ndarray],
         axial_force: float | None,
     ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
-        """Forces (k, 3), (c,) N with which gaps close and sticking nodes stay, and how far the indenter moves, m."""
+        """Return forces (k, 3), (c,) N with which gaps close and sticking nodes stay, and the indenter's travel, m.
+        curves : of ``_bend``; axial_force : N to reach, None where the indenter stays"""
         at = np.flatnonzero(points.slips & points.active[: self.block.k])
         slipping = coulomb.slipping_nodes(at, points, motion, *curves, self.friction)
         stiffness, direction = self.stiffness.among(self.block, points.active), self.pose.direction
@@ -117,10 +118,9 @@ class Friction:
         return force, core, step
 
     def _step_for(self, change: np.ndarray, force: np.ndarray, axial_force: float) -> float:
-        """Return the indenter's travel, m, in a step to an axial force. Raises UnsolvedError.
+        """Return the indenter's travel, m, in a step to axial_force N. Raises UnsolvedError.
 
-        change : (3 k + c, 2) N, of forces without motion, and per metre of it; force : (k, 3) N before the step
-        """
+        change : (3 k + c, 2) N, of forces without motion, and per metre of it; force : (k, 3) N before the step"""
         changed = change[: force.size].reshape(-1, 3, 2).sum(axis=0)
         carried, per_step = self.pose.direction @ changed
         if not per_step > 0:
@@ -132,7 +132,8 @@ class Friction:
         return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
 
     def _spare(self, force: np.ndarray) -> float:
-        """Friction, N, beyond its limit that a node may bear which alternates between stick and slip."""
+        """Return the friction, N, beyond its limit that a node may bear which alternates between stick and slip. force
+        : (k, 3) N"""
         axial = abs(float(force.sum(axis=0) @ self.pose.direction))
         return max(WAVERING * self.friction * axial, coulomb.FORCE_NOISE)
 

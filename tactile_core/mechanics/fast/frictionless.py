@@ -84,7 +84,7 @@ class Pace:
         return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
     def after(self, gap: np.ndarray, active: np.ndarray) -> float:
-        """Return the share of the next step to take, for gaps (k,) m that should be closed where ``active`` (k,)."""
+        """Return the share, 0 to 1, of the next step to take, from gap (k,) m, which should be 0 where active (k,)."""
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
@@ -118,7 +118,7 @@ class Frictionless:
         self._probes = bool(probe.any())
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return gaps (k,) m and normals (k, 3) for displacements (k, 3) m and a shift of the indenter, m, along its
+        """Return gaps (k,) m and normals (k, 3) under a displacement (k, 3) m and a shift of the indenter, m, along its
         motion; a crease's second face is measured at the point moved by ``probe``."""
         points = self.rest + displacement
         there = self.pose.moved(shift) if shift else self.pose
@@ -128,10 +128,10 @@ class Frictionless:
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from a first guess for the contact at its depth, or at a force along the motion, N.
+        """Solve from a first guess for the contact at its depth, or, if not None, at axial_force, N along the motion.
 
-        The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step fails.
-        """
+        The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step
+        fails."""
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
         gap, normal = self.distance(place, state.shift)
         flips = np.zeros(len(gap), int)
@@ -160,7 +160,7 @@ class Frictionless:
         return state
 
     def _model(self, normal: np.ndarray, older: _Model | None) -> _Model:
-        """Return the model at normals (k, 3), or the older one if they have hardly turned."""
+        """Return the model at unit vectors ``normal`` (k, 3), or the older one if they have hardly turned."""
         if older is None:
             return _Model(normal, self.block.normal(normal), {})
         stale = np.flatnonzero(np.abs(normal - older.normal).max(axis=1) > _STALE)

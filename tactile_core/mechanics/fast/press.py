@@ -125,10 +125,10 @@ class CorrectedPress:
         return self._with_correction(contact, fall)
 
     def _at_force(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Solve by secants in the logarithms of linear and corrected force, which is nearly a power of the other.
+        """Solve for a corrected force N, by secants in the logarithms of linear and corrected force, nearly a line.
 
-        None beyond the limit; raises UnsolvedError if none is found.
-        """
+        fall : m, how much deeper first touch is than at the press's own pose
+        None beyond the limit; raises UnsolvedError if none is found."""
         if isinstance(self.problem, EdgeContactProblem):
             return self._by_depths(force, pose, fall)
         contact = self.last or self._find_first_contact(pose)
@@ -156,7 +156,8 @@ class CorrectedPress:
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
     def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Solve by a search over depth, faster with points between nodes; None, or errors, as in ``_at_force``."""
+        """Solve for a force N by a search over depth, faster with points between nodes; fall and errors as in
+        ``_at_force``."""
 
         def move(depth: float, before: FastContact) -> FastContact:
             """Return the corrected contact at a depth m from first touch, starting from the contact before."""
@@ -177,7 +178,8 @@ class CorrectedPress:
         return found
 
     def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
-        """Power by which the corrected force grows with the linear one, between two contacts; kept for the next."""
+        """Return the power by which the corrected force grows with the linear one, between contacts before and found,
+        each (linear, corrected) N; kept for the next."""
         if before is not None and min(*before, *found) > 0:
             linear, corrected = np.log(found) - np.log(before)
             if abs(linear) > _POWER_FROM:
@@ -210,6 +212,7 @@ class CorrectedPress:
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:
-    """Return a contact with its depth counted from first touch at the place slid to, which the correction expects."""
+    """Return a contact with its depth counted from first touch at the place slid to, which lies ``fall`` m deeper; the
+    correction expects that."""
     depth = max(contact.depth - fall, _LEAST_DEPTH)
     return contact if depth == contact.depth else contact.at_depth(depth)

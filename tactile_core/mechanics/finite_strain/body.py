@@ -47,10 +47,10 @@ class Body:
     def contact(
         self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
     ) -> FiniteStrainContact:
-        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most.
+        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most from its pose.
 
-        every_edge : add penalty points also for edges near the nodes at first touch, not only at full depth
-        """
+        friction : Coulomb's; every_edge : add penalty points also for edges near the nodes at first touch, not only at
+            full depth"""
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
         near = mesh.surface[distance < _REACH]

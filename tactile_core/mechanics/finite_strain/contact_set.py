@@ -87,10 +87,10 @@ class ContactSet:
     ) -> ContactSet:
         """Return the set that starts the next load step: nodes that touched, and those the moved obstacle overlaps.
 
-        at : (n, 3) m, the mesh's nodes now; before : the obstacle's pose until now
+        candidates : (m,) mesh nodes; at : (n, 3) m, the mesh's nodes now; before : the obstacle's pose until now
+        friction, grip : of the new set, see the class
         first_share : where nothing touched, only nodes enter that overlap by this share of the largest overlap.
-        Anchors of slipping nodes are dragged to where friction holds them.
-        """
+        Anchors of slipping nodes are dragged to where friction holds them."""
         m = len(candidates)
         if obstacle is None or not m:
             return ContactSet.none()
@@ -111,15 +111,16 @@ class ContactSet:
         return carried
 
     def _tie(self, fresh: np.ndarray, at: np.ndarray) -> None:
-        """Anchor nodes where they meet the obstacle, which moves onto them in this load step."""
+        """Anchor candidates fresh (m,) bool where they meet the obstacle, which moves onto them in this load step. at :
+        (n, 3) m, the mesh's nodes now"""
         last = self.obstacle.pose.to_own(at[self.candidates[fresh]])
         self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 
     def begin(self, at: np.ndarray) -> np.ndarray:
         """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first column.
 
-        One tangent is perpendicular to the axis of the normal's smallest component, as mirror symmetry needs.
-        """
+        at : (n, 3) m, the mesh's nodes now. One tangent is perpendicular to the axis of the normal's smallest
+            component, as mirror symmetry needs."""
         if not len(self.candidates):
             self._distance, self._frames = np.empty(0), np.empty((0, 3, 3))
             return self._frames
@@ -134,7 +135,7 @@ class ContactSet:
         return self._frames
 
     def _stretch(self, at: np.ndarray) -> None:
-        """Measure how far nodes are from their anchors, along the obstacle."""
+        """Measure how far nodes, of all ``at`` (n, 3) m, are from their anchors, along the obstacle."""
         away = at[self.nodes] - self.obstacle.pose.from_own(self.anchor[self.active])
         self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
 
@@ -143,7 +144,7 @@ class ContactSet:
         self.rubbing, self.slipping[self.active] = self._capped(self._trial)
 
     def _capped(self, trial: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Limit pulls (k, 3) N by friction; returns the limited pulls (k, 3), and which (k,) slip."""
+        """Limit pulls ``trial`` (k, 3) N by friction; returns the limited pulls (k, 3), and which (k,) slip."""
         bound, size = self.friction * np.maximum(self.pressing, 0), np.linalg.norm(trial, axis=1)
         slips = size > bound
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
@@ -176,10 +177,8 @@ class ContactSet:
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:
-        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals: pressing times the Hessian.
-
-        It is taken on the obstacle's surface, where the nodes will lie: deep inside, the curvature misleads.
-        """
+        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals, pressing times the Hessian, on
+        the obstacle's surface, where nodes ``at`` (n, 3) m will lie: deep inside, the curvature misleads."""
         if not self.active.any():
             return np.empty((0, 3, 3))
         return self.pressing[:, None, None] * self.obstacle.curvature(
@@ -222,7 +221,7 @@ class ContactSet:
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)
 
     def follow(self, reaction: np.ndarray) -> None:
-        """Update friction, if any node slips, to the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
+        """Update friction, if any node slips, to the normal forces of a reaction (k, 3) N, in ``begin``'s frames."""
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
@@ -230,7 +229,7 @@ class ContactSet:
             self.imbalance = float(np.abs(self.rubbing - before).max() / max(self.pressing.max(initial=0), 1e-12))
 
     def press(self, reaction: np.ndarray) -> None:
-        """Store the normal forces of reactions (k, 3) N, in ``begin``'s frames."""
+        """Store the normal forces of a reaction (k, 3) N, in ``begin``'s frames."""
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:

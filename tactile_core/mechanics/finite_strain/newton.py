@@ -105,10 +105,10 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve a contact without friction as ``move`` does, by continuation from one with friction, which fades to 0.
+        """Solve a contact without friction as ``move``, in steps of ``step`` m, by continuation from one with friction,
+        which fades to 0.
 
-        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without it.
-        """
+        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without it."""
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
             for friction in _FADING[1:]:
@@ -190,7 +190,8 @@ class FiniteStrainContact:
         raise FloatingPointError("a cell would be turned inside out")
 
     def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
-        """Push of the indenter on the penalty points; none where the contact is not ``guarded``."""
+        """Return the push of the indenter on the penalty points; none where the contact is not ``guarded``.
+        at : (n, 3) m, the mesh's nodes now; spring : stiffness of a point, over a node's own"""
         if not (start.guarded and outer.obstacle and self._penalty):
             return NO_PUSH
         return self._penalty.push(outer.obstacle, at, spring * self._factor.stiffness)
@@ -218,11 +219,10 @@ class FiniteStrainContact:
     def _newton(
         self, state: State, outer: ContactSet, inner: ContactSet, fluid: float, push: Push, unrest: float
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
-        """Solve for a Newton step.
+        """Solve for a Newton step. fluid : its pressure, Pa; unrest : the last step's relative imbalance
 
         Returns the steps of displacement (n, 3) m and of the fluid's pressure Pa, the relative imbalance before them,
-        the cells' pressure step (n_cells, 4) Pa, and the share of the step that friction allows.
-        """
+        the cells' pressure step (n_cells, 4) Pa, and the share of the step that friction allows."""
         lines = self.solid.linearise(state)
         largest = np.abs(lines.internal_force(condensed=False)).max()
         pattern, at = self.solid.pattern, self._at(state)

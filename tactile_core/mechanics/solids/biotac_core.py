@@ -42,7 +42,7 @@ class Core:
         return height / length, gradient / length[:, None]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Derivative (n, 3, 3) 1/m of the normal, symmetric part, by central differences."""
+        """Return the normal's derivative (n, 3, 3) 1/m at points (n, 3) m, symmetric part, by central differences."""
         blocks = np.empty((len(points), 3, 3))
         for k, axis in enumerate(np.eye(3) * _HESSIAN_STEP):
             blocks[:, :, k] = self.distance(points + axis)[1] - self.distance(points - axis)[1]

@@ -26,7 +26,7 @@ class BlockPattern:
         self.starts = np.searchsorted(self.rows, np.arange(n_nodes + 1)).astype(np.int32)
 
     def gather(self, stiffness: np.ndarray) -> np.ndarray:
-        """Sum cell matrices (n_cells, k, 3, 3, k), (node, axis, axis, node), to blocks (n_blocks, 3, 3)."""
+        """Sum cells' stiffness (n_cells, k, 3, 3, k), (node, axis, axis, node), to blocks (n_blocks, 3, 3)."""
         blocks = np.empty((len(self.rows), 3, 3))
         for i in range(3):
             for j in range(3):
@@ -35,7 +35,7 @@ class BlockPattern:
         return blocks
 
     def find(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Return the indices (p,) into ``blocks`` of pairs of nodes (p,), (p,) that share a cell."""
+        """Return the indices (p,) into ``blocks`` of pairs of nodes rows, columns (p,) that share a cell."""
         return np.searchsorted(self._places, rows.astype(np.int64) * self.n_nodes + columns)
 
     def turn(self, blocks: np.ndarray, nodes: np.ndarray, frames: np.ndarray) -> None:
@@ -48,7 +48,7 @@ class BlockPattern:
             blocks[here] = blocks[here] @ frame if side else frame.swapaxes(1, 2) @ blocks[here]
 
     def sparse(self, blocks: np.ndarray):  # noqa: ANN201 (scipy is imported only where it is needed)
-        """Assemble the matrix (3 n, 3 n), scipy BSR."""
+        """Assemble the matrix (3 n, 3 n), scipy BSR, of blocks (n_blocks, 3, 3)."""
         import scipy.sparse
 
         size = 3 * self.n_nodes
@@ -70,8 +70,8 @@ class BlockPattern:
     def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
         """Assemble the upper triangle of the free degrees of freedom, scipy CSR, identity rows for ``held`` ones.
 
-        held : (n_free,) bool. The pattern is the same every time: a solver may keep its analysis.
-        """
+        blocks : (n_blocks, 3, 3); held : (n_free,) bool. The pattern is the same every time: a solver may keep its
+            analysis."""
         import scipy.sparse
 
         rows, columns, places, starts = self._upper

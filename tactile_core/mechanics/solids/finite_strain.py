@@ -54,7 +54,9 @@ class NeoHookean:
         return isochoric + self.at_points / 2 * (j - 1) ** 2
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative by F."""
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative (..., 3, 3, 3, 3)
+        by F. f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, of the cells, positive where they are
+        larger"""
         cofactor = cofactors(f)
         g = cofactor / j[..., None, None]  # F^-T
         i1 = np.einsum("...ij,...ij->...", f, f)
@@ -79,7 +81,7 @@ class NeoHookean:
 
 
 def cofactors(f: np.ndarray) -> np.ndarray:
-    """Return the cofactors (..., 3, 3) J F^-T of matrices; written out, several times faster than LAPACK one by one."""
+    """Return the cofactors (..., 3, 3) J F^-T of matrices f (..., 3, 3); much faster, written out, than by LAPACK."""
     a, b, c = f[..., 0, :], f[..., 1, :], f[..., 2, :]
     answer = np.empty_like(f)
     for row, first, second in ((0, b, c), (1, c, a), (2, a, b)):
@@ -90,7 +92,7 @@ def cofactors(f: np.ndarray) -> np.ndarray:
 
 
 def determinants(f: np.ndarray) -> np.ndarray:
-    """Return the determinants (...,) of matrices (..., 3, 3)."""
+    """Return the determinants (...) of matrices f (..., 3, 3)."""
     a, b, c = f[..., 0, :], f[..., 1, :], f[..., 2, :]
     minors = (b[..., (k + 1) % 3] * c[..., (k + 2) % 3] - b[..., (k + 2) % 3] * c[..., (k + 1) % 3] for k in range(3))
     return sum(a[..., k] * minor for k, minor in enumerate(minors))
@@ -150,7 +152,8 @@ class FiniteStrainSolid:
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 4)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation gradient F (n_cells, 27, 3, 3) and its determinant J (n_cells, 27)."""
+        """Return the deformation gradient F (n_cells, 27, 3, 3) at Gauss points and its determinant J (n_cells, 27),
+        under displacement (n, 3) m."""
         moved = displacement[self.mesh.cells].swapaxes(1, 2)
         f = (moved @ self._by_node).reshape(-1, 3, 27, 3).swapaxes(1, 2) + np.eye(3)
         return f, determinants(f)

@@ -21,11 +21,11 @@ class FluidCavity:
         self.faces, self.n_nodes = faces, n_nodes
 
     def volume(self, nodes: np.ndarray) -> float:
-        """Return the volume, m3, for node positions (n_nodes, 3) m."""
+        """Return the volume, m3, for positions ``nodes`` (n_nodes, 3) m."""
         return float((nodes.ravel() @ self.gradient(nodes)) / 3)
 
     def gradient(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the gradient dV / d(node) (3 n_nodes,), m2."""
+        """Return the gradient dV / d(node) (3 n_nodes,), m2, at positions ``nodes`` (n_nodes, 3) m."""
         corners = nodes[self.faces]
         parts = 3 * np.cross(corners[:, None], self._arms(corners)).sum(axis=2)
         gradient = np.zeros((self.n_nodes, 3))

@@ -142,7 +142,8 @@ _THIN_TOP = 0.12  # of the thickness: below a top cell of this size a fourth cel
 
 
 def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: float) -> np.ndarray:
-    """Places of node lines, an odd number, through all marks: evenly spaced in the footprint, growing beyond."""
+    """Return places of node lines along an axis, 0 rows or 1 columns, an odd number, through all marks: evenly spaced
+    in the footprint, growing beyond. widest : the largest cell, in lattice lines"""
     low, high = footprint.low[axis], footprint.high[axis]
     at = np.linspace(marks[0], marks[-1], 20 * (marks[-1] - marks[0]) + 1)
     beyond = np.maximum(np.maximum(low - at, at - high), 0)
@@ -177,7 +178,8 @@ def _bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.nda
 
 
 def _skin_points(sensor: str, layer: str, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Points (i, j, 3) m of a skin's grid at real-valued stations and columns, by cubics along both."""
+    """Return points (i, j, 3) m of a skin's layer, "outer" or "inner", at real-valued rows (i,), which are stations,
+    and columns (j,), by cubics along both."""
     skin = sensors.skin_of(sensor)
     angles = np.r_[skin.angles, np.pi]
     points = skin.skin_points(layer, np.interp(columns, np.arange(len(angles)), angles))

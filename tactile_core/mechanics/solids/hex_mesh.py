@@ -33,10 +33,9 @@ class HexMesh:
 
 
 def hex_cells(ids: np.ndarray) -> np.ndarray:
-    """Cells (n, 27) of 27-node hexahedra on a grid of node numbers (odd, odd, odd).
+    """Return the cells (n, 27) of 27-node hexahedra on a grid of node numbers ``ids`` (odd, odd, odd).
 
-    Repeated numbers collapse an edge or a face, as at the skin's poles.
-    """
+    Repeated numbers collapse an edge or a face, as at the skin's poles. Raises ValueError for an even size."""
     if any(size % 2 == 0 for size in ids.shape):
         raise ValueError(f"a grid of quadratic cells has odd sizes, got {ids.shape}")
     a, b, c = (slice(0, size - 2, 2) for size in ids.shape)
@@ -49,10 +48,9 @@ def _shift(part: slice, by: int) -> slice:
 
 
 def gel_solid(top: np.ndarray, back_y: float, layers: np.ndarray = GEL_LAYERS) -> HexMesh:
-    """The gel below a grid (rows, columns, 3) m of its surface, both odd, bonded at its flat back at ``back_y`` m.
+    """Return the gel below its surface ``top`` (rows, columns, 3) m, both odd, bonded at its flat back at ``back_y`` m.
 
-    layers : places of the nodes through the gel, 0 = back, 1 = surface, an odd number
-    """
+    layers : places of the nodes through the gel, 0 = back, 1 = surface, an odd number"""
     back = top.copy()
     back[..., 1] = back_y
     nodes = back[..., None, :] + layers[:, None] * (top - back)[..., None, :]
@@ -63,10 +61,9 @@ def gel_solid(top: np.ndarray, back_y: float, layers: np.ndarray = GEL_LAYERS) -
 
 
 def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: int = SKIN_LAYERS) -> HexMesh:
-    """The skin between two grids (stations, columns, 3) m, whose first and last stations are the poles.
+    """Return the skin between grids outer and inner (stations, columns, 3) m, whose first and last stations are poles.
 
-    glued : (stations, columns) bool, inner points that do not move; layers : nodes through the skin, odd
-    """
+    glued : (stations, columns) bool, inner points that do not move; layers : nodes through the skin, odd"""
     through = np.linspace(0, 1, layers)
     grid = inner[..., None, :] + through[:, None] * (outer - inner)[..., None, :]
     stations, columns = outer.shape[:2]

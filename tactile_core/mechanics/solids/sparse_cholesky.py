@@ -168,7 +168,7 @@ class DampedFactor:
             raise NotPositiveDefiniteError("the solid is unstable, damped or not")
 
         def solve(force: np.ndarray) -> np.ndarray:
-            """Return the displacements (n, 3) m of all nodes under forces (n, 3) N on those that are not held."""
+            """Return the displacements (n, 3) m of all nodes under force (n, 3) N on those that are not held."""
             moved = np.zeros(force.size)
             moved[free] = fast(np.where(held, 0.0, force).ravel()[free, None])[:, 0]
             return moved.reshape(-1, 3)
@@ -177,10 +177,10 @@ class DampedFactor:
 
 
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Return the curvature terms (k, 3, 3) N/m, limited to a share of their nodes' own stiffness (k, 3, 3).
+    """Return the curvature terms ``bending`` (k, 3, 3) N/m, limited to a share of their nodes' stiffness (k, 3, 3) N/m.
 
-    At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it costs iterations only.
-    """
+    At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it costs iterations
+    only."""
     size = np.abs(bending).max(axis=(1, 2))
     most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3
     return bending * np.minimum(1.0, most / np.maximum(size, 1e-30))[:, None, None]
