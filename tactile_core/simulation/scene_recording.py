@@ -21,7 +21,7 @@ from ..mechanics.solution import Sensor, Solution, Tier
 from ..mechanics.solve import solve
 from ..recordings import Truth, write_simulated
 from ..sensors import SOURCE, TARGET, descriptor
-from ..sensors.readout import Wiring, readings
+from ..sensors.readout import readings
 from .scene import RecordingSpec, Scene, load_scene
 
 PRESSURE_AT_REST = 1750.0  # Pa, initial pressure of the independent COMSOL model (docs/sources.md, BioTac fluid)
@@ -99,7 +99,9 @@ def simulate_recording(
     if "electrodes" in keep:
         pressure = _pressure(frames)
         change = np.stack([frame.change for frame in frames])
-        electrode_counts, pdc = readings(change, time, _wiring(spec), seed), pdc_counts(pressure)
+        drift = spec.drift_counts / (spec.points[-1].time_s - spec.points[0].time_s)
+        electrode_counts = readings(change, time, seed, noise=spec.noise_counts, drift=drift)
+        pdc = pdc_counts(pressure)
         still = np.full(len(time), _STILL_COUNT, np.int16)
         fluid = f" Fluid pressure {pressure.min() / 1e3:.2f} to {pressure.max() / 1e3:.2f} kPa; PDC counts "
         fluid += f"{sensors.PRESSURE_PER_COUNT:g} Pa each. Electrodes by the sheet law."
@@ -202,12 +204,6 @@ def _pressure(frames: list[_Frame]) -> np.ndarray:
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
     """Convert the fluid's pressure, Pa, to PDC (...,) int16 counts, 0..4095."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
-
-
-def _wiring(spec: RecordingSpec) -> Wiring:
-    """Return the scene's defects; its drift is the total from the first to the last frame, here counts/s."""
-    lasts = spec.points[-1].time_s - spec.points[0].time_s
-    return Wiring(noise=spec.noise_counts, drift=spec.drift_counts / lasts)
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
