@@ -72,7 +72,7 @@ LONG = 60.0  # s from which on a job is asked about
 
 
 def duration(seconds: float) -> str:
-    """Write a time in its most readable unit: 40 s, 12 min, 3.5 h."""
+    """Write seconds in their most readable unit: 40 s, 12 min, 3.5 h."""
     if seconds < 2 * LONG:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -64,7 +64,7 @@ def claim(folder: Path, room: str) -> None:
 
 
 def _stored(file: Path, values: np.ndarray) -> str:
-    """Write an array; returns the hash of its file's bytes."""
+    """Write an array, values of any shape; returns the hash of its file's bytes."""
     with atomic.new_file(file) as partial:
         with open(partial, "wb") as out:
             np.save(out, values)

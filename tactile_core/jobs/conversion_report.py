@@ -180,7 +180,7 @@ def _plain_matplotlib() -> Iterator[None]:
 
 
 def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
-    """Return warnings as lines that fit the sheet, no more than it has room for."""
+    """Return warnings as lines that fit the sheet, first one on low confidence (k,) of the frames shown."""
     lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
     if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
         lines.insert(0, "Low confidence in every frame shown: take this as a guess.")

@@ -47,7 +47,7 @@ class Drawer:
         return arrays if self.solve is None else self.solve(arrays)
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Draw the picture (H, W, 3) uint8 of heights (H, W) m and of the dots on a gel displaced by (M, 3) m."""
+        """Draw the picture (H, W, 3) uint8 of height (H, W) m and of the dots on a gel with displacement (M, 3) m."""
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
     def warm_up(self) -> None:

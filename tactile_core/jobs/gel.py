@@ -194,7 +194,8 @@ class Gel:
         return compliance_of(self.sensor)
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """Return ``_moved_to``'s contact or None; if it fails, that of an indenter that comes straight in."""
+        """Return ``_moved_to``'s contact or None; if it fails, that of an indenter that comes straight in.
+        force : N or None, as of ``press``; flags : words are added; began : as of ``_moved_to``"""
         path = self._press
         try:
             return self._moved_to(pose, force, flags, began=began)
@@ -247,7 +248,8 @@ class Gel:
     def _at_force(
         self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
     ) -> FastContact:
-        """Return the contact at a force or, if that is not reached, the nearest one found."""
+        """Return the contact at force, N, from first touch or, if that is not reached, the nearest one found.
+        limit : m, greatest depth; flags : words on a miss are added"""
         bears, above = float(self._contact.force[1]), None
         if bears > _LARGEST_DROP * force:
             above = press.at_force(float(np.sqrt(bears * force)), touch, touches=True)

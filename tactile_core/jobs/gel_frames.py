@@ -45,7 +45,7 @@ class Frames:
     heights: np.ndarray | None = None
 
     def iterate_rows(self, rows: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the displacement (M, 3) m or heights (H, W) m of each of some frames."""
+        """Yield the displacement (M, 3) m or heights (H, W) m of each of rows (n,), positions in ``numbers``."""
         if self.heights is not None:
             yield from self.heights[rows]
         elif self.displacement is not None:

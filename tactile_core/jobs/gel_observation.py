@@ -32,7 +32,8 @@ def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str,
 
 
 def observation_space(markers: np.ndarray, *, picture: bool = True) -> Any:
-    """Return the ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco]."""
+    """Return the ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco].
+    markers : (rows, columns) int, of ``marker_nodes``"""
     with needing("mujoco"):
         from gymnasium.spaces import Box, Dict
 

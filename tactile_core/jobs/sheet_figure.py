@@ -92,7 +92,7 @@ class SheetFigure:
             self.top += WARNING_LINE
 
     def electrodes(self, time: np.ndarray, electrodes: np.ndarray, frames: np.ndarray) -> None:
-        """Draw (T, 19) counts over (T,) s, and mark the frames (k,) of the columns."""
+        """Draw electrodes (T, 19), counts from rest, over time (T,) s, and mark frames (k,) of the columns."""
         import matplotlib
 
         self.top += NUMBERS
@@ -112,7 +112,7 @@ class SheetFigure:
         self.top += ELECTRODES + TIME_AXIS
 
     def explained(self, time: np.ndarray, explained: np.ndarray) -> None:
-        """Draw the share of the electrodes' change that the translation explains (T,) over (T,) s; below 0 as 0."""
+        """Draw explained (T,), the explained share of the electrodes' change, over time (T,) s; below 0 as 0."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, EXPLAINED)
         axes.plot(time, np.clip(explained, 0, 1), color="black", linewidth=0.8)
         axes.set(xlim=self._over_time, ylim=(0, 1), yticks=[0, 0.5, 1], xticklabels=[])
@@ -120,7 +120,7 @@ class SheetFigure:
         self.top += EXPLAINED + GAP
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray) -> None:
-        """Draw the fluid's pressure (T,) Pa over (T,) s, translated and, where known, measured."""
+        """Draw the fluid's pressure (T,) Pa over time (T,) s, translated and, where known, measured (T,) Pa."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
         if np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
@@ -132,7 +132,7 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write number and time (k,) s, or a snapshot's own number, above each column."""
+        """Write number and time, seconds (k,), or a snapshot's own number, above each column."""
         for k, at in enumerate(seconds):
             text = f"{k + 1}:  {self._heading.format(at)}"
             self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")
@@ -141,14 +141,15 @@ class SheetFigure:
     def skin_row(
         self, label: str, displacement: np.ndarray, largest: float, centers: np.ndarray | None, sensor: str
     ) -> None:
-        """Draw maps of (k, N, 3) m on the unrolled skin; largest : m where colours end; centers : (k, c, 2) m."""
+        """Draw maps of displacement (k, N, 3) m on the unrolled skin of a sensor, one a column; label : before the row
+        largest : m, where colours end; centers : (k, c, 2) = (x, z) m of contacts, or None"""
         plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
         self._surface_row(label, plan, faces, displacement, largest, UNROLLED_X, UNROLLED_Z, centers)
         self.top += GAP
 
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
-        """Draw maps of (k, M, 3) m on the gel, with the border of its picture; centers : (k, c, 2) m of contacts."""
+        """Draw maps of displacement (k, M, 3) m on the gel, with its picture's border; centers : as in `skin_row`"""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(
             label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
@@ -164,7 +165,8 @@ class SheetFigure:
         self.top += Z_AXIS
 
     def _on_sheet(self, place: np.ndarray, column: int, z: tuple[float, float]) -> np.ndarray:
-        """Convert places (x, z) m on a column's map to (..., 2) mm from a row's left edge, and along the finger."""
+        """Convert place (..., 2) = (x, z) m on a column's map to (..., 2) mm from a row's left edge, and along x.
+        z : m, range that a map shows"""
         pitch = (self.column_width + GAP) / self.column_width * (z[1] - z[0])
         from_left = self.camera.right_z * place[..., 1] - min(self.camera.right_z * np.array(z))
         return np.stack([1e3 * (column * pitch + from_left), 1e3 * place[..., 0]], axis=-1)
@@ -180,7 +182,9 @@ class SheetFigure:
         z: tuple[float, float],
         centers: np.ndarray | None,
     ) -> Axes:
-        """Draw a row of maps of |displacement| over the plan (n, 2) = (x, z) m; one set of axes takes half the time."""
+        """Draw a row of maps of |displacement| (k, n, 3), m, over the plan (n, 2) = (x, z) m; one set of axes is
+        faster.
+        faces : (f, 3) nodes of triangles; x, z : m, ranges shown; largest, centers : as in `skin_row`"""
         from matplotlib.tri import Triangulation
 
         axes, height = self._row(self._row_height(x, z)), self._row_height(x, z)
@@ -216,7 +220,7 @@ class SheetFigure:
         return axes
 
     def _frame(self, axes: Axes, corner: np.ndarray, opposite: np.ndarray) -> Rectangle:
-        """Draw border (4,) and background of one column between two corners (2,) of the axes; return the background."""
+        """Draw border and background of one column, corner to opposite corner (2,) of the axes; return the latter."""
         from matplotlib.patches import Rectangle
 
         width, height = opposite - corner
@@ -282,7 +286,7 @@ def scale(*displacements: np.ndarray | None) -> float:
 
 
 def _shown(place: np.ndarray, beside: float) -> tuple[float, float]:
-    """Return the range, m, that a row shows along one axis: all nodes' places (n,) m and a margin, to 0.1 mm."""
+    """Return the range, m, that a row shows along an axis: all nodes' place (n,) m and `beside` m, to 0.1 mm."""
     low, high = np.round(1e4 * np.array([place.min() - beside, place.max() + beside])) / 1e4
     return float(low), float(high)
 

@@ -80,7 +80,7 @@ def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str)
 
 
 def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray]:
-    """Remove values that hold for the networks' gel alone from frames solved on another."""
+    """Remove values that hold for the networks' gel alone from arrays of frames solved on another; see `solved`."""
     flags, (x, z) = arrays["flags"].copy(), arrays["contact_center"].T
     flags[sensors.shape_of(gel).outline_distance(x, z) <= 0] |= np.uint16(Flag.BEYOND_DIGIT)
     unknown = {name: np.full_like(arrays[name], np.nan) for name in ERRORS if name in arrays}
@@ -109,7 +109,7 @@ def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, 
 
 
 def describe_miss(total: np.ndarray, force: np.ndarray, solved: bool = False) -> str:
-    """Describe how far the magnitude of tractions that add up to (T, 3) N is from that of the networks' force (T, 3) N.
+    """Describe how far the magnitude of total (T, 3) N, sums of traction, is from that of the networks' force (T, 3) N.
     Directions are not compared: the force is that on the finger, whose pad is curved.
     solved : true if gels were solved under that force"""
     size, carried = accuracy.lengths(force), accuracy.lengths(total)

@@ -139,7 +139,7 @@ class Camera:
     def to_gel(
         self, row: np.ndarray, column: np.ndarray, height: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (x, z) m of the points at a height, m, that fractional pixels see: the inverse of ``to_pixel``."""
+        """Return (x, z) m of points at a height, m, that fractional pixels row, column see; inverts ``to_pixel``."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer

@@ -23,29 +23,28 @@ _RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19), not rounded, after impedances grew by factors (..., 19) from rest counts (19,)."""
+    """Return the counts (..., 19), not rounded, at impedances growth (..., 19) times those at counts rest (19,)."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
 def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return counts (..., 19) after the films' impedances alone grew by factors (..., 19) from rest counts (19,)."""
+    """Return the counts (..., 19) at impedances of the films alone growth (..., 19) times those at rest (19,)."""
     return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one at counts ``to`` (19,). A
-    unit at 3,500 counts responds to a contact with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5
-    times."""
+    """Convert change (..., 19) counts of a unit at counts rest (..., 19) to that of one at counts ``to`` (19,). A unit
+    at 3,500 counts responds to a contact with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5 times."""
     return _converted(change, rest, to)
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert changes of a unit that rests at counts ``of`` (19,) to those of one at ``rest`` (19,)."""
+    """Convert change (..., 19) counts of a unit at rest counts ``of`` (19,) to that of one at ``rest`` (19,)."""
     return _converted(change, of, rest)
 
 
 def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
-    """Convert changes of a unit at counts rest to one at counts to, with equal growth of the film's impedance."""
+    """Convert change of a unit at counts rest to that at counts to, with equal growth of the film's impedance."""
     rest, to = np.clip(rest, *_RESTS), np.clip(to, *_RESTS)
     return of_films(_film(rest + change) / _film(rest), to) - to
 
@@ -63,7 +62,7 @@ def film_impedance(counts: np.ndarray) -> np.ndarray:
 def of_typical_film(
     change: np.ndarray, rest: np.ndarray, thickness: float, conductivity: np.ndarray | float = 1.0
 ) -> np.ndarray:
-    """Convert changes (..., 19) counts of a unit at rest counts (..., 19) to those of one with typical films.
+    """Convert change (..., 19) counts of a unit at counts rest (..., 19) to that of one with typical films.
 
     thickness : of its films at rest, divided by a typical unit's; conductivity : its fluid's, divided by that at rest
     A movement u of the skin over a film h makes the impedance grow by g = h / (h - u); over a typical film of h /

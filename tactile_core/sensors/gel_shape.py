@@ -103,7 +103,8 @@ class GelShape:
         return np.full(np.shape(z), self.tip_x)
 
     def _corner_block(self, steps_x: np.ndarray, steps_z: np.ndarray) -> np.ndarray:
-        """Points (rows, columns, 2) from the window's tip corner (z > 0) to the arc, at fractions 0..1 each way."""
+        """Return points (rows, columns, 2) = (x, z) m from the window's tip corner (z > 0) to the arc.
+        steps_x, steps_z : (rows,), (columns,), fractions 0 to 1 of the way along either axis"""
         corner = np.array([self._lattice.window_x[0], self._lattice.window_z[1]])
         # where the row of the corner meets the arc, and where its column does
         angle_a = np.arctan2(self._half_width_at(corner[:1])[0], corner[0] - self.arc_x)
@@ -137,7 +138,8 @@ class GelShape:
         return np.concatenate([self._round_rim(x, z, toward), body], axis=0) if self._outline.tip == ROUND else body
 
     def _round_rim(self, x: np.ndarray, z: np.ndarray, toward: np.ndarray) -> np.ndarray:
-        """The rows of the lattice between the window and a round tip."""
+        """Return the rows (rim, columns, 2) = (x, z) m of the lattice between the window and a round tip.
+        x, z : m, of the window's rows and columns; toward : fractions 0 to 1 of the way from the window to the side"""
         rim = self._lattice.rim_tip
         steps = np.arange(1, rim + 1) / rim
         tip = np.empty((rim, len(z), 2))

@@ -87,7 +87,7 @@ class SkinShape:
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
-        """Nodes (stations, columns, 3) m of ``skin_grid`` at any angles (columns,) rad."""
+        """Return nodes (stations, columns, 3) m of ``skin_grid``'s layer at any angles theta (columns,) rad."""
         x, r = np.moveaxis(_around(self._meridians(layer), theta), 1, 0)
         x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
         r[[0, -1]] = 0
@@ -98,7 +98,7 @@ class SkinShape:
         return self._radius("core", x, theta)
 
     def thickness_below(self, point: np.ndarray, outward: np.ndarray) -> float:
-        """Distance, m, from a point (3,) m of the skin along its inward normal to the core, or to the axis."""
+        """Return the distance, m, from point (3,) m of the skin against its normal outward (3,) to core or axis."""
         distance = np.arange(0, _FARTHEST, _STEP)
         x, y, z = (point - distance[:, None] * outward).T
         radius = np.hypot(y - self.axis_y, z)
@@ -155,7 +155,7 @@ def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.ndarray) -> np.ndarray:
-    """Points (n, 2) at fractions of the arc length of the polyline (x, r) between x = low and x = high."""
+    """Return points (n, 2) at fractions (n,) of the arc length of the polyline (x, r) m between x = low and high."""
     keep = (x > low) & (x < high)
     ends = np.interp([low, high], x, r)
     line = np.column_stack([np.r_[low, x[keep], high], np.r_[ends[0], r[keep], ends[1]]])
@@ -170,7 +170,7 @@ def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def _columns(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The table's columns (4, n) next to angles (n,), and their weights (4, n)."""
+    """Return the table's columns (4, n) next to angles `at` (n,) rad, and their weights (4, n)."""
     position = (at + np.pi) / (2 * np.pi) * 72
     cell = np.floor(position + 1e-9).astype(int)
     return (cell + np.arange(-1, 3)[:, None]) % 72, catmull_rom(position - cell)

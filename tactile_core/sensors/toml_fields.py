@@ -50,7 +50,7 @@ def number(
     may_miss: bool = False,
     length: int | None = None,
 ) -> Any:
-    """Declare a number, or a list of numbers: its unit in the file, and its open interval in that unit.
+    """Declare a number, or a list of numbers: its unit in the file, and its open interval (above, below) in that unit.
     default : in Python; may_miss : true if a file may leave it out; length : of lists whose type has none"""
     meta = {"unit": unit, "above": above, "below": below, "may_miss": may_miss, "length": length}
     return dataclasses.field(default=default, metadata=meta)

@@ -14,7 +14,8 @@ _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, col
 
 
 def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit outward normals (n, 3) at nodes (n, 3): the area-weighted mean of the triangles around."""
+    """Return unit outward normals (n, 3) at nodes (n, 3) m: the area-weighted mean of the triangles around.
+    faces : (f, 3) nodes of each triangle, counter-clockwise from outside"""
     corners = nodes[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
     summed = [np.bincount(faces.ravel(), np.repeat(area[:, k], 3), minlength=len(nodes)) for k in range(3)]

@@ -153,6 +153,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if the contact, nodes (n,) bool of the source, extends beyond the part that unrolls onto the gel."""
+    """Return true if the contact, source nodes touched (n,) bool, extends beyond what unrolls onto the gel."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

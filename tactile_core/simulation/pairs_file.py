@@ -210,7 +210,7 @@ def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> N
 
 
 def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:
-    """SHA-256 over names, types, shapes, values and attributes."""
+    """Return the SHA-256 over names, types, shapes and values of arrays, their scales (m a unit), and attributes."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())

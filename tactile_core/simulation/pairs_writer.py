@@ -68,7 +68,7 @@ _READ = ("force", "place", "slide", "press", "indenter")
 
 
 def _histogram(values: np.ndarray, edges: tuple[float, ...]) -> dict[str, list]:
-    """Return counts between edges; the last includes what lies beyond."""
+    """Return counts of values (n,) between edges; the first and the last include what lies beyond."""
     counts, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
     return {"edges": list(edges), "counts": counts.tolist()}
 

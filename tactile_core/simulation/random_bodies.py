@@ -20,7 +20,7 @@ def random_body(random: np.random.Generator) -> Indenter:
 
 
 def _between(random: np.random.Generator, least: float, most: float) -> float:
-    """Draw a length, m, between two in mm."""
+    """Draw a length, m, between least and most, mm, evenly in its logarithm."""
     return float(np.exp(random.uniform(np.log(least), np.log(most)))) * _MM
 
 

@@ -163,7 +163,8 @@ def _solve(
     where: str, indenter: Indenter, place: Placement, force: float, friction: float, used: Collection[Sensor],
     tiers: Mapping[Sensor, Tier],
 ) -> dict[Sensor, Solution]:  # fmt: skip
-    """Return the contacts of a frame by sensor; none where nothing presses."""
+    """Return the contacts of a frame by sensor under force, N; none where nothing presses.
+    friction : coefficient; used : sensors to solve; where : of the frame, for messages"""
     found = {}
     for sensor in used if force > 0 else ():
         try:

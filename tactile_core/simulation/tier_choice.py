@@ -49,7 +49,7 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
 
 
 def _up_to(tier: str, sensor: str, share: float) -> float:
-    """Return the largest error, um, of all depths up to this one, which a press passes through."""
+    """Return the largest error, um, of all depths up to share (of the thickness), which a press passes through."""
     below = [each["depth_share_to"] for each in measured()["tiers"][tier][sensor]["bins"]]
     depths = [each for each in below if each < share] + [share]
     return 1e6 * max(expected_error(tier, sensor, depth)[0] for depth in depths)

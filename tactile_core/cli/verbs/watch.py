@@ -178,7 +178,7 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
 
 
 def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
-    """Return an output that draws a frame's pictures side by side."""
+    """Return an output that draws a frame's pictures side by side; draw : takes (H, W, 3) uint8, false once closed"""
     import numpy as np
 
     return lambda shown, seen: draw(np.concatenate(list(seen.values()), axis=1))

@@ -178,7 +178,7 @@ def _survives(recipe: Recipe, rows: list[Row] | None) -> Iterable[str]:
 
 
 def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touched: bool = False) -> float:
-    """Mean of a share over all frames, or over those touched."""
+    """Return the mean of a share, value(summary), over all frames, or over those touched."""
     weights = [one.recording.frames * (one.touched if touched else 1.0) for one in summaries]
     return float(np.average([value(one) for one in summaries], weights=weights)) if sum(weights) else 0.0
 

@@ -91,14 +91,14 @@ def _summary(one: Recorded, tasks: Sequence[str]) -> Summary:
 
 
 def _changes(values: np.ndarray, first: int) -> np.ndarray:
-    """Return the means of a recording's parts minus that of its first frames, concatenated."""
+    """Return the means (PARTS k,) of parts of a recording's values (T, k), each less that of its `first` frames."""
     parts = [part for part in np.array_split(values, PARTS) if len(part)]
     means = [parts[min(number, len(parts) - 1)].mean(axis=0) for number in range(PARTS)]
     return np.concatenate([mean - values[:first].mean(axis=0) for mean in means])
 
 
 def _squares(picture: np.ndarray) -> np.ndarray:
-    """Mean colours (SQUARES x 3,), 0 to 255, of a picture's squares."""
+    """Return the mean colours (SQUARES x 3,), 0 to 255, of the squares of picture (H, W, 3)."""
     down, across = (size // count for size, count in zip(picture.shape, SQUARES, strict=False))
     cut = picture[: down * SQUARES[0], : across * SQUARES[1]].astype(np.float32)
     return cut.reshape(SQUARES[0], down, SQUARES[1], across, 3).mean(axis=(1, 3)).ravel()

@@ -70,7 +70,7 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
 
 
 def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
-    """Name the group (count,) of each example, which is held out as a whole."""
+    """Name the group (count,) of each example, which is held out as a whole; apart : as of `rows`"""
     if apart in one.told:
         return one.told[apart]
     name = one.recording.name
@@ -79,7 +79,8 @@ def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
 
 
 def _right(values: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> float:
-    """Accuracy of a support vector machine, its width and penalty chosen within the training examples."""
+    """Return the accuracy of a support vector machine, its width and penalty chosen within the training examples.
+    values : (n, k) features; labels : (n,) to be told from them; groups : (n,) held out together"""
     from sklearn.model_selection import GridSearchCV, GroupKFold
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

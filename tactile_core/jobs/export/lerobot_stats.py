@@ -21,7 +21,7 @@ class EpisodeStats:
         self._pictures = 0
 
     def add(self, rows: dict[str, np.ndarray]) -> None:
-        """Add columns (n, ...) of numbers, pictures (n, H, W, 3) uint8, or words, which have no statistics."""
+        """Add rows, name -> column: numbers (n, ...), pictures (n, H, W, 3) uint8, or words (no statistics)."""
         for name, values in rows.items():
             if values.dtype.kind in "fiu" and values.ndim < 4:
                 self._numbers[name].append(values.reshape(len(values), -1))
@@ -39,7 +39,7 @@ class EpisodeStats:
 
 
 def _of_numbers(values: np.ndarray) -> dict[str, np.ndarray]:
-    """Statistics of (n, k) numbers."""
+    """Return the statistics (k,) of values (n, k), by LeRobot's names."""
     quantiles = np.quantile(values, list(QUANTILES.values()), axis=0)
     return {
         "min": values.min(axis=0), "max": values.max(axis=0), "mean": values.mean(axis=0, dtype=np.float64),
@@ -49,7 +49,7 @@ def _of_numbers(values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
-    """Statistics of channels given as histograms `counts` (3, LEVELS) of pixels."""
+    """Return the statistics of channels given as histograms `counts` (3, LEVELS) of pixels; pictures : their number"""
     levels, shares = np.linspace(0, 1, LEVELS), counts / counts.sum(axis=1, keepdims=True)
     mean = shares @ levels
     below = np.cumsum(counts, axis=1) / counts.sum(axis=1, keepdims=True)

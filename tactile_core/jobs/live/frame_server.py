@@ -48,7 +48,7 @@ class FrameServer:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> None:
-        """Publish a frame; never waits for a reader."""
+        """Publish a frame and its arrays by name, as ``message`` writes them; never waits for a reader."""
         content = message(shown, arrays)
         with self._news:
             self._message, self._sent = b"\x02" + len(content).to_bytes(8, "big") + content, self._sent + 1

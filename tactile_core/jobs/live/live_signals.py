@@ -123,7 +123,8 @@ class LiveSignals:
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return signals of frames (T, 19) and PDC (T,) counts, or NaN. Raises ValueError before rest is known."""
+        """Return signals of frames electrodes (T, 19), pdc (T,), as in the file or NaN. ValueError before rest is
+        known."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)

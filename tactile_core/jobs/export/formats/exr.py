@@ -32,7 +32,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _channels(block: dict[str, np.ndarray], row: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Name and (H, W) values of each channel of a frame."""
+    """Yield name and (H, W) values of each channel of frame `row` in block, arrays height_map, image by name."""
     if "height_map" in block:
         yield "height", block["height_map"][row]
     if "image" in block:
