@@ -118,7 +118,7 @@ def full_tier() -> dict[str, dict[str, float]]:
 
 
 def contact_ms(sensor: Sensor, friction: float) -> float:
-    """Mean CPU time of a contact of the full tier at FORCES, ms."""
+    """Return the mean CPU time of a contact of the full tier at FORCES, ms. friction : Coulomb's coefficient"""
     began = time.process_time()
     for force in FORCES:
         solve(sensor, Sphere(3.5e-3), Placement(-8e-3, 0.0, 0.0), force=force, tier="full", friction=friction)

@@ -156,7 +156,8 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
 def converge(
     unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model."""
+    """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model.
+    heights : (H, W) m of each field; levels : converts radiance (H, W, LED) to grey levels"""
     rest = of_unit(rest_height_map(unit.camera), unit)
     light = MatteLight(unit, truth, variant, rest, seed)
     resting, seen = light.direct(rest)
@@ -175,7 +176,7 @@ def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> f
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
-    """Measure how far the two variants' pictures of heights (H, W) m differ."""
+    """Yield rows of how far the two variants' pictures of height (H, W) m differ."""
     for name in ("standard", "quality"):
         one, other = (Renderer(unit, name, variant) for variant in (LLVM, SCALAR))
         difference = one.in_levels(one.radiance(height) - other.radiance(height))
@@ -198,7 +199,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
-    """Return the least CPU time, ms, of ``repeats`` drawings of heights (H, W) m: other programs only lengthen it."""
+    """Return the least CPU time, ms, of ``repeats`` drawings of height (H, W) m: other programs only lengthen it."""
     spent = []
     for _ in range(repeats):
         start = time.process_time()

@@ -56,7 +56,7 @@ class Choice(NamedTuple):
     ridge: float
 
     def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
-        """Return the kernel (n, m) of scaled features (n, j), (m, j) with friction ``rubs`` (n,), (m,)."""
+        """Return the kernel (n, m) of scaled features a (n, j), b (m, j) with friction a_rubs (n,), b_rubs (m,)."""
         return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
@@ -104,7 +104,8 @@ def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
 
 
 def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
-    """Errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest."""
+    """Return errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest.
+    kind : true for those with friction; parts : the features that are used, their slice or numbers"""
     error, rubbing = np.zeros_like(goals), rubs(known.x)
     for f in np.unique(known.fold):
         rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)
@@ -115,6 +116,6 @@ def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.
 
 
 def _size(error: np.ndarray) -> float:
-    """Return the sum of median and mean of each row's root mean square, of errors (m, k)."""
+    """Return the sum of median and mean of each row's root mean square, of an error (m, k)."""
     size = np.sqrt((error**2).mean(axis=1))
     return float(np.median(size) + size.mean())

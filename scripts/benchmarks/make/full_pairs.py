@@ -69,7 +69,8 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
 
 
 def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
-    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier."""
+    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier. friction
+    : Coulomb's coefficient"""
     for _ in range(_TRIES):
         try:
             force = solve(SOURCE, indenter, place, depth=depth, friction=friction).axial_force
@@ -121,7 +122,8 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
 
 
 def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:
-    """Slide and both contacts of each step; raises TactileError where the next one is not found on one sensor."""
+    """Yield slide and both contacts of each step; raises TactileError where the next one is not found on one sensor.
+    steps : pairs of depth m and slide (2,) m; friction : Coulomb's coefficient"""
     on_biotac, trouble = _on_biotac(press, steps, friction)
     if on_biotac:
         slides = [slide for _, slide in steps[: len(on_biotac)]]
@@ -137,7 +139,8 @@ def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: fl
 def _on_biotac(
     press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
 ) -> tuple[list[Solution], TactileError | None]:
-    """Return the contacts found, and the error that ended them or None. A slide keeps its depth under the surface."""
+    """Return the contacts found, and the error that ended them or None; for steps and friction see ``_pairs``. A slide
+    keeps its depth under the surface."""
     pose, surface, found = pose_at(SOURCE, press.indenter, press.place), sensors.biotac_surface(), []
     drops = [surface_drop(surface, press.indenter, pose, pose.slid(*slide)) for _, slide in steps]
     asked = [Step(max(depth + drop, 0.0), slide=tuple(to)) for (depth, to), drop in zip(steps, drops, strict=True)]

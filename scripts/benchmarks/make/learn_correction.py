@@ -85,7 +85,7 @@ def paired(
     sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
 ) -> Iterator[Sample]:
     """Solve press ``number`` in the fast tier at the depths of ``full_press``'s contacts, ``full``; yield a sample of
-    each contact that both tiers hold."""
+    each contact that both tiers hold. friction : Coulomb's coefficient"""
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None
@@ -170,7 +170,8 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """Return ``Learned.trust``: the share of predictions for held-out presses that leaves the least squares."""
+    """Return ``Learned.trust``: the share of predictions for held-out presses that leaves the least squares.
+    which : (n,) bool, samples that count; log_guess : (n,), guess : (n, g, 3), predictions of log_ratio and fields"""
     rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -MOST, MOST)
     for _, _, here in _bins(depth):
         pairs = (log_guess[which][here], log_ratio[here]), (guess[which][here], known.fields[which][here])
@@ -180,7 +181,8 @@ def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.nda
 
 
 def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:
-    """RMS and largest shape error m, relative force error; each after the correction, then before."""
+    """Return rms and largest shape error m, relative force error; each after the correction, then before.
+    factor : of force, field : (g, 3) of shape, the sample's correction"""
     truth = sample.full.astype(float)
     counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
     after = correction.add_field(sensor, sample.fast, sample.frame, field, sample.depth) - truth
@@ -200,7 +202,8 @@ def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
 
 
 def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -> Iterator[Row]:
-    """Median errors with the correction, beside those without it, in bins of depth."""
+    """Yield median errors with the correction, beside those without it, in bins of depth (n,). errors : (n, 6) of
+    ``_errors``; friction : Coulomb's coefficient, all contacts'"""
     measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
     for low, high, here in _bins(depth):
         for what, after, before, scale, unit in measures:

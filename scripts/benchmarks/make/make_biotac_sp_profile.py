@@ -55,7 +55,9 @@ def table(name: str = "biotac_sp") -> str:
 
 
 def _radius(x: np.ndarray, theta: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """Radius (stations, angles) mm about the centre of two half ellipsoids, the pad's and the back's; nan beyond."""
+    """Return the radius (stations, angles) mm about the centre of two half ellipsoids; nan beyond.
+    x : (stations,) mm; theta : (angles,) rad from the pad; front, back : (3,) mm, semi-axes of its half and the
+        other"""
     height = np.where(np.abs(theta) <= np.pi / 2, front[2], back[2])
     across = 1 / np.hypot(np.sin(theta) / front[1], np.cos(theta) / height)
     inside = 1 - (x / front[0]) ** 2
@@ -63,7 +65,9 @@ def _radius(x: np.ndarray, theta: np.ndarray, front: np.ndarray, back: np.ndarra
 
 
 def _shifted(x: np.ndarray, theta: np.ndarray, axes: np.ndarray, centre: float) -> np.ndarray:
-    """Distance (stations, angles) mm along rays from the skin's centre to an ellipsoid ``-centre`` mm above it."""
+    """Return the distance (stations, angles) mm along rays from the skin's centre to an ellipsoid ``-centre`` mm
+    higher.
+    x, theta : as in ``_radius``; axes : (3,) mm, its semi-axes"""
     inside = 1 - (x / axes[0]) ** 2
     a = (np.sin(theta) / axes[1]) ** 2 + (np.cos(theta) / axes[2]) ** 2
     b = -centre * np.cos(theta) / axes[2] ** 2  # the ray goes down by cos(theta) from the height ``centre``

@@ -70,7 +70,8 @@ def write(path: Path, solid: compliance.Solid, even: Half, odd: Half, step: floa
 
 
 def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
-    """Order the unknowns: touched nodes, sensing points, feet and swell (which have no clusters), the other nodes."""
+    """Order the unknowns: touched nodes, sensing points, feet and swell (which have no clusters), the other nodes. step
+    : of an entry's rounding, m/N"""
     rows, columns = solid.lattice.shape
     number = np.arange(len(solid.lattice.rest))
     places = np.column_stack(np.divmod(number, columns)).astype(float)
@@ -102,7 +103,7 @@ def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
 
 
 def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """Cluster points at (n, 2) m; also return the order (n,) in which the largest clusters' details come first."""
+    """Cluster points at places (n, 2) m; also return the order (n,) with the largest clusters' details first."""
     clusters: list[tuple[np.ndarray, np.ndarray]] = []
     level = np.zeros(len(places), int)
     linear = np.column_stack([np.ones(len(places)), places])

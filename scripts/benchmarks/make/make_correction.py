@@ -30,12 +30,12 @@ SENSORS = "digit", "biotac"
 
 
 def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
-    """Path of a press's contacts in the full tier."""
+    """Return the path of the file of press ``number``'s contacts in the full tier. friction : Coulomb's coefficient"""
     return folder / f"{sensor}_{seed}_{number:05d}_friction_{friction:g}.npz"
 
 
 def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
-    """Solve one press in the full tier, unless its file is there; returns a line to print."""
+    """Solve one press in the full tier, unless its file is there; returns a line to print. job : as for ``file_of``"""
     _, sensor, seed, number, friction = job
     path = file_of(*job)
     if path.exists():

@@ -64,7 +64,7 @@ def main() -> int:
 
 
 def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Join the arrays (40, ...) of S sequences to arrays (S, 40, ...), by name."""
+    """Join arrays (40, ...) by name, one row for each of S sequences, to arrays (S, 40, ...)."""
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 
@@ -95,7 +95,8 @@ SENSORS = ("biotac", "digit")
 
 
 def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) -> list[Contact]:  # noqa: ANN001
-    """Solve a roll on both sensors: the indenter leans from -LEAN / 2 to LEAN / 2 and moves by ROLLED ``ahead``."""
+    """Solve a roll on both sensors: the indenter leans from -LEAN / 2 to LEAN / 2 and moves by ROLLED ``ahead``.
+    forces : (F,) N; moved : (F,), share of the way, 0 to 1; ahead : (2,), unit vector x, z; friction : coefficient"""
     contacts = []
     for force, share in zip(forces.tolist(), (moved - 0.5).tolist(), strict=True):
         x, z = np.array([place.x, place.z]) + share * ROLLED * ahead

@@ -105,12 +105,14 @@ class AxisymmetricSolid:
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 3)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deformation gradient F (n_cells, 9, 3, 3) and its determinant J (n_cells, 9)."""
+        """Return the deformation gradient F (n_cells, 9, 3, 3), its determinant J (n_cells, 9) by displacement (n, 3)
+        m."""
         f, change = self._deformation(displacement)
         return f, 1 + change
 
     def _deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """F and the volume change J - 1, summed from F - 1: a large bulk modulus would show the rounding of J."""
+        """Return F and J - 1, as ``deformation`` of a displacement, the volume change summed from F - 1: a large bulk
+        modulus would show the rounding of J."""
         h = np.einsum("eqci,ei->eqc", self.strain, displacement.ravel()[self.dofs], optimize=True)
         rr, ra, ar, aa, hoop = np.moveaxis(h, -1, 0)
         plane = rr + aa + rr * aa - ra * ar

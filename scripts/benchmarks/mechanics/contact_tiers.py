@@ -87,10 +87,10 @@ def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution
 
 
 def by_depth(misses: Iterable[Miss], edges: Sequence[float]) -> list[Bin]:
-    """Median and 95 % of the errors in bins of depth over thickness with these upper ends; bins without are left out.
+    """Return median and 95 % of the errors in bins of depth over thickness with upper ends edges; empty ones are left
+    out.
 
-    shape_um, force : rms um and relative, the median; shape_95_um, force_95 : 95 of 100 contacts have less
-    """
+    shape_um, force : rms um and relative, the median; shape_95_um, force_95 : 95 of 100 contacts have less"""
     misses, found = list(misses), []
     for low, high in itertools.pairwise((0.0, *edges)):
         here = [each for each in misses if low < each.share <= high]
@@ -126,7 +126,7 @@ class Truth:
 
 
 def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], seed: int) -> None:
-    """Write contacts by sensor, each with number, share, displacement (n, 3) m, force N and seconds, to one file."""
+    """Write contacts found, by sensor, each with number, share, displacement (n, 3) m, force N, seconds, to a file."""
     arrays = {"seed": np.int64(seed)}
     for sensor, contacts in found.items():
         for name in ("number", "share", "force", "seconds"):

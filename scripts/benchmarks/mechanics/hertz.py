@@ -23,13 +23,14 @@ _NODES = 50  # along the contact radius
 
 
 def force(depth: float, ball: float, youngs: float, poisson: float) -> float:
-    """Force, N, on a rigid ball of radius ``ball`` m, ``depth`` m in a half space; youngs : Pa. Johnson, Contact
-    Mechanics, 1985, eq. 4.23."""
+    """Return the force, N, on a rigid ball of radius ``ball`` m, ``depth`` m in a half space of moduli youngs, Pa, and
+    poisson. Johnson, Contact Mechanics, 1985, eq. 4.23."""
     return 4 / 3 * youngs / (1 - poisson**2) * np.sqrt(ball) * depth**1.5
 
 
 def solve(poisson: float, slope: float) -> tuple[FiniteStrainContact, ContactState, float]:
-    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m."""
+    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m. poisson :
+    Poisson's ratio of the block"""
     radius = slope * BALL
     block = _BLOCK * radius
     mesh = disc_mesh(block, block, 1.3 * radius, radius / _NODES, radius, growth=1.2)

@@ -28,13 +28,14 @@ def deformed(points: np.ndarray) -> np.ndarray:
 
 
 def gradient(points: np.ndarray) -> np.ndarray:
-    """Deformation gradient (..., 3, 3) of ``deformed``, exact."""
+    """Return the deformation gradient (..., 3, 3) of ``deformed`` at points (..., 3), exact."""
     columns = [deformed(points + 1j * _COMPLEX_STEP * axis).imag / _COMPLEX_STEP for axis in np.eye(3)]
     return np.stack(columns, -1)
 
 
 def errors(cells: int, poisson: float) -> tuple[float, float]:
-    """Root mean square error of displacement (side 1) and deformation gradient on ``cells`` cells a side."""
+    """Return the rms errors of displacement (side 1) and gradient on ``cells`` cells a side. poisson : the
+    material's"""
     planes = np.linspace(0, 1, 2 * cells + 1)
     mesh = block(planes, planes[::-1], planes)
     solid = FiniteStrainSolid(mesh, Material(1.0, poisson))

@@ -129,23 +129,25 @@ class _Other:
                     self.mass[4 * cell + k, 4 * cell + m] = (weight * shape * self.linear[m]).sum() / bulk
 
     def solve(self, values: np.ndarray) -> np.ndarray:
-        """Pressures (4 n_cells,) of a volume excess."""
+        """Return the pressures (4 n_cells,) of volume excesses ``values`` (4 n_cells,), or of columns of them."""
         return np.linalg.solve(self.mass, values)
 
 
 def _determinant(f: np.ndarray) -> np.ndarray:
-    """Determinant of (3, 3, ...), by cofactors of the first row; complex steps go through it."""
+    """Return the determinants (...) of f (3, 3, ...), by cofactors of the first row; complex steps go through it."""
     minors = [f[1, (k + 1) % 3] * f[2, (k + 2) % 3] - f[1, (k + 2) % 3] * f[2, (k + 1) % 3] for k in range(3)]
     return sum(f[0, k] * minors[k] for k in range(3))
 
 
 def _density(f: np.ndarray, shear: float) -> np.ndarray:
-    """Isochoric neo-Hookean energy density (docs/sources.md, Mechanics)."""
+    """Return the isochoric neo-Hookean energy density (...) of F f (3, 3, ...), shear Pa (docs/sources.md,
+    Mechanics)."""
     return shear / 2 * (_determinant(f) ** (-2 / 3) * (f * f).sum((0, 1)) - 3)
 
 
 def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
-    """First Piola-Kirchhoff stress written out, for complex F."""
+    """Return the first Piola-Kirchhoff stress (3, 3, ...) of complex f (3, 3, ...). p : (...) Pa, of a cell; shear :
+    Pa"""
     j = _determinant(f)
     inverse = np.moveaxis(np.linalg.inv(np.moveaxis(f, (0, 1), (-2, -1))), (-1, -2), (0, 1))
     return shear * j ** (-2 / 3) * (f - (f * f).sum((0, 1)) / 3 * inverse) + p * j * inverse

@@ -38,7 +38,7 @@ def thickness_of(sensor: Sensor) -> float:
 
 
 def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Row]:
-    """Errors and times."""
+    """Yield errors and times of a sensor's contacts at depths, m. friction : Coulomb's coefficient"""
     list(_timed(sensor, "fast", depths[:1], friction))  # the matrices are read, the code is compiled
     solved = {tier: list(_timed(sensor, tier, depths, friction)) for tier in TIERS}
     rubbed = f"_friction_{friction:g}" if friction else ""
@@ -56,14 +56,16 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
 
 
 def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> Iterator[tuple[Solution, float]]:
-    """Solve each depth on its own, from rest: a mesh is made for its contact."""
+    """Yield contact and seconds of each of the depths, m, on its own, from rest: a mesh is made for it. friction :
+    Coulomb's coefficient"""
     for depth in depths:
         began = time.process_time()
         yield next(solve_path(sensor, _BALL, _PLACE, [Step(depth)], tier, friction)), time.process_time() - began
 
 
 def gel_normals(displacement: np.ndarray) -> np.ndarray:
-    """Unit normals (201, 153, 3) of the deformed gel where the camera looks, by the lattice's cubic splines."""
+    """Return unit normals (201, 153, 3) of a gel under displacement (n, 3) m where the camera looks, by cubic
+    splines."""
     surface = digit_surface()
     grid = surface.grid(surface.rest + displacement)[surface.window]
     splines = [EvenSpline(0.0, 1.0, size) for size in grid.shape[:2]]

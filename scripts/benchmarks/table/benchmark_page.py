@@ -98,7 +98,7 @@ def label(method: Method) -> str:
 
 
 def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """The (time, error) that no other point beats in both, by growing time."""
+    """Return those of the points (time, error) that no other beats in both, by growing time."""
     front: list[tuple[float, float]] = []
     for point in sorted(points):
         if not front or point[1] < front[-1][1]:

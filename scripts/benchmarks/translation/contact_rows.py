@@ -150,7 +150,7 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
 
 
 def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return gels (B, M, 3) m of the contacts that translated ones, ``gel``, show, solved under forces (B, 3) N."""
+    """Return gels (B, M, 3) m of the contacts that translated ones, ``gel``, show, solved under force (B, 3) N."""
     arrays = {
         "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
         "force": force, "flags": np.zeros(len(gel), np.uint16),
@@ -159,7 +159,7 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
-    """Return errors of gels (B, M, 3) m and forces (B,) N on a part of the pairs; ``name`` begins their names."""
+    """Return errors of gel (B, M, 3) m and force (B,) N on a part of the pairs; ``name`` begins their names."""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {
@@ -171,7 +171,8 @@ def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: s
 
 
 def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Error (C,) of gels (C, M, 3) m, divided by that of no displacement, rms over nodes above a tenth of the peak."""
+    """Return the error (C,) of gels ``gel`` from true ones, both (C, M, 3) m, divided by that of no displacement, rms
+    over nodes above a tenth of the peak."""
     size = accuracy.lengths(true)
     felt = size > FELT * size.max(1, keepdims=True)
     left, all_of_it = ((np.square(each) * felt).sum(1) for each in (accuracy.lengths(gel - true), size))

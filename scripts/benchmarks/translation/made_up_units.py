@@ -71,7 +71,7 @@ class Unit:
         return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
 
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
-        """Return the press of an indenter on this finger; its forces leave the unit's stiffness out."""
+        """Return the press of an indenter on this finger, friction given; its forces leave the unit's stiffness out."""
         pose = pose_at(SOURCE, indenter, place)
         limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
         return CorrectedPress(self.skin, indenter, pose, limit, friction)
@@ -88,7 +88,8 @@ class Unit:
         return self._counts(found / typical.resistances(typical.film))
 
     def _counts(self, resistance: np.ndarray) -> np.ndarray:
-        """Counts (..., 19) for the film's resistances (..., 19) over a typical unit's at rest, but for the fluid."""
+        """Return counts (..., 19) for a film's resistance (..., 19) over a typical unit's at rest, but for the
+        fluid."""
         film = divider.film_impedance(REST_COUNTS)
         series = COUNT_MAX / REST_COUNTS - 1 - film
         return COUNT_MAX / (1 + series + film * resistance / self.conductivity)

@@ -122,14 +122,14 @@ def _table(path: Path, columns: int) -> np.ndarray:
 
 
 def replace_glitches(electrodes: np.ndarray) -> np.ndarray:
-    """Interpolate the samples of (T, 19) counts that are further than 30 counts from their median of 11."""
+    """Interpolate the samples of electrodes (T, 19) counts that are further than 30 counts from their median of 11."""
     padded = np.pad(electrodes, ((HALF_MEDIAN, HALF_MEDIAN), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_MEDIAN + 1, axis=0)
     return fill(electrodes, np.abs(electrodes - np.median(windows, axis=-1)) > GLITCH)
 
 
 def lowpass(values: np.ndarray) -> np.ndarray:
-    """Keep what lies below 5 Hz of (T, ...) at 100 Hz, without delay."""
+    """Keep what lies below 5 Hz of values (T, ...) at 100 Hz, without delay."""
     from scipy.signal import butter, filtfilt
 
     return filtfilt(*butter(4, CUT / (SAMPLE_RATE / 2)), values, axis=0)
@@ -167,7 +167,7 @@ def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def without_pose(values: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Subtract from (T,) the cubic in the arm's place (T,) that fits it best."""
+    """Subtract from values (T,) the cubic in the arm's place (T,) that fits them best."""
     powers = np.vander((arm - arm.mean()) / (arm.std() + 1e-12), DEGREE + 1)
     return values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
 
@@ -180,5 +180,5 @@ def silence(strength: np.ndarray, lost: np.ndarray) -> float:
 
 
 def spread(centre: np.ndarray, touching: np.ndarray) -> np.ndarray:
-    """Standard deviation (2,) of places (T, 2) while surely in contact; NaN where that is too short."""
+    """Return the standard deviation (2,) of centre (T, 2) while touching (T,) bool; NaN where that is too short."""
     return centre[touching].std(axis=0) if touching.sum() > CENTRE_FRAMES else np.full(2, np.nan)

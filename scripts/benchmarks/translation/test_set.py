@@ -105,13 +105,14 @@ def expected_error_rows(
 
 
 def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
-    """A row with a target from below, from above, or both."""
+    """Return a row of value with the target low or more, high or less, or both, None for no bound; set_name : its
+    data"""
     found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
     return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
 
 
 def as_read(change: np.ndarray, seed: int) -> np.ndarray:
-    """Return true changes (C, 19) counts with seeded noise and gains, as a sensor reads them."""
+    """Return the true change (C, 19) counts with noise and gains drawn by a seed, as a sensor reads it."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
     return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

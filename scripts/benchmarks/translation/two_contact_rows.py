@@ -107,7 +107,7 @@ def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> l
 
 
 def _errors(found: Translation, true: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
-    """Errors (C,) of translated gels against true ones (C, M, 3) m, and of forces against true ones (C,) N."""
+    """Return errors (C,) of translated gels against true (C, M, 3) m, and of both forces' sum against force (C,) N."""
     size, moved = lengths(true), lengths(found.displacement_digit)
     deep, deepest = (each > HALF * each.max(1, keepdims=True) for each in (moved, size))
     both = lengths(found.force) + lengths(found.second_force)

@@ -56,7 +56,7 @@ class ComplianceRows:
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return near nodes' displacements (n, 3) m; forces as in ``Rows.moved``."""
+        """Return the near nodes' displacements (n, 3) m; for nodes, force, inner, inner_force see ``Rows.moved``."""
         moved = self._under(nodes, force)
         if len(inner):
             moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
