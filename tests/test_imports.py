@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 import os
 import subprocess
@@ -61,10 +62,16 @@ def test_every_module_but_training_imports_with_all_heavy_libraries_out_of_reach
     assert third_party(names) == {"numpy"}
 
 
+@functools.cache
+def nodes(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of a file's syntax tree, its module first; parsed once for all tests."""
+    return tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def imported(path: Path) -> set[str]:
     """Top-level packages that a file imports anywhere in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             found |= {name.name.partition(".")[0] for name in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -123,7 +130,7 @@ def room_of(path: Path) -> str:
 def rooms_imported(path: Path, package: str = PACKAGE.name) -> set[str]:
     """Rooms of tactile_core, or of another package, that a file imports from, anywhere in it, its own left out."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in nodes(path):
         if isinstance(node, ast.ImportFrom):
             above = path.relative_to(ROOT).parts[: -node.level] if node.level else ()
             names = [*above, *(node.module or "").split(".")] if node.module else [*above]
@@ -143,7 +150,7 @@ def names_in(module: Path) -> set[str]:
     """What can be imported from a module, without its suffix, or a package: its modules, and names that stand in it."""
     file = module.with_suffix(".py") if module.with_suffix(".py").is_file() else module / "__init__.py"
     found = {path.stem for path in module.glob("*")}
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else ():
+    for node in nodes(file) if file.is_file() else ():
         if isinstance(node, ast.Name):
             found.add(node.id)
         elif isinstance(node, ast.alias | ast.FunctionDef | ast.ClassDef):
@@ -155,7 +162,7 @@ def missing(path: Path) -> list[str]:
     """Modules and names of the project that a file imports, anywhere in it, and that are not there."""
     return [
         f"{path.relative_to(ROOT)}:{node.lineno} imports {alias.name}"
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes(path)
         if isinstance(node, ast.ImportFrom) and node.level
         for alias in node.names
         if alias.name not in names_in(path.parents[node.level - 1].joinpath(*(node.module or "").split(".")))
@@ -196,7 +203,7 @@ def members_imported(folder: Path) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {name: set() for name in names}
     for path in folder.rglob("*.py"):
         own = path.relative_to(folder).with_suffix("").parts[0]
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if own in names else ():
+        for node in nodes(path) if own in names else ():
             if isinstance(node, ast.ImportFrom) and node.level:
                 base = path.parents[node.level - 1]
                 ends = [node.module.replace(".", "/")] if node.module else [alias.name for alias in node.names]
@@ -222,7 +229,7 @@ def test_no_room_looks_up_to_the_public_face():
     offenders = [
         f"{path.relative_to(ROOT)} imports {alias.name} from the face"
         for path in sources("tactile_core")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes(path)
         if isinstance(node, ast.ImportFrom) and node.module is None
         and path.relative_to(ROOT).parts[: -node.level] == (PACKAGE.name,)
         for alias in node.names
@@ -272,7 +279,7 @@ def test_no_function_bears_a_name_that_says_nothing():
     found = [
         f"{path.relative_to(ROOT)}:{node.name}"
         for path in sources("tactile_core", "addon", "scripts")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in nodes(path)
         if isinstance(node, ast.FunctionDef) and node.name.lstrip("_") in banned
     ]
     assert found == []
@@ -294,7 +301,7 @@ def test_all_that_is_public_has_a_docstring():
     found = [
         name
         for path in sources("tactile_core", "addon", "scenes")
-        for name in undocumented(ast.parse(path.read_text(encoding="utf-8")), f"{path.relative_to(ROOT)}:")
+        for name in undocumented(nodes(path)[0], f"{path.relative_to(ROOT)}:")
     ]
     assert found == []
 
