@@ -89,7 +89,7 @@ class Store:
         return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Read an array as `array` does; return None where the file does not hold it."""
+        """Read an array of a shape as `array` does; return None where the file does not hold it."""
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:
@@ -133,7 +133,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
 
 @contextmanager
 def damage_reported(where: str, what: str) -> Iterator[None]:
-    """Turn any error of a file library into a TactileError."""
+    """Turn any error of a file library into a TactileError on `what`, a word for the file, damaged at `where`."""
     try:
         yield
     except (TactileError, MemoryError):

@@ -50,13 +50,13 @@ class BadRows(TactileError):
 
 
 def sensor_with(count: int) -> str:
-    """Return the name of the sensor that has this number of electrodes; empty for none."""
+    """Return the name of the sensor that has `count` electrodes; empty for none."""
     fluid = ((each, found) for each in known_sensors() if isinstance(found := describe(each), Fluid))
     return next((name for name, found in fluid if found.electrodes.count == count), "")
 
 
 def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -> None:
-    """Raise TactileError unless the sensor has this number of electrodes; source : where it was counted, in words."""
+    """Raise TactileError unless the sensor has `count` electrodes; source : where they were counted, in words."""
     wanted = electrode_count(sensor)
     if count == wanted:
         return
@@ -173,7 +173,8 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
-    """Write sentences that name row and field of the first few problems, and the number of the others."""
+    """Write sentences that name row and field of the first few problems, and the number of the others.
+    row_word : "line" or "frame", what a row is called"""
     sentences = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")

@@ -118,7 +118,8 @@ def _noisy(electrodes: np.ndarray) -> bool:
 def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats; return them, flags and a report."""
+    """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats (of kind "raw"); return them, flags
+    and a report."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
@@ -200,7 +201,8 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of raw readings (T, 19) counts at an end of the 12-bit range; adds findings to warnings."""
+    """Return flags (T,) of readings (T, 19), of kind "raw", at an end of the 12-bit range; adds findings to
+    warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)

@@ -96,7 +96,7 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
 
 
 def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """Return the polarity of a sensor's raw readings, from its descriptor; for other kinds it is assumed."""
+    """Return the polarity of a sensor's raw readings, by its descriptor; for a kind other than "raw" it is assumed."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
     return Polarity(reading, raw) if kind == "raw" else Polarity(reading, f"as {raw}", Basis.ASSUMED)

@@ -81,7 +81,7 @@ class Preparer:
         return False
 
     def _decided_once(self, signals: Signals, *, first: bool) -> Signals:
-        """Return a part's signals under the polarity decided for the whole recording, which is reported once."""
+        """Return a part's signals under the polarity of the whole recording, which the first part reports."""
         report, warnings = signals.report, signals.warnings
         if self._polarity_found:
             report = report | {"polarity_evidence": self._polarity_found}

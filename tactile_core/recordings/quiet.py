@@ -225,7 +225,7 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
 
 
 def tare_frames(asked: slice | str, count: int) -> slice:
-    """Convert tare frames, a slice or "A:B", to a slice without step; TactileError unless within `count` frames."""
+    """Convert asked tare frames, a slice or "A:B", to a slice without step; TactileError unless within `count`."""
     if isinstance(asked, slice):
         tare = asked
     else:

@@ -74,7 +74,8 @@ def read(
 
 
 def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Recording:
-    """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header."""
+    """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header.
+    lean : see `read`"""
     with opened(path) as (container, where, finger, file):
         if columns is not None:
             refuse_bag(path, container)
@@ -137,7 +138,7 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
 
 
 def sensor_of_first(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> str:
-    """Return the sensor of the first readable recording; the BioTac where none is, as `read` then refuses them."""
+    """Return the sensor of the first readable one of paths; the BioTac where none is, as `read` then refuses them."""
     for path in paths:
         with suppress(TactileError):
             return sensor_of(path, columns)
@@ -185,7 +186,7 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> list[str]:
-    """List the recordings of each file as `each_finger` does; unreadable files are listed too, for `read` to refuse."""
+    """List the recordings of each of paths as `each_finger` does; unreadable files, too, for `read` to refuse."""
     found = []
     for path in paths:
         try:
@@ -214,7 +215,8 @@ def names(store: Store) -> set[str]:
 def table_reader(
     path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
 ) -> Callable[[Table], Recording]:
-    """Return the reader of a CSV file's table, by map or header. Raises TactileError for another sensor's file."""
+    """Return the reader of a CSV file's table, by map or header; finger : its number in a hand's table, None for the
+    first. Raises TactileError for another sensor's file."""
     if columns is not None:
         reader = partial(read_mapped, columns=columns)
     else:
@@ -228,7 +230,8 @@ def table_reader(
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """Return the layout that knows most of the file's columns or arrays. Raises TactileError if none does."""
+    """Return the layout that knows most of keys, the file's columns or arrays. Raises TactileError if none does.
+    container : kind of file: csv, json, hdf5, npz or mat"""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0], default=(0.0, formats))
     if best < RECOGNISED:

@@ -153,6 +153,6 @@ class Signals:
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Convert change (n, 19) counts of a unit at counts rest (19,) to a typical unit's; kinds other than "raw" stay."""
+    """Convert change (n, 19) counts of a unit at counts rest (19,) to a typical unit's, if its kind is "raw"."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

@@ -49,7 +49,8 @@ def write_simulated(
     start_time: float = 0.0,
 ) -> Path:
     """Write the file whole or not at all, and return its path; None is left out. Shapes and units: see the module.
-    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
+    made_by, note : texts, the program and what a reader must know. Raises TactileError: shapes that do not belong
+    together, counts outside 12 bits, displacements beyond +-16 mm."""
     path = Path(path)
     frames = len(time)
     _check_shape(path, "time", time, (frames,))

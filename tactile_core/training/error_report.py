@@ -148,7 +148,7 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
 
 
 def write_log(path: Path, history: list[list]) -> None:
-    """Write the losses of every epoch as CSV."""
+    """Write the losses of every epoch as CSV; history : rows (stage, epoch, train, validation)"""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["stage", "epoch", "train", "validation"])

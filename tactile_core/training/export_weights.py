@@ -83,7 +83,7 @@ def _rest_entry(contacts: Contacts) -> dict[str, list[float]]:
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
-    """Return the tensors of one network under the names of `networks.py`, in float16; scales and turns in float32."""
+    """Return the tensors of network `net` under the names of `networks.py`, in float16; scales and turns in float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
     if net == "SVB" or net in POSTERIORS:
         return state

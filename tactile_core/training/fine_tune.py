@@ -191,7 +191,7 @@ def _train(
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:
-        """Compute the errors of place and force, and the change of the shape, over some frames."""
+        """Compute the errors of place and force, and the change of the shape, over frames rows (B,)."""
         state = module.contact(latent[rows])
         found = module.given(latent[rows], state)
         miss = (state[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()

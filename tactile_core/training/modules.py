@@ -75,28 +75,29 @@ class ContactPosterior(nn.Module):
         self.components = components
 
     def mixture(self, latent: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Map latent_signal (B, K) to the logarithm of the weights (B, C), means and spreads (B, C, STATE)."""
+        """Map the signal's latent (B, K) to the logarithm of the weights (B, C), means and spreads (B, C, STATE)."""
         raw = self.posterior(latent)
         weight, rest = raw[:, : self.components], raw[:, self.components :].view(len(raw), 2, self.components, STATE)
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Return minus the log density (B,), nats, of the mixture at the true state (B, STATE), but for a constant."""
+        """Return -log density (B,), nats, of the mixture of latent (B, K) at the true state (B, STATE), but a
+        constant."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
         return -(weight + density).logsumexp(-1)
 
     def given(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Map latent_signal (B, K) and a state (B, STATE) to latent_biotac (B, L)."""
+        """Map the signal's latent (B, K) and a state (B, STATE) to latent_biotac (B, L)."""
         return self.code(torch.cat([latent, state], -1))
 
     def forward(self, latent: Tensor) -> Tensor:
-        """Map latent_signal (B, K) to latent_biotac (B, L) of the most plausible contact."""
+        """Map the signal's latent (B, K) to latent_biotac (B, L) of the most plausible contact."""
         return self.given(latent, self.contact(latent))
 
     def contact(self, latent: Tensor) -> Tensor:
-        """Map latent_signal (B, K) to the state (B, STATE) of the most plausible contact: see `Posterior.likely`."""
+        """Map the signal's latent (B, K) to the state (B, STATE) of the likeliest contact: see `Posterior.likely`."""
         weight, mean, spread = self.mixture(latent)
         state = mean[torch.arange(len(mean)), weight.argmax(-1)]
         place, spread = mean[..., :PLACE], spread[..., :PLACE]
@@ -147,11 +148,11 @@ class MeshVae(Vae):
         self.surface, self.modes = surface, modes
 
     def mean(self, x: Tensor) -> Tensor:
-        """Map the encoder's input (B, K + 4) to the latent (B, L)."""
+        """Map the encoder's input x (B, K + 4) to the latent (B, L)."""
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Sample like `Vae.sample`, a latent (B, L) and the KL divergence, without noise on the place."""
+        """Sample a latent (B, L) of x (B, K + 4), and the KL divergence, like `Vae.sample`; no noise on the place."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
@@ -188,7 +189,7 @@ def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
 
 
 def compress(signal: Tensor) -> Tensor:
-    """Convert changes in counts and whether they are rectified, (B, 20), to SVB's input; see `layers.compress`."""
+    """Convert signal (B, 20), changes in counts and 1 where rectified, to SVB's input; see `layers.compress`."""
     return torch.cat([torch.asinh(signal[:, :-1] / COUNT_SCALE), signal[:, -1:]], -1)
 
 

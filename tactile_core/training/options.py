@@ -105,7 +105,7 @@ class Options:
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))
 
     def decay(self, net: str) -> float:
-        """Return the weight decay of a network."""
+        """Return the weight decay of the network `net`."""
         return self.rectified_decay if net.startswith("R2MPN") else self.weight_decay
 
     def settings(self) -> dict[str, object]:

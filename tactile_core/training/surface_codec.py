@@ -134,8 +134,7 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Round places (B, 2) to cells (B, 2) and remainders (B, 2), which carry the gradients; see
-        `ContactFrame.cells`."""
+        """Round place (B, 2) to cells (B, 2) and remainders (B, 2), which carry gradients: `ContactFrame.cells`."""
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))

@@ -123,10 +123,10 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 
 @contextmanager
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
-    """Make the folder, for one training at a time; after an error a new folder that is empty is removed.
+    """Make the folder `out`, for one training at a time; after an error a new folder that is empty is removed.
 
-    Raises TactileError if it cannot be made, is being written, or already holds weights. (Weights beside a checkpoint
-    are of a training that was killed after it wrote them, and can be continued.)"""
+    Raises TactileError if it cannot be made, is being written, or already holds weights, but to overwrite them.
+    (Weights beside a checkpoint are of a training that was killed after it wrote them, and can be continued.)"""
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
         (out / "weights").mkdir(parents=True, exist_ok=True)
@@ -180,7 +180,7 @@ def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress
 def run_stage(
     stage: Stage, model: Model, contacts: Contacts, seed: int, state: checkpoint.State, path: Path, progress: Progress
 ) -> None:
-    """Train the networks of one stage for its epochs."""
+    """Train the networks of one stage for its epochs, from state on, which is saved to path now and then."""
     options = contacts.options
     groups = [
         {"params": list(model.get_submodule(net).parameters()), "weight_decay": options.decay(net)}

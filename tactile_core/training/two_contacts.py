@@ -66,13 +66,13 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the layer sizes of the network, from ``network_input`` to half the difference of both parts' signals and
-    the logit of there being two."""
+    """Return the layer sizes of the network, from ``network_input`` of so many electrodes to half the difference of
+    both parts' signals and the logit of there being two."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 
 def network_input(change: Tensor) -> Tensor:
-    """Convert changes (B, e) counts to the network's input (B, 2e): their arcsinh on a coarse and on a fine scale."""
+    """Convert change (B, e) counts to the network's input (B, 2e): its arcsinh on a coarse and on a fine scale."""
     return torch.cat([torch.asinh(change / COUNT_SCALE), torch.asinh(FINE * change / COUNT_SCALE)], -1)
 
 
@@ -88,7 +88,7 @@ def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -
 
 
 def _apart(parts: tuple[Tensor, Tensor], true: tuple[Tensor, Tensor]) -> Tensor:
-    """Squared error (B,) of both parts on the finer scale, mean over electrodes."""
+    """Return the squared error (B,) of both parts (B, e) from the true ones, fine scale, mean over electrodes."""
     fine = [torch.asinh(FINE * each / COUNT_SCALE) for each in (*parts, *true)]
     return ((fine[0] - fine[2]).square() + (fine[1] - fine[3]).square()).mean(-1)
 

@@ -96,7 +96,7 @@ def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
-    """Fit the unit of a set of single-finger recordings, or one unit for each finger of a hand; also returns warnings.
+    """Fit the unit of single-finger recordings (paths), or one for each finger of a hand; also returns warnings.
     untouched : recording of the unit's rest, for a single unit of a sensor whose typical rest is known
     Raises TactileError like `adapt`, and for a mixture of hands and single fingers."""
     columns = None if options is None else options.columns
@@ -121,7 +121,7 @@ def adapt_hand(
 
 
 def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | None) -> UnitRest:
-    """Read a unit's rest. Raises TactileError for several units, and for a sensor without a typical rest."""
+    """Read a unit's rest from a recording untouched. TactileError for several units, or without a typical rest."""
     if units > 1:
         raise TactileError("--rest", f"given for {units} units", "one", "Adapt to each finger by itself: FILE#0")
     if typical_rest(sensor) is None:
@@ -135,7 +135,7 @@ def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | No
 
 
 def _units(every: Sequence[str]) -> dict[str, list[str]]:
-    """Group recordings by the section of their unit. Raises TactileError for a mixture of hands and single fingers."""
+    """Group every recording's path by its unit's section. TactileError for hands and single fingers together."""
     units: dict[str, list[str]] = {}
     for one in every:
         chosen = split(one)

@@ -63,7 +63,7 @@ SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in (*NETS, PARTS)}
 
 
 def card_entry(card: dict, net: str, path: Path) -> dict:
-    """Return the card's entry for one network: its sha256 and sizes."""
+    """Return the card's entry for the network `net`: its sha256 and sizes. Raises TactileError, which names path."""
     nets = card.get("nets")
     entry: Any = nets.get(net) if isinstance(nets, dict) else None
     sizes: Any = entry.get("sizes") if isinstance(entry, dict) else None
@@ -80,7 +80,8 @@ def card_entry(card: dict, net: str, path: Path) -> dict:
 
 
 def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = ELECTRODES) -> None:
-    """Raise TactileError unless networks fit together: a latent's size is the same in all networks that share it."""
+    """Raise TactileError unless networks fit together: a latent's size is the same in all networks that share it.
+    sizes : network -> name -> number, of the card; electrodes : how many are read"""
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),

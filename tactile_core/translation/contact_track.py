@@ -102,7 +102,7 @@ def needed(frames: np.ndarray, count: int) -> np.ndarray:
 
 
 def _span(block: int, count: int) -> tuple[int, int]:
-    """Return the first frame of a block with its margins, and the one past its last."""
+    """Return the first frame of a block (its number) with its margins, and the one past its last, of `count` frames."""
     return max(block * BLOCK - MARGIN, 0), min((block + 1) * BLOCK + MARGIN, count)
 
 

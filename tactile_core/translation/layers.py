@@ -97,7 +97,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Return the tensor shapes of `residual`."""
+    """Return the tensor shapes of `residual`: from inputs through `blocks` blocks of a width to outputs."""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

@@ -128,7 +128,7 @@ def _counts(values: object) -> bool:
 
 
 def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.PathLike) -> None:
-    """Check that the tensors fill the data without overlap or hole."""
+    """Check that rising spans (begin, end, name) of tensors fill `body` bytes without overlap or hole."""
     position = 0
     for begin, end, name in spans:
         if begin != position:

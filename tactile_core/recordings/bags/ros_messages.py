@@ -75,7 +75,8 @@ class Definition:
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
-    """Return the possible definitions of a type: the bag's own, or those of `KNOWN`; unreadable ones are left out."""
+    """Return the possible definitions of a type, kind: the bag's own text, in IDL if idl, or those of `KNOWN` where it
+    is empty; unreadable ones are left out."""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
     if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):
@@ -148,7 +149,7 @@ class _Cursor:
             raise ValueError("more entries than bytes")
 
     def numbers(self, kind: str, count: int) -> np.ndarray:
-        """Return the next numbers (count,)."""
+        """Return the next numbers (count,); kind : numpy's type without byte order"""
         dtype = np.dtype(self._order + kind)
         if count == 0:
             return np.empty(0, dtype)
@@ -159,7 +160,7 @@ class _Cursor:
         return found
 
     def text(self, kind: str) -> str:
-        """Skip the next text, which is not needed."""
+        """Read the next text, of kind "string" or "wstring"."""
         length = int(self.numbers("u4", 1)[0]) * (2 if kind == "wstring" else 1)
         self.place += length
         if self.place > len(self.data):

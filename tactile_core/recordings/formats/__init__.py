@@ -78,17 +78,18 @@ HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": 
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
-    """Return the largest share of one finger's columns in a file. style : of a column's name, by finger and number"""
+    """Return the largest share of a finger's columns in keys, a file's. style : of a column, by finger and number"""
     return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
 
 
 def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
-    """Return the numbers of the fingers of which a file has columns; style : see ``share_of_fingers``"""
+    """Return the numbers of the fingers of which keys, a file's, hold columns; style : see ``share_of_fingers``"""
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``."""
+    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``.
+    style : see ``share_of_fingers``; snapshots : see ``assemble``"""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

@@ -38,7 +38,7 @@ def canonical(names: Sequence[str]) -> list[str]:
 
 
 def score(keys: Collection[str]) -> float:
-    """Return the share of time and electrodes among the columns, in any spelling."""
+    """Return the share of time and electrodes among keys, the columns' names, in any spelling."""
     return share(canonical(list(keys)), ["time", *ELECTRODE_NAMES])
 
 

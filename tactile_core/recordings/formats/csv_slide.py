@@ -17,7 +17,7 @@ ELECTRODE_NAMES = [f"ele{i}" for i in range(1, ELECTRODES + 1)]
 
 
 def score(keys: Collection[str]) -> float:
-    """Return the share of the time and the electrodes among the columns."""
+    """Return the share of the time and the electrodes among keys, the columns' names."""
     return share(keys, ["timestamp", *ELECTRODE_NAMES])
 
 

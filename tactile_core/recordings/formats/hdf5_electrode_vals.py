@@ -19,7 +19,7 @@ NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indente
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where the electrodes' array is present, else 0."""
+    """Return 1 where the electrodes' array is among keys, the arrays' names, else 0."""
     return float(ELECTRODES_NAME in keys)
 
 

@@ -19,12 +19,12 @@ _ELECTRODES = re.compile(r"F([0-4])Electrodes")
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where a finger's electrodes are present, else 0."""
+    """Return 1 where a finger's electrodes are among keys, the arrays' names, else 0."""
     return float(bool(fingers(keys)))
 
 
 def fingers(keys: Collection[str]) -> tuple[int, ...]:
-    """Return the numbers of the fingers that a file holds, ascending."""
+    """Return the numbers of the fingers that a file holds, ascending; keys : its arrays' names"""
     return tuple(sorted(int(found[1]) for key in keys if (found := _ELECTRODES.fullmatch(key))))
 
 

@@ -15,7 +15,7 @@ NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where the electrodes' array is present, else 0."""
+    """Return 1 where the electrodes' array is among keys, the arrays' names, else 0."""
     return float("electrodes" in keys)
 
 

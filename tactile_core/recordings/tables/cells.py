@@ -39,7 +39,8 @@ def number(cell: str) -> float | None:
 
 
 def seconds(cell: str) -> float:
-    """Parse a time, with its day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight, or raise ValueError."""
+    """Parse a cell with a time, and its day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight, or
+    ValueError."""
     found = CLOCK.fullmatch(cell.strip())
     if found is None:
         raise ValueError(cell)
@@ -57,7 +58,7 @@ class Words:
         self._numbers: dict[str, int] = {}
 
     def number(self, cell: str) -> float:
-        """Return the index of a text."""
+        """Return the index of a cell's text, a new one where it is new; beyond `MOST_WORDS` that of `MORE`."""
         word = cell.strip().translate(OUTSIDE)
         if word not in self._numbers and len(self._numbers) >= MOST_WORDS:
             word = MORE
@@ -95,13 +96,13 @@ class Cells:
         self.plain = all(reader is _plain_number for reader in self._readers)
 
     def values(self, cells: Sequence[str]) -> list[float]:
-        """Read a row. Raises ValueError where a number or time cannot be read."""
+        """Read the cells of a row as numbers. Raises ValueError where a number or time cannot be read."""
         if self.plain:
             return [float(cell) for cell in cells]
         return [reader(cell) for reader, cell in zip(self._readers, cells, strict=True)]
 
     def value(self, place: int, cell: str) -> float | None:
-        """Read the cell of a column; None for what is neither finite nor of the column's kind."""
+        """Read the cell of column number `place`; None for what is neither finite nor of the column's kind."""
         try:
             found = self._readers[place](cell)
         except ValueError:

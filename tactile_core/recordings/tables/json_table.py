@@ -89,7 +89,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _of_object(path: str, whole: dict[str, Any]) -> Table:
-    """Make a table of the file's single object: of its list of records, or of its lists of numbers."""
+    """Make a table of `whole`, the file's single object: of its list of records, or of its lists of numbers."""
     lists = dict(_lists("", whole))
     constants = {name: str(value) for name, value in _flat("", {k: v for k, v in whole.items() if _plain(v)})}
     records = next((each for each in lists.values() if all(isinstance(one, dict) for one in each)), None)

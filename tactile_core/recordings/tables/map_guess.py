@@ -116,7 +116,7 @@ def _nearest(names: Iterable[str], like: str) -> str:
 
 
 def _alike(name: str, other: str) -> int:
-    """Count the characters with which both names begin."""
+    """Count the characters with which name and other both begin."""
     pairs = zip(name, other, strict=False)
     return next((place for place, (one, two) in enumerate(pairs) if one != two), min(len(name), len(other)))
 

@@ -33,7 +33,7 @@ def refuse_several(table: Table, columns: ColumnMap) -> None:
     keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
 
     def different(places: list[int]) -> int:
-        """Count the distinct combinations of values in these columns in the first rows."""
+        """Count the distinct combinations of values in the columns at places in the first rows."""
         rows = np.column_stack([table.exact.get(place, table.values[:, place])[:LOOKED_AT] for place in places])
         return len(np.unique(rows, axis=0))
 

@@ -37,7 +37,7 @@ def read_by_map(
 
 @contextmanager
 def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
-    """Open the arrays of an HDF5, NPZ or MATLAB file."""
+    """Open the arrays of a file whose container is hdf5, npz or mat."""
     opened = {"hdf5": lambda: open_hdf5(path), "npz": lambda: open_npz(path, file)}
     with opened.get(container, lambda: open_matlab(path, file))() as store:
         yield store

@@ -16,7 +16,7 @@ MAX_BLANK = 8  # blank lines that a message names
 
 
 def is_row(line: str, header: Header) -> bool:
-    """Return false for blank lines, comments, and the header again, as of a log that was continued."""
+    """Return false for a line that is blank, a comment, or the header again, as of a log that was continued."""
     return line != header.line and bool(line.strip(" \t")) and not line.lstrip().startswith(COMMENTS)
 
 
@@ -35,7 +35,7 @@ def clean(rows: list[str], header: Header) -> np.ndarray | None:
 
 
 def row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]) -> list[float]:
-    """Parse the row's values; its errors are added to problems."""
+    """Parse a line to the row's values, for frame number `frame`; errors are added to problems, under line_number."""
     width = len(header.names)
     cells = split(line, header.separator)
     if len(cells) > width and not "".join(cells[width:]).strip():

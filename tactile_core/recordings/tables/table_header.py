@@ -55,7 +55,7 @@ class Header:
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Split a line into cells; decimal commas become points, but where commas separate."""
+    """Split a line into cells at the separator; decimal commas become points, but where commas separate."""
     cells = line.split() if separator == SPACE else line.split(separator)
     if separator == "," or not ("," in line or INSIDE[ord(",")] in line):
         return cells
@@ -63,7 +63,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
-    """Return the index of the first line that is no comment or title, and of the last comment before it, or None."""
+    """Return the index of the first of lines that is no comment or title, and of the last comment before, or None."""
     filled = [place for place, line in enumerate(lines) if line.strip()]
     first = next((place for place in filled if not lines[place].lstrip().startswith(COMMENTS)), None)
     if first is None:
@@ -80,7 +80,7 @@ def _width(line: str) -> int:
 
 
 def _separator(line: str) -> str:
-    """Return the separator of cells; commas, at most one a cell, are those of decimals beside semicolons or tabs."""
+    """Return the separator of a line's cells; commas, at most one a cell, are decimals beside semicolons or tabs."""
     commas = line.count(",")
     return next((mark for mark in ";\t" if mark in line and commas <= line.count(mark) + 1), "," if commas else SPACE)
 
@@ -93,7 +93,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _is_data(cells: Sequence[str]) -> bool:
-    """Return true for a row of numbers, unless they count from 0 or 1, as pandas names columns."""
+    """Return true for cells of numbers, unless they count from 0 or 1, as pandas names columns."""
     values = [value for cell in cells if (value := number(cell)) is not None]
     counts = len(values) > 1 and values[0] in (0, 1) and values == [values[0] + step for step in range(len(values))]
     return len(values) > len([cell for cell in cells if cell]) // 2 and not (counts and len(values) >= MANY)
