@@ -44,7 +44,7 @@ def fcurves_of(owner: bpy.types.ID) -> Any:
 def write_curve(
     owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0, lines: int = LINEAR
 ) -> None:
-    """Replace one F-curve by straight lines, or by steps, through ``values`` (T,) at ``frames`` (T,)."""
+    """Replace one F-curve, by data path and index, by straight lines, or steps, through values (T,) at frames (T,)."""
     curves = fcurves_of(owner)
     old = curves.find(path, index=index)
     if old is not None:
@@ -58,7 +58,7 @@ def write_curve(
 
 
 def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, lines: int = LINEAR) -> None:
-    """Write one F-curve a column of ``values`` (T, k) at ``frames`` (T,)."""
+    """Write one F-curve a column of ``values`` (T, k) at ``frames`` (T,); owner, path, lines as in ``write_curve``."""
     for index in range(values.shape[1]):
         write_curve(owner, path, frames, values[:, index], index, lines)
 

@@ -38,8 +38,8 @@ def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) 
 
 
 def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
-    """Give each node of the skin the change (T, e), counts, of the electrode nearest to it, as an attribute. frames :
-    (T,), evenly spaced, of the scene"""
+    """Give each node of the skin the change (T, e), counts, of the electrode nearest to it, as an attribute.
+    frames : (T,), evenly spaced, of the scene"""
     rest, places = properties.surface_of(skin).rest, sensors.electrodes(properties.sensor_name(skin))
     # An electrode shows where the skin is nearest to it.
     over = rest[np.linalg.norm(rest[:, None] - places, axis=-1).argmin(0)]

@@ -149,7 +149,7 @@ def _touched(nodes: NodeGroup, _largest: bpy.types.NodeSocket, _moved: bpy.types
 
 
 def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """0 where the reading falls by the largest change, 1 where it rises by it."""
+    """Return 0 where the reading falls by the largest change, 1 where it rises by it; _moved is unused."""
     share = nodes.math("DIVIDE", nodes.attribute(frame_attribute.COUNTS), largest)
     return nodes.math("MULTIPLY_ADD", share, 0.5, 0.5)
 

@@ -207,7 +207,7 @@ def _with_progress(
 
 
 def _in_memory(pair: tuple[str, str], parts: Iterator[Translation]) -> tuple[Translation, Motion, Motion]:
-    """Join a translation; returns the movements of skin and gel too."""
+    """Join a translation; returns the movements of skin and gel too. pair : names of the two sensors"""
     whole = Translation.joined(list(parts))
     skin, gel = (mesh_cache.in_memory(getattr(whole, name), sensor) for name, sensor in zip(_MOVED, pair, strict=True))
     return whole, skin, gel

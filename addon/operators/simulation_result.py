@@ -57,7 +57,7 @@ def read(folder: Path) -> Result:
 
 
 def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:
-    """Bake onto the scene's frames; returns a sentence for the user."""
+    """Bake a result, with the indenter ``thing``, onto the scene's frames; returns a sentence for the user."""
     scene = context.scene
     frames = np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
     rate = scene.render.fps / scene.render.fps_base

@@ -195,14 +195,14 @@ def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> N
 
 
 def colour_by(context: bpy.types.Context, kind: str) -> None:
-    """Colour Solid views by object, or by the surfaces' own colours where they have some ("VERTEX")."""
+    """Colour Solid views by object ("OBJECT"), or by the surfaces' own colours where they have some ("VERTEX")."""
     for area in context.window.screen.areas if context.window else ():
         if area.type == "VIEW_3D":
             area.spaces.active.shading.color_type = kind
 
 
 def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> None:
-    """Play a recording of ``rate`` Hz in its own time."""
+    """Play a recording of ``rate`` Hz in its own time, from the scene's frame ``first`` to ``last``."""
     scene.render.fps = max(1, round(rate))
     scene.render.fps_base = scene.render.fps / rate
     scene.frame_start, scene.frame_end = first, last

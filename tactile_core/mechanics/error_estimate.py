@@ -39,7 +39,7 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Enlarge a depth's errors (shape m, force relative) for an indenter of least radius of curvature ``radius`` m.
+    """Enlarge a depth's errors ``table`` (shape m, force relative) for an indenter of least radius of curvature m.
     nodes : number that touch; where none does the errors are ``depth`` m and 1"""
     if not nodes:
         return _of_nothing(depth)
@@ -48,11 +48,11 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 
 
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
-    """Enlarge a depth's errors, full or reference tier, where few nodes touch or the indenter cuts in between them.
+    """Enlarge ``table``, a depth's errors in full or reference tier, where few nodes touch or a body cuts in between
+    them.
 
     nodes : number that touch; across : nodes across the contact, at the full tier's spacing
-    hidden : m, the indenter's penetration between nodes
-    """
+    hidden : m, the indenter's penetration between nodes"""
     if not nodes:
         return _of_nothing(depth)
     coarser = max(_ACROSS / max(across, 1e-3), 1.0) ** 2

@@ -143,7 +143,8 @@ def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, map
 
 @Loop
 def _lambert_loop(right, down, height, slope_right, slope_down, inverse, position, strength):  # noqa: ANN001, ANN202
-    """Compute the fields of ``Lit`` as ``lambert`` does; right : (W,), down : (H,), position : (L, 3)."""
+    """Compute the fields of ``Lit`` as ``lambert`` does, from the fields of ``Surface``, right (W,) and down (H,), and
+    the LEDs' position l (L, 3) m and strength |l|^2 (L,) m2."""
     rows, columns = height.shape
     one, zero, two = np.float32(1), np.float32(0), np.float32(-2)
     near, tilt = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)

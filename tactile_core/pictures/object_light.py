@@ -22,6 +22,6 @@ def contact_share(risen: np.ndarray) -> np.ndarray:
 
 
 def object_light(unit: Calibration, risen: np.ndarray) -> np.ndarray:
-    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by (H, W) m."""
+    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by ``risen`` (H, W) m."""
     levels = (unit.through * unit.facing).astype(np.float32)
     return levels[:, None, None] * contact_share(risen)

@@ -91,15 +91,15 @@ def measured() -> dict[str, Any]:
 
 
 def cheapest(error: float, variant: str) -> str:
-    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``. Raises
-    TactileError where none is."""
+    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``, drawn
+    by a variant of Mitsuba's. Raises TactileError where none is."""
     table = measured()["presets"]
     rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name
 
 
 def describe_choice(name: str, error: float) -> str:
-    """Describe why a preset was chosen for a largest error, grey levels."""
+    """Describe why the preset ``name`` was chosen for a largest error, grey levels."""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 

@@ -66,7 +66,8 @@ class Choice(NamedTuple):
 
 
 def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> Learned:
-    """Fit a correction to samples and their mirror images, by kernel ridge regression with the three ``choices``."""
+    """Fit a correction to known samples and their mirror images, by kernel ridge regression with the three of
+    ``choices``: for_force by all features, by_few, for_fields."""
     x = np.concatenate([known.x, known.x * MIRRORED])
     fields = np.concatenate([known.fields, mirrored(known.fields)])
     log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)

@@ -69,8 +69,8 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
 
 
 def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
-    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier. friction
-    : Coulomb's coefficient"""
+    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier.
+    friction : Coulomb's coefficient"""
     for _ in range(_TRIES):
         try:
             force = solve(SOURCE, indenter, place, depth=depth, friction=friction).axial_force

@@ -64,7 +64,7 @@ def main() -> int:
 
 
 def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Join arrays (40, ...) by name, one row for each of S sequences, to arrays (S, 40, ...)."""
+    """Join the arrays (40, ...) by name of rows, one for each of S sequences, to arrays (S, 40, ...)."""
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -29,8 +29,8 @@ def force(depth: float, ball: float, youngs: float, poisson: float) -> float:
 
 
 def solve(poisson: float, slope: float) -> tuple[FiniteStrainContact, ContactState, float]:
-    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m. poisson :
-    Poisson's ratio of the block"""
+    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m.
+    poisson : Poisson's ratio of the block"""
     radius = slope * BALL
     block = _BLOCK * radius
     mesh = disc_mesh(block, block, 1.3 * radius, radius / _NODES, radius, growth=1.2)

@@ -146,8 +146,8 @@ def _density(f: np.ndarray, shear: float) -> np.ndarray:
 
 
 def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
-    """Return the first Piola-Kirchhoff stress (3, 3, ...) of complex f (3, 3, ...). p : (...) Pa, of a cell; shear :
-    Pa"""
+    """Return the first Piola-Kirchhoff stress (3, 3, ...) of complex f (3, 3, ...).
+    p : (...) Pa, of a cell; shear : Pa"""
     j = _determinant(f)
     inverse = np.moveaxis(np.linalg.inv(np.moveaxis(f, (0, 1), (-2, -1))), (-1, -2), (0, 1))
     return shear * j ** (-2 / 3) * (f - (f * f).sum((0, 1)) / 3 * inverse) + p * j * inverse

@@ -56,8 +56,8 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
 
 
 def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> Iterator[tuple[Solution, float]]:
-    """Yield contact and seconds of each of the depths, m, on its own, from rest: a mesh is made for it. friction :
-    Coulomb's coefficient"""
+    """Yield contact and seconds of each of the depths, m, on its own, from rest: a mesh is made for it.
+    friction : Coulomb's coefficient"""
     for depth in depths:
         began = time.process_time()
         yield next(solve_path(sensor, _BALL, _PLACE, [Step(depth)], tier, friction)), time.process_time() - began

@@ -220,7 +220,8 @@ def translated_contacts(network: Translator, made: Sequence[Played], taken: str)
 
 
 def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
-    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact."""
+    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact.
+    made, taken : as in ``translated_contacts``"""
     began = time.process_time()
     found = translated_contacts(network, made, taken)
     spent = time.process_time() - began

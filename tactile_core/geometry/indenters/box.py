@@ -61,7 +61,8 @@ class Box(Indenter):
 
 @Loop
 def _from_box(points, middle, inner, edge):  # noqa: ANN001, ANN202
-    """Distance (n,) m and its gradient (n, 3) of points (n, 3) m; middle, inner : (3,) m."""
+    """Distance (n,) m and its gradient (n, 3) of points (n, 3) m from a box; middle, inner : (3,) m, its centre and
+    half sides before it is inflated by ``edge`` m"""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         square, face, deepest = 0.0, 0, -np.inf

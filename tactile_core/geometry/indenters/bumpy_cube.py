@@ -117,7 +117,8 @@ class BumpyCube(Indenter):
         return branch, distance, gradient, at_bump
 
     def _above(self, points, at_bump, of_ball, from_ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # noqa: ANN001
-        """Find the part nearest to points in the cube above a bump, its distance and gradient."""
+        """Find the part nearest to points (n, 3) m in the cube above a bump, its distance and gradient.
+        at_bump : points in the bump's ball's frame; of_ball, from_ball : their distance and gradient there"""
         reach, toward = circle_distance(at_bump - [0.0, 0.0, self.bump_height], self._foot)
         shaft, pose = self._shaft
         of_shaft, from_shaft = shaft.distance(points - pose.apex)

@@ -59,7 +59,9 @@ class Cylinder(Indenter):
 
 @Loop
 def _from_cylinder(points, axis, middle, radius, half_span, edge, nearest):  # noqa: ANN001, ANN202
-    """Distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along an own axis about a middle."""
+    """Distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along axis 0, 1 or 2 about a middle (3,)
+    m.
+    radius, half_span : m, before it is inflated by ``edge`` m; nearest : m, least distance from the axis"""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     first, second = (axis + 1) % 3, (axis + 2) % 3
     for p in range(len(points)):

@@ -104,11 +104,11 @@ def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarr
 
 @functools.partial(Loop, waits=False)  # many cells and triangles for each of few points
 def _least_squares(places, cells, triangles, starts, members, boxes, shape, steps, bound):  # noqa: ANN001, ANN202
-    """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on; lengths in cells.
+    """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on, squared too; unit:
+    cells.
 
-    Cells are visited by ``steps`` (q, 3) from a place's own, where the box (2, 3) of what they hold is near enough.
-    A foot inside the triangle gives the distance to its plane, any other the distance to its nearest edge.
-    """
+    Cells are visited by ``steps`` (q, 3) from a place's own, where the box (2, 3) of what they hold is near enough. A
+    foot inside the triangle gives the distance to its plane, any other the distance to its nearest edge."""
     squares, normal, arm, edge = np.empty(len(places)), np.empty(3), np.empty(3), np.empty(3)
     around, count = np.empty(len(steps), np.int64), 0
     for p in range(len(places)):

@@ -207,7 +207,7 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
 
 
 def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Noise-free change (e,) of the raw counts against rest, of a unit that rests at ``rest_counts``; 3 ms."""
+    """Noise-free change (e,) of a sensor's raw counts against rest in a contact, of a unit at ``rest_counts``; 3 ms."""
     films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
     rest = rest_counts(sensor)
     return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest

@@ -45,8 +45,8 @@ class ThinSheet:
         return self.patches[1:].T @ answer
 
     def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
-        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j. film :
-        (n,) m, h at the given nodes; conductivity : S/m, sigma"""
+        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j.
+        film : (n,) m, h at the given nodes; conductivity : S/m, sigma"""
         if not (film > 0).all():  # false for NaN too
             raise ValueError("a film without thickness does not conduct")
         thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle

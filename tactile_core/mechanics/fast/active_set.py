@@ -103,7 +103,8 @@ def complement(
 
 
 def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
-    """Cholesky factor of the block of ``active`` (k,) nodes, ``index`` (j,), and its solution of ``right`` (j, ...)."""
+    """Cholesky factor of the block of a matrix (n, n) at ``index`` (j,), where ``active`` is true, and its solution of
+    ``right`` (j, ...). factors : those found so far, by ``active``'s bytes; None to keep none"""
     from scipy.linalg import lapack
 
     known = factors.get(active.tobytes()) if factors is not None else None

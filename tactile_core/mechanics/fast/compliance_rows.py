@@ -232,7 +232,7 @@ def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_for
 
 @Loop
 def _normal_compliance(matrix, normal, c, ridge):  # noqa: ANN001, ANN202
-    """Compute ``ComplianceBlock.normal`` in a loop; ridge : relative, added to each point's own."""
+    """Compute ``ComplianceBlock.normal`` in a loop; matrix, c : its own; ridge : relative, added to each point's own"""
     k = len(normal)
     size, gaps = 3 * k, np.empty((k + c, k + c))
     for a in range(k):

@@ -246,7 +246,7 @@ class ContactProblem:
         return found
 
     def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
-        """Return a result without contact, or one that was not found."""
+        """Return a result without contact, or, not converged, one that was not found after some iterations."""
         none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
             self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,

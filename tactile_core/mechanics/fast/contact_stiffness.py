@@ -60,7 +60,8 @@ class ContactStiffness:
         return self._inverse, self._rows
 
     def _is_quick(self, gone: int, new: np.ndarray, wanted: np.ndarray) -> bool:
-        """Return true if it is not better made anew; new, wanted : (m,) bool."""
+        """Return true if it is not better made anew. gone : rows that go; new, wanted : (m,) bool, that come, and
+        all"""
         size, most = int(wanted.sum()), len(self._inverse) + int(new.sum())
         effort = _GOES * gone * len(self._inverse) ** 2 + _COMES * int(new.sum()) * most**2
         return size >= _SMALL and effort <= _FEW * size**3 and self._updates <= _MOST_UPDATES

@@ -267,7 +267,8 @@ def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.n
 
 @Loop
 def _add_field(displacement, plane, frames, centre, radius, field, scale):  # noqa: ANN001, ANN202
-    """``displacement`` (n, 3) plus ``scale`` times a field on a grid, float64: bilinear, 0 beyond it."""
+    """Return displacement (n, 3) plus scale times a field (g, 3) on a grid, float64: bilinear, 0 beyond it.
+    plane : (n, 2) m, nodes' places; frames : (3, 3, n), of ``node_frames``; centre, radius : (2,) m, m, the grid's"""
     moved, per_line = np.empty(displacement.shape), (LINES - 1) / 2 / np.arcsinh(REACH)
     middle = (LINES - 1) / 2
     for node in range(len(plane)):

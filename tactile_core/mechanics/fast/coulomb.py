@@ -107,10 +107,10 @@ class Sorted(NamedTuple):
 
 @Loop
 def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001, ANN201
-    """Reduce guessed forces to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
+    """Reduce a guessed force and core to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
 
     Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; nodes without one stick from now on.
-    """
+    Arguments as in ``Points``; friction : mu"""
     k = force.shape[0]
     lean = np.zeros((k, 3))
     for a in range(k):
@@ -271,9 +271,9 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
     """Let nodes that return to the contact slip instead of stick, since sticking is what pulled them off.
 
+    points, after : before and after ``sort_points``; turned : (k, 3), new normals; friction : Coulomb's coefficient
     left : (k,) bool, nodes that have left so far. Updates it, the nodes' forces and ``after.slips`` in place.
-    Returns the largest gap, m, of the nodes that touch now.
-    """
+    Returns the largest gap, m, of the nodes that touch now."""
     force, _, active, _, normal, _, gap, _, off = points
     wrong = 0.0
     for a in range(len(left)):

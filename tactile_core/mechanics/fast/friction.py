@@ -132,8 +132,8 @@ class Friction:
         return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
 
     def _spare(self, force: np.ndarray) -> float:
-        """Return the friction, N, beyond its limit that a node may bear which alternates between stick and slip. force
-        : (k, 3) N"""
+        """Return the friction, N, beyond its limit that a node may bear which alternates between stick and slip.
+        force : (k, 3) N, of all nodes"""
         axial = abs(float(force.sum(axis=0) @ self.pose.direction))
         return max(WAVERING * self.friction * axial, coulomb.FORCE_NOISE)
 

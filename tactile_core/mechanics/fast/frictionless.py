@@ -173,7 +173,8 @@ class Frictionless:
         return _Model(mixed, self.block.turned(older.matrix, mixed, stale), {})
 
     def _offset(self, gap, normal, place, model, solved) -> np.ndarray:  # noqa: ANN001
-        """Return the gaps at zero force; with a model of older normals they are exact only at the present forces."""
+        """Return gaps (k + c,) m at zero force; with a model of older normals they are exact only at present forces.
+        gap, normal : (k,) m, (k, 3), at the displacement ``place`` (k, 3) m; solved : the last forces, or None"""
         if solved is None or model.normal is normal:
             return np.concatenate([gap - np.einsum("ai,ai->a", normal, place), self.core_gap])
         k = self.block.k
@@ -272,11 +273,10 @@ def _stiffness(mode: np.ndarray) -> np.ndarray:
 
 @Loop
 def _tangent_response(matrix, k, nodes, tangent, normal, touching, core):  # noqa: ANN001, ANN202
-    """Compute what unit forces along weighted tangents (q, 3) at ``nodes`` (q,) move.
+    """Compute what unit forces along weighted tangents, ``tangent`` (q, 3), at ``nodes`` (q,) move; normal : (k, 3).
 
     Returns the motion along them (q, q), and of the gaps (q, t + d) of the touching nodes (t,) and of the points
-    (d,) that press on the core.
-    """
+    ``core`` (d,) that press on the core. matrix, k : of the block"""
     q, t, d = len(nodes), len(touching), len(core)
     among, onto_gaps = np.empty((q, q)), np.empty((q, t + d))
     for each in range(q):

@@ -75,8 +75,8 @@ def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> 
 def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
     """Find forces (s, 3, r) N of slipping nodes, without the turn of normals, and moves (q, 3, r) m of curved ones.
 
-    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the moves returned are relative to the indenter
-    """
+    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the moves returned are relative to the indenter, which moves
+        along the unit vector ``direction`` (3,)"""
     at, curved, columns = slipping.at, slipping.curved, forces.shape[1]
     bearing, moved = np.empty((len(at), 3, columns)), np.empty((len(curved), 3, columns))
     for a in range(len(at)):
@@ -137,7 +137,8 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
 
 @Loop
 def slide(known, answer, slipping):  # noqa: ANN001, ANN201
-    """Add the slip that belongs to the slipping nodes' unknowns (2 s, r) to the motion ``known`` (3 k + c, r) m."""
+    """Add the slip by ``answer`` (2 s, r), slipping nodes' unknowns, to the motion ``known`` (3 k + c, r) m, in
+    place."""
     s, lean, across, against = len(slipping.at), slipping.lean, slipping.across, slipping.against
     for a in range(s):
         node = slipping.at[a]
@@ -149,7 +150,7 @@ def slide(known, answer, slipping):  # noqa: ANN001, ANN201
 
 @Loop
 def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
-    """Compute forces (k, 3), (c,) N after a ``Change``; step : m, of the indenter."""
+    """Compute forces (k, 3), (c,) N from force, core after a ``Change``; step : m, of the indenter."""
     forces, bearing, moved, turns = change
     k, new, new_core, last = len(force), force.copy(), core.copy(), forces.shape[1] - 1
     for a in range(k):

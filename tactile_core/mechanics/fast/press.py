@@ -74,7 +74,8 @@ class CorrectedPress:
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
-        """Solve the contact whose corrected force along the motion is ``force`` N; None beyond the limit or if lost."""
+        """Solve the contact whose corrected force along the motion is force N; None beyond the limit or if lost. pose,
+        touches : as in ``at_depth``"""
         there = pose or self.pose
         fall, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:
@@ -197,7 +198,7 @@ class CorrectedPress:
         return None
 
     def _surface_drop(self, pose: Pose, *, touches: bool) -> float:
-        """Return how much deeper, m, first touch is at a pose than at the press's own."""
+        """Return how much deeper, m, first touch is at a pose than at the press's own; touches : the pose is there"""
         if touches:
             return float((pose.apex - self.pose.apex) @ pose.direction)
         return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)

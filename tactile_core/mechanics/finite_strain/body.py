@@ -64,7 +64,8 @@ class Body:
         )  # fmt: skip
 
     def _faces(self, indenter: Indenter, poses: tuple[Pose, ...], near: np.ndarray) -> np.ndarray | None:
-        """Faces (f, 9) among nodes ``near`` an indenter so sharp that nodes slide off it; None for any other."""
+        """Faces (f, 9) among nodes near an indenter so sharp, in one of the poses, that they slide off it; else
+        None."""
         mesh = self.solid.mesh
         if not BENDS <= min(sharpest(indenter, pose, mesh.nodes[near]) for pose in poses) < BLUNT:
             return None

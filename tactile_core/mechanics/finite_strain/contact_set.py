@@ -111,8 +111,8 @@ class ContactSet:
         return carried
 
     def _tie(self, fresh: np.ndarray, at: np.ndarray) -> None:
-        """Anchor candidates fresh (m,) bool where they meet the obstacle, which moves onto them in this load step. at :
-        (n, 3) m, the mesh's nodes now"""
+        """Anchor candidates fresh (m,) bool where they meet the obstacle, which moves onto them in this load step.
+        at : (n, 3) m, the mesh's nodes now"""
         last = self.obstacle.pose.to_own(at[self.candidates[fresh]])
         self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 

@@ -264,10 +264,9 @@ class FiniteStrainContact:
         return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
     def _pull(self, system: LinearSystem, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
-        """Step (n, 3) m, reactions (n, 3) N and rise of the fluid's pressure, Pa.
+        """Step (n, 3) m, reactions (n, 3) N and rise of the fluid's pressure, Pa, by a linear system of a Newton step.
 
-        swell : (n, 3) m2, gradient of the fluid's volume. Friction follows the normal forces.
-        """
+        swell : (n, 3) m2, gradient of the fluid's volume. Friction of ``outer`` follows the normal forces."""
         rise, prescribed = 0.0, system.prescribed
         known = (system.matrix @ prescribed.ravel()).reshape(-1, 3)
         under_pressure = system.solve(swell) if self.cavity else swell

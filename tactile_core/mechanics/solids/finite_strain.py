@@ -55,8 +55,8 @@ class NeoHookean:
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative (..., 3, 3, 3, 3)
-        by F. f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, of the cells, positive where they are
-        larger"""
+        by F.
+        f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, of the cells, positive where they are larger"""
         cofactor = cofactors(f)
         g = cofactor / j[..., None, None]  # F^-T
         i1 = np.einsum("...ij,...ij->...", f, f)
@@ -188,7 +188,8 @@ class FiniteStrainSolid:
         return Linearised(self, by_cell, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
 
     def _cells(self, part, f, j, p, residual, couple, stiffness) -> None:  # noqa: ANN001
-        """Fill in internal forces (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some cells."""
+        """Fill in internal forces, residual[part] (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some
+        cells, a slice ``part``, at gradients f, determinants j and pressures p at their Gauss points."""
         stress, tangent = self.law.stress_tangent(f, j, p)
         by_node, n = self._by_node[part], len(j)
         weight = self.weight[part]

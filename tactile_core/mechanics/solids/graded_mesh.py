@@ -192,7 +192,8 @@ def _skin_points(sensor: str, layer: str, rows: np.ndarray, columns: np.ndarray)
 
 
 def _spline(lines: np.ndarray, count: int, *, periodic: bool = False) -> np.ndarray:
-    """Matrix (count, lines) from values on lines to values at 0 .. count - 1, by a cubic spline."""
+    """Matrix (count, lines) from values on lines to values at 0 .. count - 1, by a cubic spline. lines : (lines,)
+    places; periodic : the last line is the first, and has no column"""
     import scipy.interpolate
 
     values = np.eye(len(lines))

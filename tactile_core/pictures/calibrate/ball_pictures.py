@@ -97,12 +97,12 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """Return the whole factor by which a fit reduces pictures."""
+    """Return the whole factor by which a fit reduces pictures of width x height px."""
     return whole_factor(width, height, WORKING_WIDTH)
 
 
 def whole_factor(width: int, height: int, side: int) -> int:
-    """Return the largest divisor of both sides that leaves at least ``side`` px of the shorter one, else 1."""
+    """Return the largest divisor of width and height that leaves at least ``side`` px of the shorter one, else 1."""
     wanted = max(min(width, height) // side, 1)
     return next(factor for factor in range(wanted, 0, -1) if width % factor == 0 and height % factor == 0)
 

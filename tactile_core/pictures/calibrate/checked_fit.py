@@ -98,7 +98,7 @@ def check_orientation(
 
 
 def _changed(press: Press, way: Way) -> Press:
-    """Return the press as the transformed photograph shows it."""
+    """Return the press as its photograph shows it after the transformation ``way``."""
     picture, drift, change = way.applied_to(press.picture), way.applied_to(press.drift), way.applied_to(press.change)
     touched, region = way.applied_to(press.touched), way.applied_to(press.region)
     return dataclasses.replace(press, picture=picture, drift=drift, change=change, touched=touched, region=region)
@@ -179,7 +179,7 @@ def cross_validated(
     progress: Progress = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate each press by a calibration on the others, in thirds; none for a single press. ball_diameter : m;
-    progress : called with (steps done, in all)"""
+    start : where fits start; quick : without Mitsuba; progress : called with (steps done, in all)"""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

@@ -119,7 +119,8 @@ def _transmitting(unit: Calibration, reflectance: float) -> Calibration:
 
 
 def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
-    """Describe by what a calibration was fitted: pictures, presses, balls and background."""
+    """Describe by what a calibration was fitted: pictures, presses, balls and background. finish : true if by Mitsuba
+    too; estimated : true if the background is"""
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if estimated else "photographed"
     balls = {f"{2e3 * press.radius:g}" for press in presses if press.radius is not None}
     of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""

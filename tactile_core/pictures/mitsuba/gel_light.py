@@ -176,7 +176,8 @@ class GelLight:
         return light if self._lobe is None else light + self._mirrored(mi, hit, self._lobe)
 
     def _mirrored(self, mi: Any, hit: Any, lobe: tuple[Any, Any]) -> np.ndarray:
-        """Light (H, W, 3) that narrow highlights throw onto other gel, on cells half as wide as the bounce's."""
+        """Return the light (H, W, 3) that narrow highlights throw onto other gel, on cells half as wide as the
+        bounce's. hit : of the coarse rays; lobe : as in ``led_integrator.mirrored``"""
         camera, step = self.unit.camera, self.preset.bounce_step
         cell = max(step // 2, 1)
         right, down = self._per_mm

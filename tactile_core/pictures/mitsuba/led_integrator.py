@@ -32,7 +32,7 @@ class EmitterLight(NamedTuple):
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[EmitterLight]:
-    """Compute the light of each emitter at surface interactions, from a number of points on the emitter.
+    """Compute the light of each of the emitters at surface interactions ``hit``, from some points on the emitter.
     scene : the occluders; phase : 0..1, rotates the points, in shares of their distance
     lobe : cosine of the half vector beyond which light near the mirror's direction is left out; None for none"""
     import drjit as dr
@@ -60,7 +60,7 @@ def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
     """Return the radiance (n, 3) of n surface interactions by light that other places have reflected onto them, once.
-    meet : function that intersects rays; hit : the interactions, each DIRECTIONS times in a row
+    meet : function that intersects rays; scene, emitters : as in ``direct``; hit : interactions, each DIRECTIONS times
     phase : 0..1 of each, rotates its directions; lobe : as in ``direct``, at those other places"""
     import drjit as dr
 
@@ -106,6 +106,7 @@ def mirrored(
     shape: tuple[int, int],
 ) -> np.ndarray:
     """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
+    meet, scene, emitters : as in ``bounced``; shape : (h, w)
     hit : the mirroring places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
     phase : 0..1 of each, rotates its directions; lobe : alpha, and the cosine at its end
     camera_height : mm; to_cell : (column, row) at which the camera sees a point"""

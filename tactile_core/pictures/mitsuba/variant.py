@@ -45,8 +45,8 @@ class Choice:
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """Choose the given variant, or the faster one that works on this machine. Raises TactileError for an unknown one or
-    one that does not work; ModuleNotFoundError without mitsuba."""
+    """Choose the variant wanted, or for None the faster one that works on this machine. Raises TactileError for an
+    unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
     import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
     if wanted not in (None, LLVM, SCALAR):
@@ -74,7 +74,7 @@ def fitting(error: float, variant: str | None = None) -> str:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """Return the variant for all workers of a job, so that pictures agree; "" for fast ones, which need none."""
+    """Return a preset's variant for all workers of a job, so that pictures agree; "" for fast ones, which need none."""
     return "" if preset == "fast" else choose_variant(wanted).name
 
 
