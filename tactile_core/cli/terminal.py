@@ -57,7 +57,7 @@ def next_step(text: str) -> None:
 
 
 def counted(number: int, thing: str) -> str:
-    """Write a number of things: 1 shard, 2 shards, 3 presses; a unit such as % stays as it is."""
+    """Write a number of things: 1 shard, 2 shards, 3 presses; a thing that is no word, such as %, stays."""
     if number == 1 or not thing.isalpha():
         return f"{number} {thing}"
     return f"{number} {thing}{'es' if thing.endswith('s') else 's'}"

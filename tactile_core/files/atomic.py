@@ -56,7 +56,8 @@ def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False
 
 
 def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
-    """Write readable JSON, keys sorted, lists of numbers or names in one line. Raises ValueError for NaN."""
+    """Write content as readable JSON, keys sorted, lists of numbers or names in one line. Raises ValueError for NaN.
+    shared : see `write_bytes`"""
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     text = _PLAIN_LIST.sub(lambda found: "[" + ", ".join(_PLAIN.findall(found[0])) + "]", text)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
@@ -177,7 +178,7 @@ def _sync(path: Path) -> None:
 
 
 def _sync_all(paths: list[Path]) -> None:
-    """Flush many files. Raises OSError where the disk refuses one."""
+    """Flush the files at paths. Raises OSError where the disk refuses one."""
     from concurrent.futures import ThreadPoolExecutor
 
     # The disk gathers what several ask for at once: 700 pictures took 2.9 s one by one and 0.1 s so, on one core.

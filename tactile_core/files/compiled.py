@@ -30,7 +30,7 @@ def available() -> bool:
 
 
 def add_scaled(total: Any, factor: Any, line: Any) -> None:
-    """Add ``factor`` times an array (n,) to ``total`` (n,), in place; in loops compiled without a copy."""
+    """Add ``factor`` times line (n,) to ``total`` (n,), in place; in loops compiled without a copy."""
     total += factor * line
 
 

@@ -69,7 +69,7 @@ class Drawer:
 
 
 def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
-    """Return a sentence where contacts found on one gel are solved on another, else nothing."""
+    """Return a sentence where contacts found_on one gel are solved on another, the target, else nothing."""
     if target == found_on:
         return ()
     return (

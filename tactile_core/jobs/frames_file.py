@@ -98,14 +98,14 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 
 
 def named(name: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's name for another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's name for a pair of another source than a BioTac, or another gel than a DIGIT's."""
     stem, _, role = name.rpartition("_")
     sensor = dict(zip(PAIR, pair, strict=True)).get(role)
     return f"{stem}_{sensor}" if sensor else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's meaning for another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's meaning for a pair of another source than a BioTac, or another gel than a DIGIT's."""
     for role, sensor in zip(PAIR, pair, strict=True):
         if role != sensor:
             meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")

@@ -213,7 +213,8 @@ class Gel:
         return found
 
     def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """Return the contact at a pose or force; None where nothing touches. Raises UnsolvedError."""
+        """Return the contact at a pose or force, N; None where nothing touches. Raises UnsolvedError.
+        flags : words are added; began : true if there was no pose before"""
         try:
             touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by

@@ -78,7 +78,7 @@ def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
 
 
 def not_negative(value: Any, where: str, expected: str) -> float:
-    """Return the value as a float; raises TactileError unless it is a finite number of zero or more."""
+    """Return the value as a float; TactileError unless it is a finite number from 0, as expected says in words."""
     try:
         number = float(value)
     except (TypeError, ValueError):

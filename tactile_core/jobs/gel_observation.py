@@ -33,7 +33,7 @@ def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str,
 
 def observation_space(markers: np.ndarray, *, picture: bool = True) -> Any:
     """Return the ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco].
-    markers : (rows, columns) int, of ``marker_nodes``"""
+    markers : (rows, columns) int, of ``marker_nodes``; picture : whether it is observed"""
     with needing("mujoco"):
         from gymnasium.spaces import Box, Dict
 

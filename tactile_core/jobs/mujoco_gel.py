@@ -114,7 +114,7 @@ class MujocoGel:
         return found
 
     def _presses(self, geom: int) -> bool:
-        """Return false for planes and height fields, which have no bounds; this is logged once."""
+        """Return false for a geom that is a plane or height field, which have no bounds; this is logged once."""
         import mujoco
 
         endless = self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -178,7 +178,7 @@ def _trimesh(model: mujoco.MjModel, geom: int, kind: Any, size: np.ndarray) -> A
 
 
 def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
-    """Return the number of a named geom or site."""
+    """Return the number of a named "geom" or "site", the kind."""
     import mujoco
 
     wanted = mujoco.mjtObj.mjOBJ_GEOM if kind == "geom" else mujoco.mjtObj.mjOBJ_SITE

@@ -96,7 +96,7 @@ def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]
 
 
 def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
-    """Solve the contacts of one block of presses and write them; returns false if the block was there already."""
+    """Solve the contacts of block `number` of presses and write them; returns false if the block was there already."""
     from ..simulation.pair_sampling import press_rows
 
     one = job.inputs[index]
@@ -128,7 +128,8 @@ def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
-    """Estimate the blocks for `count` contacts from those made so far. Raises TactileError where none touches."""
+    """Estimate the blocks for `count` contacts from counts, block -> contacts so far. TactileError where none
+    touches."""
     have, number = 0, 0
     while have < count and number in counts:
         have += counts[number]

@@ -110,7 +110,7 @@ class _Writer:
         self._about: dict[str, Any] = {"warnings": [], "prepared": [], "labels": {}}
 
     def append(self, recording: Recording, signals: Signals, repeated: int) -> None:
-        """Add a part's new frames."""
+        """Add a part's new frames, those after the first `repeated`."""
         arrays = {"time": recording.time, **{name: getattr(signals, name) for name in tuple(COLUMNS)[1:]}}
         end = self.count + len(recording) - repeated
         for name, kind in COLUMNS.items():

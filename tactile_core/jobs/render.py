@@ -132,8 +132,8 @@ def choose_preset(options: Options) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration in pixels of height maps (H, W) or of size (width, height). Raises TactileError if they
-    differ."""
+    """Return the calibration in pixels of height maps, heights (H, W), or of size (width, height); TactileError if both
+    and they differ."""
     if heights is not None:
         height, width = heights
         if size not in (None, (width, height)):
@@ -169,7 +169,7 @@ class Pictures:
             self._write_camera(folder / CAMERA)
 
     def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
-        """Write one frame. values : displacement (M, 3) m of the gel's nodes, or its heights (H, W) m."""
+        """Write frame `number`. values : displacement (M, 3) m of the gel's nodes, or its heights (H, W) m."""
         with self.clock.stage("height_map"):
             height = values if self.heights else gel_mapper(self.renderer.camera)(values)
         with self.clock.stage("radiance"):

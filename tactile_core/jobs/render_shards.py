@@ -97,7 +97,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
 
 
 def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
-    """Render the frames of a shard, unless they are there; returns true if they were made."""
+    """Render the frames of shard `number`, unless they are there; returns true if they were made."""
     one, recipe = job.inputs[index], job.recipe
     file = jobs.shard_file(folder, one.name, number)
     if checksummed.verified_checksum(file) is not None:
@@ -137,7 +137,7 @@ def _frames(folder: Path, job: Job[Render]) -> int:
 
 
 def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> dict[str, np.ndarray]:
-    """Read arrays of the prepared input."""
+    """Read arrays of the prepared input by names; rows : of those that have rows"""
     return array_pack.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
 
 

@@ -80,7 +80,7 @@ class SheetFigure:
         self.figure.text(left / WIDTH, 1 - (self.top + down) / self.height, text, **style)
 
     def title(self, name: str, simulated: bool) -> None:
-        """Draw the name, and the warnings below it."""
+        """Draw the name, a mark if simulated, and the warnings below it."""
         self._text(LEFT, 0.36, name, size=15, weight="bold", va="center", parse_math=False)
         if simulated:
             box = {"boxstyle": "round,pad=0.35", "facecolor": MARK, "edgecolor": "none"}
@@ -239,7 +239,7 @@ class SheetFigure:
         bar.set_label("displacement, mm", size=8)
 
     def picture_row(self, label: str, pictures: np.ndarray) -> None:
-        """Draw pictures (k, H, W, 3) uint8."""
+        """Draw pictures (k, H, W, 3) uint8; label : before the row"""
         height = self.column_width * self.camera.height / self.camera.width
         axes = self._row(height)
         for k in range(self.columns):

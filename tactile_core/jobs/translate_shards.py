@@ -50,7 +50,8 @@ def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, b
 
 
 def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
-    """Translate a shard unless it is whole; returns true if it was made. Raises TactileError; OSError of the disk."""
+    """Translate shard `number` of recording `index` unless it is whole; returns true if it was made. Raises
+    TactileError; OSError of the disk."""
     recipe, name = job.recipe, job.inputs[index].name
     pictures, pair = (job.calibration, recipe.preset, recipe.variant or None), (recipe.target, recipe.source)
     options = ToolOptions(job.weights, *pictures, recipe.answer, recipe.gel, *pair)
@@ -82,7 +83,7 @@ def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int)
 
 
 def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict[str, str | int]:
-    """The attributes that distinguish a shard from others."""
+    """Return the attributes that distinguish shard `number` of recording `index`, of so many frames, from others."""
     return {
         "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
     }  # fmt: skip
@@ -111,7 +112,7 @@ def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
 
 
 def check_unit(calibration: str | None, sha256: str) -> None:
-    """Raise TactileError for a calibration that is not the one the job was made with."""
+    """Raise TactileError for a calibration that is not the one, of this sha256, that the job was made with."""
     if calibration is not None and unit_hash(Path(calibration)) != sha256:
         advice = "Use the calibration that the job was made with"
         raise TactileError(calibration, "another content", f"sha256 {sha256[:12]}..., as in the job", advice)

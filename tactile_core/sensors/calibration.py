@@ -272,7 +272,7 @@ class Calibration:
         return dataclasses.replace(self, leds=(red, green, blue), response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
-        """Return the same view at another size in pixels. Raises TactileError for another aspect ratio."""
+        """Return the same view at another width and height in pixels. Raises TactileError for another aspect ratio."""
         return dataclasses.replace(self, camera=self.camera.at_size(width, height))
 
 

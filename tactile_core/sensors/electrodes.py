@@ -109,7 +109,7 @@ def read_places(path: Path) -> Places:
 
 
 def _read_sp(path: Path, rows: list[list[str]]) -> Places:
-    """Sort electrodes by their numbers; those of the excitation have -1, -2, ..."""
+    """Sort electrodes, rows of cells of the file, by their numbers; those of the excitation have -1, -2, ..."""
     places: dict[int, tuple[float, ...]] = {}
     for at, row in enumerate(rows, start=2):
         try:

@@ -58,7 +58,8 @@ class SkinShape:
         }
 
     def _meridian(self, layer: str, column: int) -> np.ndarray:
-        """Points (rows, 2) = (x, r) in m along one meridian of the table, from the tip pole to the base pole."""
+        """Return points (rows, 2) = (x, r) m along one meridian of a layer's table, from the tip pole to the base
+        pole."""
         table = self.table
         known = np.isfinite(table[layer][:, column])
         x, r = table["x"][known], table[layer][known, column]
@@ -81,9 +82,9 @@ class SkinShape:
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
-        """Nodes (stations, columns, 3) m of the ``"outer"`` or ``"inner"`` skin. Stations run from the tip pole to the
-        base pole, each pole one point repeated over the columns; outer and inner points of one station and column face
-        each other."""
+        """Return nodes (stations, columns, 3) m of a layer of skin, ``"outer"`` or ``"inner"``. Stations run from the
+        tip pole to the base pole, each pole one point repeated over the columns; outer and inner points of one station
+        and column face each other."""
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
@@ -131,8 +132,8 @@ class SkinShape:
 
     @functools.cache  # noqa: B019
     def skin_surface(self, layer: str = "outer") -> Lattice:
-        """The outer (or inner) skin at rest: rows from tip to base, columns around the axis, then the two poles.
-        Triangles point away from the solid, those of the inner skin into the fluid."""
+        """Return the "outer" (or "inner") layer of skin at rest: rows from tip to base, columns around the axis, then
+        the two poles. Triangles point away from the solid, those of the inner skin into the fluid."""
         grid = self.skin_grid(layer)
         stations, columns = grid.shape[:2]
         rows = stations - 2

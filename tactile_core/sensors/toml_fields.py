@@ -57,7 +57,7 @@ def number(
 
 
 def file_beside(*, or_none: bool = False) -> Any:
-    """Declare the name of a file beside the one that is read; empty where it may be left out."""
+    """Declare the name of a file beside the one that is read; or_none : it may be left out, and then is empty"""
     meta = {"beside": True, "may_miss": or_none}
     return dataclasses.field(metadata=meta, default="" if or_none else dataclasses.MISSING)
 
@@ -114,7 +114,7 @@ def _key(each: dataclasses.Field) -> str:
 
 
 def check_names(where: str, content: dict[str, Any], names: tuple[str, ...]) -> None:
-    """Raise TactileError for a field that is missing, unknown or in another unit."""
+    """Raise TactileError for a field of content that is not among names: missing, unknown or in another unit."""
     fields = f"the fields {', '.join(names)}"
     for name in sorted(set(content) - set(names)):
         for right in names:
@@ -134,7 +134,8 @@ def _without_unit(name: str) -> str:
 
 
 def read_value(kind: Any, value: Any, where: str, meta: Mapping[str, Any]) -> Any:
-    """Convert a value of the file to a field's type, in SI units. Raises TactileError for a value of another type."""
+    """Convert a value of the file to a field's type, kind, in SI units; meta : of its declaration. Raises TactileError
+    for a value of another type."""
     kind = next((each for each in typing.get_args(kind) if dataclasses.is_dataclass(each)), kind)  # of Dome | None
     if dataclasses.is_dataclass(kind):
         return read_table(typing.cast(type, kind), value, where, **meta.get("given", {}))

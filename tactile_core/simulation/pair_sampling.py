@@ -65,7 +65,7 @@ def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tup
 def _on_both(
     indenter: Indenter, place: Placement, spec: PairSpec, steps: Iterator[Step], pair: tuple[str, str]
 ) -> Iterator[tuple[Step, Solution, Solution]]:
-    """Yield each step's contacts on both sensors, up to the greatest depth or until an edge penetrates."""
+    """Yield each step's contacts on both sensors of the pair, up to the greatest depth or until an edge penetrates."""
     steps, *for_each = itertools.tee(steps, 3)
     on_source, on_target = (
         _press(sensor, indenter, place, spec, own) for sensor, own in zip(pair, for_each, strict=True)

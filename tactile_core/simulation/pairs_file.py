@@ -148,7 +148,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
 
 
 def _named(pair: tuple[str, str]) -> dict[str, str]:
-    """Names in the file of ``DATASETS``, which are named after both sensors."""
+    """Return the names in the file of ``DATASETS``, which are named after both sensors of the pair."""
     of = dict(zip(PAIR, pair, strict=True))
     parts = {name: name.rpartition("_") for name in DATASETS}
     return {name: f"{stem}_{of[role]}" if role in of else name for name, (stem, _, role) in parts.items()}
@@ -177,7 +177,7 @@ def _dataset(
 
 
 def _scale(data: h5py.Dataset, place: str) -> float:
-    """Metres per unit of a displacement dataset."""
+    """Return the metres per unit of a displacement dataset; place : its file and name, for errors"""
     scale = np.asarray(data.attrs.get("scale", np.nan), np.float64)
     if scale.shape != () or not 0.0 < scale < 1.0:
         raise TactileError(place, f"scale {scale}", "metres per unit, a number above 0", ADVICE)

@@ -115,7 +115,7 @@ def simulate_recording(
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
-    """Return the sensors that outputs need."""
+    """Return the sensors that outputs (keep, their words) need."""
     return tuple(dict.fromkeys(sensor for word, sensor in outputs().items() if word in keep))
 
 
@@ -179,7 +179,8 @@ def _solve(
 
 
 def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str]) -> _Frame:
-    """Return what is kept of a frame's contacts. The force is the first sensor's: the BioTac's where it is solved."""
+    """Return what is kept of a frame's contacts; keep : words of ``outputs``. The force is the first sensor's: the
+    BioTac's where it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))

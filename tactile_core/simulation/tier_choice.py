@@ -49,7 +49,7 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
 
 
 def _up_to(tier: str, sensor: str, share: float) -> float:
-    """Return the largest error, um, of all depths up to share (of the thickness), which a press passes through."""
+    """Return a tier's largest error, um, of all depths up to share (of the thickness), which a press passes through."""
     below = [each["depth_share_to"] for each in measured()["tiers"][tier][sensor]["bins"]]
     depths = [each for each in below if each < share] + [share]
     return 1e6 * max(expected_error(tier, sensor, depth)[0] for depth in depths)
@@ -65,7 +65,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """Choose a tier for each sensor of a scene's [recording]. Raises TactileError for a bound that none meets."""
+    """Choose a tier for each sensor used in a scene's [recording]. Raises TactileError for a bound, um, none meets."""
     from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)

@@ -200,7 +200,7 @@ def _tell_test(
 
 
 def _error(tried: list[Evaluation]) -> str:
-    """Describe the distance of pictures and photographs in the region of the press, beside the background's."""
+    """Describe the distance of pictures and photographs tried in the region of the press, beside the background's."""
     from ...pictures.calibrate.evaluate import mean_metrics
 
     ours, baseline = (each["roi_l1"] for each in mean_metrics(tried))
@@ -208,5 +208,5 @@ def _error(tried: list[Evaluation]) -> str:
 
 
 def _way(mm: float, less: str, more: str) -> str:
-    """Describe a position along a direction: 1.2 mm left."""
+    """Describe a position along a direction: 1.2 mm left; less, more : words for below and above 0"""
     return f"{abs(mm):.1f} mm {less if mm < 0 else more}"

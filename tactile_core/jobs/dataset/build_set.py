@@ -58,8 +58,8 @@ class Asked:
 
 def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> dict[str, str]:
     """Make the data set `out` of the recordings in a folder; what is there already is kept. Returns what was set aside,
-    and why. Raises TactileError for another set's folder, for files of others in `out`, where no recording can be
-    translated, and for a disk that cannot be written."""
+    and why. named : of the recipe, as the user named it. Raises TactileError for another set's folder, for files of
+    others in `out`, where no recording can be translated, and for a disk that cannot be written."""
     found = collect(recipe, folder, out)
     _check_out(out)
     for line in _counted(recipe, found):
@@ -152,7 +152,8 @@ def _translated(
 def _joined(
     recipe: Recipe, parts: list[tuple[str, list[File], Finished]], aside: dict[str, str], out: Path
 ) -> Finished:
-    """Join the jobs of all units as one, labelled; train comes before test."""
+    """Join the jobs of all units as one, labelled; train comes before test.
+    parts : unit, its files and its job; aside : recording -> why it was set aside, is added to"""
     recordings: list[Recorded] = []
     warnings: dict[str, list[str]] = {}
     content = hashlib.sha256()

@@ -94,7 +94,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 
 def _split(recipe: Recipe, labels: dict[str, str]) -> str:
-    """Return a recording's part; without values named for testing, by a hash of the label's value."""
+    """Return the part of a recording with labels; without values named for testing, by a hash of the label's value."""
     if recipe.split.by not in labels:
         return TRAIN
     value = labels[recipe.split.by]

@@ -43,7 +43,7 @@ def card_of(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
-    """Return the card as Markdown; rows : survival of labels, None without scikit-learn"""
+    """Return the card as Markdown; rows : survival of labels, None without scikit-learn; layouts : exported, by name"""
     of = recipe.source
     sections = {
         f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
@@ -79,7 +79,8 @@ def _plain(text: str) -> str:
 
 
 def _verdict(task: str, by: dict[str, Row]) -> str:
-    """Describe how much of a label survives: no more than chance, less than in the electrodes, or all of it."""
+    """Describe how much of the label `task` survives: no more than chance, less than in the electrodes, or all of it.
+    by : kind of features -> its row"""
     nulls = (RAW, survival.RANDOM, survival.ALWAYS)
     best = max((row for name, row in by.items() if name not in nulls), key=lambda row: row.right)
     source = max(by[RAW], by[survival.RANDOM], key=lambda row: row.right)
@@ -127,7 +128,7 @@ def _labels(summaries: list[Summary]) -> Iterable[str]:
 
 
 def _span(counts: Counter[str]) -> str:
-    """Describe the range of a label whose values are all numbers; "" for others."""
+    """Describe the range of a label whose values are all numbers, from counts, value -> recordings; "" for others."""
     try:
         numbers = [float(text) for text in counts if text != "(none)"]
     except ValueError:
@@ -184,7 +185,7 @@ def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touche
 
 
 def page_of(recipe: Recipe, summaries: list[Summary], progress: Callable[[int, int], None]) -> str:
-    """Return the page: every recording as a strip of pictures, in one self-contained HTML file."""
+    """Return the page: every recording of summaries as a strip of pictures, in one self-contained HTML file."""
     choices: dict[str, set[str]] = {}
     articles = []
     for number, one in enumerate(summaries, start=1):

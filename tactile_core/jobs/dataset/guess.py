@@ -68,7 +68,7 @@ def write(out: Path, folder: Path) -> None:
 
 
 def _patterns(paths: list[str]) -> list[str]:
-    """Guess patterns, the commonest first: in names of the same shape, the parts that differ become labels."""
+    """Guess patterns of paths, the commonest first: in names of the same shape, the parts that differ become labels."""
     alike: dict[tuple[str, ...], list[list[str]]] = {}
     for path in paths:
         stem, ending = os.path.splitext(path)

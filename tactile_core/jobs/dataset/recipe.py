@@ -96,7 +96,7 @@ def known() -> dict[str, Path]:
 
 
 def read(named: str) -> Recipe:
-    """Read a recipe: one that ships, by its name, or a TOML file. Raises TactileError naming file and field."""
+    """Read a recipe, named as one that ships or a TOML file's path. Raises TactileError naming file and field."""
     file = known().get(named, Path(named))
     try:
         found = msgspec.toml.decode(read_toml_text(file), type=Recipe)

@@ -45,7 +45,8 @@ class Cluster:
     def __init__(
         self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
     ) -> None:
-        """Raises TactileError for a bad address or file, and for other machines without TLS unless `insecure`."""
+        """Connect to an address; see the class. Raises TactileError for a bad address or file, and for other machines
+        without TLS unless `insecure`."""
         self._say, self._insecure = say, insecure
         if address.startswith(("tcp://", "ucx://")) and not _here(address):
             self._without_tls(address)
@@ -134,7 +135,7 @@ class Cluster:
         self._say(f"warning: {where}: {found}")
 
     def _connected(self, place: Any) -> Any:
-        """Return a client of the scheduler. Raises TactileError where none answers."""
+        """Return a client of the scheduler at place, an address. Raises TactileError where none answers."""
         from distributed import Client, Security
 
         for name in (

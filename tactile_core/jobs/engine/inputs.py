@@ -58,7 +58,8 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
 
 
 def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield each path or glob, also those in lists, and its source: "list.txt, line 3, " or ""."""
+    """Yield each path or glob of words, also those in lists (@list.txt), and its source: "list.txt, line 3, " or
+    empty."""
     for word in words:
         if word.startswith("@"):
             for number, line in _lines(Path(word[1:])):
@@ -68,7 +69,7 @@ def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
-    """Yield the recordings of a path or glob. within : lists those in a folder"""
+    """Yield the recordings of a word, a path or glob. within : lists those in a folder"""
     there = os.path.lexists(word) or not glob.has_magic(word)
     for path in [word] if there else _globbed(word):
         real = os.path.realpath(path)
@@ -79,7 +80,7 @@ def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
 
 
 def _globbed(word: str) -> list[str]:
-    """Expand a glob, sorted by name; refuse one that may visit the same folders again and again."""
+    """Expand a word, a glob, sorted by name; refuse one that may visit the same folders again and again."""
     parts = word.replace(os.sep, "/").split("/")
     wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:

@@ -47,7 +47,8 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder, made if needed, and clear what killed runs left. Raises TactileError if it is locked."""
+    """Lock the job's folder, made if needed, and clear what killed runs left; part : see `run`. TactileError if it is
+    locked."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)

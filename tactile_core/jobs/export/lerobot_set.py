@@ -48,13 +48,14 @@ class Layout(Protocol):
     picture: Literal["image", "video"]
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows of an episode."""
+        """Add rows of an episode (its number). rate : frames a second"""
 
     def end_episode(self) -> dict[str, Any]:
         """Close an episode's files; returns its place for the list of episodes."""
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Close all files and write all lists; returns the layout's entries of info.json."""
+        """Close all files and write all lists, of episodes and their stats; returns the layout's entries of
+        info.json."""
 
 
 def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:
@@ -102,7 +103,7 @@ def _splits(source: Finished) -> dict[str, str]:
 
 
 def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
-    """Describe the columns of a frame."""
+    """Describe the columns of a frame; rate : frames a second"""
     arrays = source.recordings[0].arrays()
     shapes = {name: list(shape) or [1] for name, (shape, _) in arrays.items()} | {"contact": [1]}
     found: Features = {}
@@ -128,7 +129,7 @@ def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
 
 
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
-    """Yield columns of some rows of an episode. start : its first row in the whole data set"""
+    """Yield columns of some rows of an episode. start : its first row in the whole data set; rate : frames a second"""
     for block, following in _followed(one):
         frame = block["frame"].astype(np.int64) // one.every
         own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {

@@ -53,7 +53,7 @@ class DigitCamera:
             self._ended.wait(self._pause)
 
     def picture(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the newest picture, (H, W, 3) uint8, upright; black before the first and after the last."""
+        """Return the newest picture, uint8 of a shape (H, W, 3), upright; black before the first and after the last."""
         import cv2
 
         frame = self._newest

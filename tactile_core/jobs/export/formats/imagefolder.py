@@ -46,7 +46,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[Any]]]:
-    """Write the pictures of a recording; yields the rows of some frames at a time."""
+    """Write the pictures of a recording; yields the rows of some frames at a time. labels : names of their columns"""
     for block in one.blocks():
         rows = []
         for row, frame in enumerate(map(int, block["frame"])):
@@ -61,6 +61,6 @@ def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[
 
 
 def _number(value: Any, part: int | None) -> str:
-    """Format a number with six digits; empty for an unknown one."""
+    """Format a value, or its number `part` (None: it has none), with six digits; empty for an unknown one."""
     number = float(value if part is None else value[part])
     return f"{number:.6g}" if np.isfinite(number) else ""

@@ -99,7 +99,7 @@ def _write_lines(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def _modality(drawn: bool) -> dict[str, Any]:
-    """Return the meaning of the state's and action's numbers, as GR00T requires."""
+    """Return the meaning of the state's and action's numbers, and, if drawn, of the picture, as GR00T requires."""
     ends = list(itertools.accumulate(len(parts) for parts in CONTACT.values()))
     spans = {name: {"start": end - len(CONTACT[name]), "end": end} for name, end in zip(CONTACT, ends, strict=True)}
     found: dict[str, Any] = {

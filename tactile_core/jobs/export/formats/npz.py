@@ -29,7 +29,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _write(archive: zipfile.ZipFile, one: Recorded, name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
-    """Write an array of any length: its header first, then its rows, some at a time."""
+    """Write an array, named, of any length: its header (shape, kind) first, then its rows, some at a time."""
     header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
     with archive.open(zipfile.ZipInfo(f"{one.stored(name)}.npy", TIME), "w", force_zip64=True) as out:
         np.lib.format.write_array_header_2_0(out, header)
