@@ -161,10 +161,9 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
 
 
 def _result(folder: Path, sensor: str, picked: list[str]) -> None:
-    """The truth; what was picked, in words; and apex (T, 3) m and axes (T, 3, 3) of the indenter.
+    """Write result.npz: the truth; what was picked, in words; apex (T, 3) m and axes (T, 3, 3) of the indenter.
 
-    It is lowered until it touches the dented surface of the sensor on which it is placed.
-    """
+    It is lowered until it touches the dented surface of the sensor on which it is placed."""
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
     from tactile_core.recordings.simulated import read_truth

@@ -193,8 +193,8 @@ def share_told(photographs: list[np.ndarray], pictures: list[np.ndarray]) -> flo
 
 
 def patch_statistics(picture: np.ndarray) -> np.ndarray:
-    """Return, for squares of PATCH px of a picture (H, W, 3), the size of grey levels, of their slopes and second
-    differences, how like neighbouring slopes are, and how like the slopes of two colours."""
+    """Return (squares, 24), for squares of PATCH px of a picture (H, W, 3): the size of grey levels, of their slopes
+    and second differences, how like neighbouring slopes are, and how like the slopes of two colours."""
     levels, found = picture.astype(float), []
     for down, right in np.ndindex(levels.shape[0] // PATCH, levels.shape[1] // PATCH):
         patch = np.moveaxis(levels[down * PATCH :, right * PATCH :][:PATCH, :PATCH], -1, 0)

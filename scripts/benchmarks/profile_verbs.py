@@ -98,7 +98,7 @@ CASES = (
 
 
 class Cost(NamedTuple):
-    """Cost of one run. cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
+    """Cost of one run. status : exit status; cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
 
     status: int
     cpu: float

@@ -142,7 +142,7 @@ class _Dent:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A body pressed into the skin at (x, z) m, its dent, and how unlike the one sought that is, 0 to 1."""
+    """A body pressed into the skin at ``aim`` (x, z) m, its dent, and how unlike the one sought that is, 0 to 1."""
 
     contact: BodyContact
     aim: np.ndarray

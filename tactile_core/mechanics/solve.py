@@ -149,7 +149,8 @@ def _guessed_depths(
 
 
 class _Fast:
-    """A path in the fast tier; ``to`` goes on from the step before."""
+    """A path in the fast tier; ``to`` goes on from the step before. pose : at first touch
+    thick, limit : m, of the sensor there, and the greatest depth; friction : Coulomb's coefficient"""
 
     def __init__(
         self, sensor: Sensor, indenter: Indenter, pose: Pose, thick: float, limit: float, friction: float

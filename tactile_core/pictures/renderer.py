@@ -235,7 +235,7 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 @Loop
 def _fill_levels(radiance, rest, response, background, ends, largest, picture):  # noqa: ANN001, ANN202
     """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W), bent.
-    ends : (4, H, 3 W) of the camera's curve"""
+    ends : (4, H, 3 W) of the camera's curve; largest : grey level"""
     leds, height, width = radiance.shape
     lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)

@@ -66,7 +66,7 @@ def exact_layer(
 
 
 class _LayerEquations:
-    """The integral equation of ``exact_layer`` on Gauss points."""
+    """The integral equation of ``exact_layer`` on Gauss points. thickness : m; youngs : Pa; poisson : its ratio"""
 
     def __init__(self, thickness: float, youngs: float, poisson: float) -> None:
         self.stiffness = youngs / (2 * (1 - poisson**2))
@@ -76,7 +76,7 @@ class _LayerEquations:
         self.waves, self.lacking = u / thickness, 10 * weight * (1 - compliance) / thickness
 
     def solve(self, contact: float, radius: float) -> tuple[float, float]:
-        """Depth m and force N at a contact radius m."""
+        """Depth m and force N at a contact radius ``contact`` m, under a ball of radius m."""
         point, weight = np.polynomial.legendre.leggauss(48)
         t, weight = contact * (point + 1) / 2, contact * weight / 2
         waves = np.cos(np.outer(np.r_[t, contact], self.waves))

@@ -28,7 +28,8 @@ EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/ben
 
 @dataclass(frozen=True)
 class Promise:
-    """Stated 95 % bounds (C,) and measured errors (C,), in ``unit``; groups : (C,) number of each contact's group."""
+    """Stated 95 % bounds ``bound`` and measured errors ``found``, both (C,) in ``unit``; groups : (C,) names, one
+    each"""
 
     name: str
     unit: str

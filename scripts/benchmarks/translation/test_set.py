@@ -105,7 +105,7 @@ def expected_error_rows(
 
 
 def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
-    """Return a row of value with the target low or more, high or less, or both, None for no bound; set_name : its
+    """Return a row of value with the target low or more, high or less, or both, None for no bound. set_name : of
     data"""
     found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
     return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}

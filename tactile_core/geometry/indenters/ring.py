@@ -97,7 +97,7 @@ def _square(vectors: np.ndarray) -> np.ndarray:
 
 @Loop
 def _from_circle(points, radius, nearest):  # noqa: ANN001, ANN202
-    """Compute ``circle_distance`` in a loop."""
+    """Compute ``circle_distance`` of points (n, 3) m in a loop; radius : m; nearest : m, least distance that divides"""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         x, y, above = points[p, 0], points[p, 1], points[p, 2]

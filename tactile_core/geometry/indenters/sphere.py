@@ -37,7 +37,7 @@ class Sphere(Indenter):
 
 @Loop
 def _polar(points, height, nearest):  # noqa: ANN001, ANN202
-    """Distance (n,) m of points (n, 3) m from a centre ``height`` m up the own z, and directions from it (n, 3)."""
+    """Distance (n,) m, at least nearest, of points (n, 3) m from a centre height m up the own z; directions (n, 3)."""
     distance, direction = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2] - height

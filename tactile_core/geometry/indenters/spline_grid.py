@@ -38,7 +38,8 @@ class SplineGrid(Summary):
 
 @Loop
 def _spline(points, origin, spacing, coefficients, bends):  # noqa: ANN001, ANN202
-    """Value (n,), gradient (n, 3) and, with ``bends``, second derivatives (n, 3, 3) at points (n, 3) m."""
+    """Value (n,), gradient (n, 3), with ``bends`` second derivatives (n, 3, 3), at points (n, 3) m; see
+    ``SplineGrid``."""
     value, gradient = np.empty(len(points)), np.empty((len(points), 3))
     hessian = np.zeros((len(points) if bends else 0, 3, 3))
     cell, beyond, weights, sums = np.zeros(3, np.int64), np.zeros(3), np.zeros((3, 3, 4)), np.zeros(10)

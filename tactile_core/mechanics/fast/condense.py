@@ -92,7 +92,7 @@ def mirror_upper(matrix: np.ndarray) -> None:
 
 
 class _Elimination:
-    """Elimination of one half of the solid down to the kept nodes."""
+    """Elimination of one half of the solid down to the nodes ``keep``, (k,); loads, parity : as of ``condense``"""
 
     def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: csc_array, parity: int) -> None:
         from scipy import sparse

@@ -36,7 +36,7 @@ _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest ov
 
 
 class _Around(NamedTuple):
-    """Effect of a contact on the nodes near it: displacement (n, 3) m, gaps (n,) m; gaps (g,) m of skin and core."""
+    """Effect of a contact on n nodes near it: moved (n, 3) m, gap (n,) m; core_gap (g,) m between skin and core."""
 
     moved: np.ndarray
     gap: np.ndarray

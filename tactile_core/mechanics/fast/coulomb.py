@@ -56,7 +56,8 @@ class Points(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion (k, 3) m of nodes to where a step begins; ``slip`` (k, 3) m from their spots and ``gap`` (k,) m there."""
+    """Motion ``moves`` (k, 3) m of nodes to where a step begins; slip (k, 3) m from their spots and gap (k,) m
+    there."""
 
     moves: np.ndarray
     slip: np.ndarray

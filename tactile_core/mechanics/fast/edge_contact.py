@@ -50,7 +50,8 @@ class _Sprung(Frictionless):
 
 
 class EdgeContactProblem(ContactProblem):
-    """Contact problem without friction whose candidates are nodes, and from number m on points between them."""
+    """Contact problem without friction whose candidates are nodes, and from number m on points between them. reach : m,
+    as in ``ContactProblem``"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None

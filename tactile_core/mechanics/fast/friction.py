@@ -30,8 +30,7 @@ class Friction:
     """Solves for the nodes of one block.
 
     rest : (k, 3) m; core_gap : (c,) m; spots : (k, 3) m, where nodes stick, in the indenter's frame
-    stiffness : inverse of the previous solve, of whatever block, which this one updates
-    """
+    friction : Coulomb's; stiffness : inverse of the previous solve, of whatever block, which this one updates"""
 
     def __init__(
         self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,

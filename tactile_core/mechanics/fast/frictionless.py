@@ -40,12 +40,11 @@ _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
 @dataclasses.dataclass
 class Try:
-    """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core force (c,) N, shift m along the motion.
+    """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core_force (c,) N, shift m along the motion.
 
     active : (k + c,) bool; settled : whether it fulfils the tolerances; iterations : so far
     slipping : (k,) bool, nodes whose friction is spent
-    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, normals there
-    """
+    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, normals"""
 
     displacement: np.ndarray
     force: np.ndarray
@@ -63,7 +62,8 @@ class Try:
 
 
 class _Model(NamedTuple):
-    """Compliance (k + c, k + c) m/N of the gaps along normals (k, 3), and its Cholesky factors by active set."""
+    """Compliance ``matrix`` (k + c, k + c) m/N of the gaps along ``normal`` (k, 3), and Cholesky factors by active
+    set."""
 
     normal: np.ndarray
     matrix: np.ndarray

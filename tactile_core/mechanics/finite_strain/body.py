@@ -35,7 +35,8 @@ _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A sensor's solid with all that a contact on it needs; ``graded`` interpolates to the lattice's nodes."""
+    """A sensor's solid with all that a contact on it needs; ``graded`` interpolates to the lattice's nodes.
+    cavity : None without fluid; core_nodes : (k,), mesh nodes of the inner skin that may touch the core"""
 
     sensor: Sensor
     tier: Literal["full", "reference"]

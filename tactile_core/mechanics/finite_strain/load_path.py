@@ -35,8 +35,7 @@ class LoadPath:
     """A path of one indenter on one sensor; ``to`` goes on from the step before.
 
     pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth
-    depths : m, of the steps to come, as far as they are known
-    """
+    depths : m, of the steps to come, as far as they are known; friction : Coulomb's coefficient"""
 
     body: Body
     problem: FiniteStrainContact

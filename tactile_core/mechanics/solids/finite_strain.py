@@ -208,8 +208,8 @@ class Linearised:
     """A solid's equations at one state, cell by cell, pressure eliminated.
 
     residual : (n_cells, 81) N; condensed : the same after elimination of the pressure, with its own residual
-    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node); the last two arrays are for ``pressure_step``
-    """
+    stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
+    to_pressure, pressure_gap : (n_cells, 4, 81) Pa/m and (n_cells, 4) Pa, for ``pressure_step``"""
 
     solid: FiniteStrainSolid
     residual: np.ndarray

@@ -128,7 +128,8 @@ def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
 
 
 class _Search:
-    """State of the search: the presses that are fitted, the unit's numbers and the balls."""
+    """State of the search: the presses that are fitted, the unit's numbers and the balls.
+    radius : m, of balls for which none is given; progress : called with the steps done"""
 
     def __init__(
         self, start: Calibration, photographs: Photographs, radius: float, progress: Callable[[int], None]
@@ -213,7 +214,8 @@ class _Search:
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
         """Return standard errors by name, and the names of parameters that the photographs do not determine. How units
-        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR. factor : of pixels"""
+        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR.
+        factor : width of a fitted pixel, in pixels of the photographs"""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]

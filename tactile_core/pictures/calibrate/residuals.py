@@ -81,7 +81,8 @@ PRESS_STEP = 10e-3  # mm
 
 @dataclasses.dataclass(frozen=True)
 class _Lights:
-    """Radiance of a press: by LED and counted pixel (3, p); terms : the same times 1, right, down in mm (9, p)"""
+    """Radiance of a press. changes : (3, p), LED and counted pixel; terms : (9, p), the same times 1, right, down in
+    mm"""
 
     changes: np.ndarray
     terms: np.ndarray
