@@ -6,6 +6,7 @@ import ast
 import functools
 import graphlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -309,6 +310,33 @@ def test_all_that_is_public_has_a_docstring():
 def test_a_docstring_that_is_missing_is_found():
     code = "class Shown:\n    'A class.'\n    def bare(self): pass\nif True:\n    def also(): pass\ndef _own(): pass"
     assert undocumented(ast.parse(code), "m:") == ["m:Shown.bare", "m:also"]
+
+
+def unnamed_arrays(function: ast.AST) -> list[str]:
+    """Parameters of arrays or floats that a function's docstring neither names nor refers elsewhere for (see `...`)."""
+    if not isinstance(function, ast.FunctionDef) or not (doc := ast.get_docstring(function)):
+        return []
+    return [
+        f"line {function.lineno}, {function.name}: {each.arg}"
+        for each in ast.walk(function.args)
+        if isinstance(each, ast.arg) and each.annotation and not re.search(rf"\b{each.arg}\b|[Ss]ee\s+`", doc)
+        if re.search("ndarray|float|Tensor", ast.unparse(each.annotation))
+    ]
+
+
+def test_docstrings_name_their_arrays():
+    """Shapes without names, as in "the motion (n, 3) under forces (k, 3)", leave strangers to guess which is which."""
+    files = sources("tactile_core", "addon", "scripts", "scenes")
+    found = [
+        f"{path.relative_to(ROOT)} {each}" for path in files for node in nodes(path) for each in unnamed_arrays(node)
+    ]
+    assert found == [], "say in the docstring what each of these parameters is: meaning, shape, unit"
+
+
+def test_an_array_that_its_docstring_does_not_name_is_found():
+    code = "def f(x: np.ndarray, y: float | None, *z: Tensor):\n    'Add y.'"
+    assert unnamed_arrays(ast.parse(code).body[0]) == ["line 1, f: x", "line 1, f: z"]
+    assert unnamed_arrays(ast.parse(code.replace("Add y.", "As f, see `g`.")).body[0]) == []
 
 
 def lint(path: str, code: str) -> str:

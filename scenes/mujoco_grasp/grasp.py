@@ -54,13 +54,13 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def controls(seconds: float) -> dict[str, float]:
-    """Return the gripper's commands at a time: N of each finger, m of the lift."""
+    """Return the gripper's commands after `seconds`: N of each finger, m of the lift."""
     squeeze = np.interp(seconds, [0, 0.1, 0.5, 1.0, 1.9, 2.1], [1.0, 1.0, 1.5, 3.0, 3.0, -2.0])
     return {"close_left": squeeze, "close_right": squeeze, "lift": np.interp(seconds, [1.0, 1.6], [0.0, 0.05])}
 
 
 def run(seconds: float, sides: tuple[str, ...], *, scene_pictures: bool = False):  # noqa: ANN201
-    """Yield a dict a frame: time s, by side the observation and MuJoCo's force (3,) N, and a picture of the scene."""
+    """Yield a dict a frame for `seconds`: time s, by side the observation and MuJoCo's force (3,) N, and a picture."""
     model = mujoco.MjModel.from_xml_path(str(HERE / "grasp.xml"))
     data = mujoco.MjData(model)
     touches = {side: MujocoGel(model, f"gel_{side}", f"gel_{side}") for side in sides}
@@ -142,7 +142,7 @@ def sheet(frames: list[dict]) -> bytes:
 
 
 def speed(seconds: float) -> str:
-    """Steps of 1 ms a second of CPU time, without sensors and with one and two at 100 frames a second."""
+    """Return steps of 1 ms a second of CPU time, in `seconds` of grasp, without sensors and with one and two."""
     rows = []
     for sides in ((), SIDES[:1], SIDES):
         began = time.process_time()

@@ -215,7 +215,7 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
 
 
 def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
-    """Advise a scale at which a picture whose pixels see places (p,) m along axis name (x, z) lies inside nodes (n,)
+    """Advise a scale at which a picture, its pixels seen (p,) m along axis name ("x", "z"), lies inside nodes (n,)
     m."""
     room = 2e3 * min(seen.mean() - nodes[0], nodes[-1] - seen.mean())
     if room <= 0:

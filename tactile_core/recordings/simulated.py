@@ -48,9 +48,10 @@ def write_simulated(
     note: str,
     start_time: float = 0.0,
 ) -> Path:
-    """Write the file whole or not at all, and return its path; None is left out. Shapes and units: see the module.
-    made_by, note : texts, the program and what a reader must know. Raises TactileError: shapes that do not belong
-    together, counts outside 12 bits, displacements beyond +-16 mm."""
+    """Write the file whole or not at all, and return its path; None is left out.
+    time : (T,) s; electrodes : (T, 19), pdc, tac, tdc : (T,) counts, raw; start_time : unix s, 0 if unknown
+    made_by, note : texts, the program and what a reader must know
+    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
     path = Path(path)
     frames = len(time)
     _check_shape(path, "time", time, (frames,))

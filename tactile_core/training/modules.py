@@ -166,7 +166,7 @@ class MeshVae(Vae):
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
     def shape_loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute `loss` of latents (B, L) whose places are replaced by the true ones of the contacts ``rows`` (B,)."""
+        """Compute `loss` of latent (B, L), whose place is replaced by the true one of the contacts ``rows`` (B,)."""
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
