@@ -89,7 +89,8 @@ def requirements(python: str, platform: str) -> list[str]:
 
 
 def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool) -> str:
-    """The manifest with the platform, Blender versions and wheels of one zip, before its first table."""
+    """The manifest with the platform, Blender versions and wheels of one zip, before its first table. platform : None
+    for a zip without wheels; debian : for the Blender of Debian, of any version"""
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     if platform is None:
         return text
@@ -102,7 +103,7 @@ def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool
 
 
 def build(out: Path, platform: str | None, python: str, wheels: list[Path], debian: bool = False) -> Path:
-    """Write the zip as one piece; returns its path."""
+    """Write the zip as one piece; returns its path. Arguments as for ``manifest``"""
     text = manifest(platform, python, wheels, debian)
     version = re.search(r'(?m)^version = "(.+)"$', text).group(1)
     tag = f"-{platform}-py{python}{'-debian' * debian}" if platform else ""
@@ -120,7 +121,7 @@ def build(out: Path, platform: str | None, python: str, wheels: list[Path], debi
 
 
 def add(file: zipfile.ZipFile, name: str, content: bytes, how: int) -> None:
-    """Add one member, without the time of day or the builder's file modes."""
+    """Add one member, compressed by ``how``, without the time of day or the builder's file modes."""
     member = zipfile.ZipInfo(name, EPOCH)
     member.compress_type, member.external_attr = how, 0o644 << 16
     file.writestr(member, content)

@@ -128,7 +128,8 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
 
 
 def run_all(python: Path, commands: Iterable[list[str]], variables: dict[str, str]) -> int:
-    """Run modules of Python's, each whatever the others report; returns the status of the first that fails."""
+    """Run commands, modules of Python's, each whatever the others report; returns the status of the first that
+    fails."""
     failed = []
     for command in commands:
         say(" ".join(command))
@@ -191,9 +192,9 @@ def install(
 ) -> Path:
     """Make the virtual environment hold the project with these extras, or packages alone; returns its Python.
 
+    numpy : its version, None for that of constraints.txt
     A stamp remembers what is installed, so that this costs nothing when nothing has changed. What an earlier call
-    installed beyond the extras asked for stays.
-    """
+    installed beyond the extras asked for stays."""
     folder = Path(os.path.abspath(str(folder)))
     python = make_venv(folder)
     have = read_stamp(folder)
@@ -265,7 +266,8 @@ def why_unusable(python: Path, have: dict) -> str | None:
 
 
 def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> bool:
-    """Run pip, which says itself what it does; returns false where it failed."""
+    """Run pip to install ``what``; it says itself what it does; returns false where it failed. numpy : see
+    ``install``"""
     constraints = ROOT / "constraints.txt"
     if numpy:
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))

@@ -115,7 +115,7 @@ def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def _power(led: Led, gel: bpy.types.Object) -> float:
-    """Blender's power, W, of an LED's lamp."""
+    """Return Blender's power, W, of an LED's lamp in the scene of a gel."""
     return led.radiance * led.radius**2 * watts_per_brightness(gel.tactile.per_metre)
 
 

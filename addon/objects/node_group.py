@@ -12,7 +12,8 @@ class Nodes:
         self.tree = tree
 
     def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
-        """Add a node; links : sockets or values of its enabled inputs, in order, None for those left alone."""
+        """Add a node of a kind, Blender's type name; links : sockets or values of its enabled inputs, in order, None
+        for those left alone; settings : its properties."""
         node = self.tree.nodes.new(kind)
         for name, value in settings.items():
             setattr(node, name, value)
@@ -56,7 +57,8 @@ class NodeGroup(Nodes):
         return self.output("GeometryNodeStoreNamedAttribute", *stored, data_type=kind, domain="POINT")
 
     def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
-        """Add an input of the group that users change in the modifier; text : what it is; least : its lower limit"""
+        """Add an input of a kind ("Float", "Vector", ...) that users change in the modifier. text : what it is; value :
+        its default; least : its lower limit"""
         item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
         item.description = text
         if value is not None:

@@ -158,7 +158,7 @@ def _points(scene: bpy.types.Scene, frames: np.ndarray, values: dict, originals:
 
 
 def _same(points: list[dict], originals: list[dict]) -> bool:
-    """Return true if the points are those of the file, up to the rounding of float32 keyframes."""
+    """Return true if the points are ``originals``, those of the file, up to the rounding of float32 keyframes."""
     if len(points) != len(originals):
         return False
     found, wanted = ([list(point.values()) for point in each] for each in (points, originals))

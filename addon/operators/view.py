@@ -86,7 +86,7 @@ def look_again(context: bpy.types.Context, pictures_alone: bool = False) -> None
 
 
 def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window, pictures_alone: bool) -> None:
-    """Look once more at pictures and at what is selected, an indenter with its sensor."""
+    """Look once more at pictures and, unless ``pictures_alone``, at what is selected, an indenter with its sensor."""
     if window not in windows.windows[:]:
         return
     selected = [] if pictures_alone else bpy.context.selected_objects

@@ -118,7 +118,7 @@ def _claimed(folder: Path, options: argparse.Namespace) -> Path:
 
 
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Write a recording as a .blend."""
+    """Write the recording ``path`` as a .blend into a folder, by the command line's options."""
     _fresh()
     words = {
         "tare": options.tare,
@@ -136,7 +136,7 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
 
 
 def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Write a simulated scene as a .blend, its recording beside it."""
+    """Write the simulated scene ``path`` as a .blend, its recording beside it, into a folder, by options as given."""
     file = path / "scene.toml" if path.is_dir() else path
     _fresh()
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))
@@ -148,7 +148,7 @@ def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
 
 
 def render(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Render pictures of a .blend or a recording."""
+    """Render pictures of the .blend or recording ``path`` into a folder, by the command line's options."""
     if path.suffix.lower() != ".blend":
         options.pictures = True
         convert(path, folder, options)

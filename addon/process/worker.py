@@ -139,14 +139,14 @@ def _too_deep(depth: float, error: Any) -> str:
 
 
 def _at_frame(indenter: str, job: dict, k: int, found: str, expected: str, advice: str) -> Exception:
-    """A TactileError in the words of the scene: object and frame."""
+    """A TactileError in the words of the scene: the object ``indenter``, at frame job["first_frame"] + k."""
     from tactile_core.errors import TactileError
 
     return TactileError(f"{indenter}, frame {job['first_frame'] + k:g}", found, expected, advice)
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
-    """Return the same error in the words of the scene, where it is of a moment.
+    """Return the same error in the words of the scene in a folder, where it is of a moment.
     depths : m, by the scene's points, where heights were given in place of forces; else None"""
     from tactile_core.simulation.scene import load_scene
 

@@ -212,7 +212,7 @@ def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> 
 
 
 def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
-    """Return true if ``need()`` raises no TactileError; else its text is what the operator's grey button shows."""
+    """Return true if ``need()`` raises no TactileError; else its text is what the grey button of ``kind`` shows."""
     try:
         need()
     except TactileError as error:

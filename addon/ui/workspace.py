@@ -47,7 +47,8 @@ class TACTILE_OT_open_workspace(TactileOperator):
 def _arrange_once_open(
     windows: bpy.types.WindowManager, window: bpy.types.Window, made: bpy.types.WorkSpace, looks: list[int]
 ) -> float | None:
-    """Arrange a new workspace as soon as its window shows it; seconds to the next look, None when there is none."""
+    """Arrange a new workspace, ``made``, as soon as its window shows it; seconds to the next look, None when there is
+    none. looks : one number, of looks left, which is counted down"""
     looks[0] -= 1
     if window not in windows.windows[:] or not looks[0]:
         return None
@@ -83,7 +84,8 @@ def arrange(window: bpy.types.Window) -> None:
 
 
 def _split(window: bpy.types.Window, area: bpy.types.Area, direction: str, share: float, kind: str) -> bpy.types.Area:
-    """Split an area at a share from its left or lower end; the smaller part, which is new, of a kind."""
+    """Split an area, "VERTICAL" or "HORIZONTAL", at a share from its left or lower end; the smaller part gets a
+    kind."""
     before = {*window.screen.areas}
     with bpy.context.temp_override(window=window, screen=window.screen, area=area):
         bpy.ops.screen.area_split(direction=direction, factor=share)

@@ -184,7 +184,8 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """Row of a preset's CPU ms a frame on one thread: median over heights (H, W) m of the best of a few calls."""
+    """Row of the preset ``name``'s CPU ms a frame on one thread: median over heights (H, W) m of the best of some
+    calls."""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
     slow = name == REFERENCE.name

@@ -57,7 +57,8 @@ def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
-    """Measure the reference, whose error is its noise: half of the squared difference between two seeds."""
+    """Measure the reference, whose error is its noise: half of the squared difference between two seeds. heights : (H,
+    W) m of each field; truth : file for its pictures"""
     import time
 
     preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE

@@ -57,7 +57,7 @@ def flat_scene() -> str:
 
 
 def pairs_of(scene: str, count: int) -> Pairs:
-    """Draw contacts of a scene's text, by the fast tier on both sensors."""
+    """Draw contacts of ``count`` presses of a scene, its text, by the fast tier on both sensors."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(scene, encoding="utf-8")

@@ -75,7 +75,8 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
 
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
-    """Measure a grip's unexplained changes with rest taken in the grip; baseline: with the unit's own rest, none."""
+    """Measure the unexplained changes of grips ``held``, (file, trial), with rest taken in the grip; baseline: of
+    ``known`` signals, with the unit's own rest, none."""
     loaded = [Preparer()(recordings.read(one)) for one, _ in held]
     of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
     return row("grip_unexplained", unexplained(loaded), "1", 0.9, baseline=unexplained(known), of=of, at_least=True)

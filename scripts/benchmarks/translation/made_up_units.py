@@ -168,8 +168,8 @@ TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | 
 def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
     """Medians over contacts of units given, found and taken as typical, beside those of equally many typical units.
 
-    found : by the recording itself, its rest and contacts, as `tactile convert` does; stiffness cannot be
-    """
+    units, presses : how many, and on each; found : by the recording itself, its rest and contacts, as `tactile convert`
+        does; stiffness cannot be"""
     drawn = [unit_of(number) for number in range(units)]
     made, typical = ([played(*each, presses) for each in enumerate(every)] for every in (drawn, [Unit()] * units))
     beside = _errors(network, typical, "unknown")

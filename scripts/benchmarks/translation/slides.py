@@ -56,11 +56,12 @@ class Slide:
 def rows(
     folder: str | os.PathLike, translate: Callable[[Recording], Translation], most: int | None = None
 ) -> list[Row]:
-    """Rows of a folder's recordings kept for reporting that have wrench and pose beside them, the first `most` or all.
+    """Rows of a folder's recordings kept for reporting that have wrench and pose beside them, the first ``most`` or
+    all.
 
+    translate : from a recording to its translation
     Baselines: the electrodes' sum; of places their centroid, weighted by the squares. Raises TactileError for a folder
-    without such recordings, and for one that cannot be read.
-    """
+    without such recordings, and for one that cannot be read."""
     whole = [path for path in reporting(folder)[:most] if all(beside(path, each).exists() for each in (WRENCH, POSE))]
     if not whole:
         raise TactileError(folder, "none with its _cw.csv and _cp.csv", "at least one", "Copy them beside it")

@@ -61,8 +61,8 @@ class ThinSheet:
     def unresolved(self, refine: int) -> np.ndarray:
         """Return each electrode's error of resistance on this grid against a refined one, (k,) ohm at 1 m and 1 S/m.
 
-        Near an electrode the film has nearly one thickness h: the error there is this value over sigma h.
-        """
+        Near an electrode the film has nearly one thickness h: the error there is this value over sigma h. refine : how
+        often the finer grid cuts each triangle into four"""
         film = np.ones(len(self.given[0]))
         miss = ThinSheet(*self.given, refine).potentials(film) - self.potentials(film)
         elsewhere = miss[~np.eye(len(miss), dtype=bool)]  # one constant, from the node where the current leaves
