@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import TactileError
-from ..sensors import SAMPLE_RATE, SOURCE, describe, electrode_count, title
+from ..sensors import COUNT_MAX, SAMPLE_RATE, SOURCE, describe, electrode_count, title, typical_rest
 from ..sensors.descriptor import names as known_sensors
 from ..sensors.fluid_sensor import Fluid
 from .electrode_faults import without_absent
@@ -26,9 +26,11 @@ MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no m
 LOOKED_AT = 10_000  # rows, by which fingers that take turns are found
 MOST_FINGERS = 5
 TURNS = 5  # times the change in a whole turn, the change to the next row (assumed; without turns it is the smaller)
-# Of a reading, times TURNS 38 counts at rest (assumed: rows change by 5 counts and less, mains hum of 50 Hz at 100 Hz
-# swings by some 20 from row to row, units rest 50 apart and more).
-NOISE = 2.5e-3
+# Of a reading, times TURNS 10 counts at rest, beside what all electrodes move alike, as by hum of the mains (assumed: rows
+# change by 5 counts and less; median differences of 6 real units' rests, without their mean, are 21 and more).
+NOISE = 6e-4
+MIRRORED = -0.5  # correlation with a typical unit's rest over electrodes: .7 to .99 in 6 real units (assumed limit)
+LEAST_MIRRORED = 300.0  # counts that nine in ten electrodes exceed, which changes do not (assumed; real units 400)
 RAW = 0.3  # share of their median that nine in ten raw readings exceed (assumed); changes lie on both sides of 0
 SHOWN = 8  # problems spelled out one by one; more are counted
 
@@ -117,8 +119,11 @@ def assemble(
         stamps = np.arange(frames) / SAMPLE_RATE
         notes += [] if snapshots else [f"{os.path.basename(path)}: no time stamps; {SAMPLE_RATE:g} Hz assumed"]
     _check_share(path, np.any(bad, axis=1), problems, row_word)
+    readings = electrodes[:LOOKED_AT][np.isfinite(electrodes[:LOOKED_AT]).all(axis=1)]
+    if len(readings):
+        _refuse_mirrored(path, np.median(readings, axis=0), sensor)
     if not snapshots:
-        _refuse_turns(path, electrodes[:LOOKED_AT])
+        _refuse_turns(path, readings)
     seconds, start, jumps, of_clock = clock_of(stamps, rows, row_word)
     clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
@@ -140,17 +145,33 @@ def assemble(
     )
 
 
-def _refuse_turns(path: str, electrodes: np.ndarray) -> None:
-    """Raise TactileError where fingers take turns: a row of electrodes (T, e) is like one some rows before, and unlike
+def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
+    """Raise TactileError where electrodes rest at levels (e,) that are low where a unit's are high."""
+    typical = typical_rest(sensor)
+    if typical is None or np.quantile(levels, 0.1) < LEAST_MIRRORED or np.median(levels) > COUNT_MAX / 2:
+        return
+    off, usual = levels - levels.mean(), typical - typical.mean()
+    if off @ usual < MIRRORED * np.sqrt(off @ off * (usual @ usual)):
+        found = f"levels of {levels.min():.0f} to {levels.max():.0f} counts, low where a unit's are high"
+        expected = f"{typical.min():.0f} to {typical.max():.0f} as of a typical unit"
+        advice = f"The file seems to hold {COUNT_MAX:g} - counts: subtract its electrodes from {COUNT_MAX:g}"
+        raise TactileError(f"{path}, electrodes", found, expected, advice)
+
+
+def _refuse_turns(path: str, readings: np.ndarray) -> None:
+    """Raise TactileError where fingers take turns: a row of readings (T, e) is like one some rows before, and unlike
     the one before. Changes are not judged: all fingers rest at 0, and any hum would stand out."""
+    if len(readings) < TURNS * MOST_FINGERS:
+        return
+    low, level = np.quantile(readings, [0.1, 0.5])
+    if low <= RAW * level:
+        return
+    apart = readings - readings.mean(axis=1, keepdims=True)
 
     def change(rows: int) -> float:
         """Return the median change of an electrode in so many rows."""
-        return float(np.nanmedian(np.abs(electrodes[rows:] - electrodes[:-rows])))
+        return float(np.median(np.abs(apart[rows:] - apart[:-rows])))
 
-    low, level = np.nanquantile(electrodes, [0.1, 0.5])
-    if len(electrodes) < TURNS * MOST_FINGERS or low <= RAW * level:
-        return
     for count in range(2, MOST_FINGERS + 1):
         if change(1) > TURNS * max(change(count), NOISE * level):
             found = f"rows of {count} fingers take turns: each is like that {count} rows before, unlike the one before"

@@ -22,6 +22,7 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.opened_file import opened
 from tactile_core.recordings.tables import column_map
 from tactile_core.recordings.tables.mapped_files import guess_map
+from tactile_core.sensors import REST_COUNTS
 
 NAMES = ["pdc_raw", *(f"E{i}" for i in range(1, 20))]
 START = 1_352_394_723.123
@@ -199,7 +200,7 @@ def test_fingers_that_take_turns_are_not_mixed(by_value, press, tmp_path):
 
 @pytest.mark.parametrize("fingers", [2, 5])
 def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp_path):
-    apart = 50 * np.arange(fingers)[:, None]  # counts; units rest 52 and more apart
+    apart = np.outer(np.arange(fingers), np.linspace(10, 100, 19))  # counts; units rest 52 and more apart
     rows = (press.electrodes[:, None] + apart).reshape(-1, 19)
     np.savez(tmp_path / "a.npz", electrodes=rows, time=np.arange(len(rows)) / (100 * fingers))
     with pytest.raises(TactileError, match=rf"rows of {fingers} fingers take turns.*Split the file: a file for each"):
@@ -207,17 +208,28 @@ def test_fingers_that_take_turns_are_found_by_their_readings(fingers, press, tmp
 
 
 def test_grasps_that_alternate_are_no_turns_of_fingers(press):
-    rows = press.electrodes + 100 * (np.arange(len(press.time)) % 2)[:, None]
+    rows = press.electrodes + np.outer(np.arange(len(press.time)) % 2, np.linspace(10, 100, 19))
     assert len(assemble("a.csv", "grasps", electrodes=rows, stamps=None, snapshots=True)) == len(rows)
     with pytest.raises(TactileError, match="2 fingers take turns"):
         assemble("a.csv", "frames", electrodes=rows, stamps=None)
 
 
 @pytest.mark.parametrize("tared", [False, True])
-def test_hum_at_half_the_rate_is_no_second_finger(tared, press, tmp_path):
-    hum = 10 * (-1) ** np.arange(len(press.time))  # counts: 50 Hz of the mains at 100 Hz
+@pytest.mark.parametrize("hertz", [50, 60])
+def test_hum_of_the_mains_is_no_second_finger(hertz, tared, press, tmp_path):
+    hum = 60 * np.sin(2 * np.pi * hertz * press.time + 1)  # counts
     rest = press.electrodes[0] if tared else 0
-    np.savez(tmp_path / "a.npz", electrodes=press.electrodes - rest + hum[:, None], time=press.time)
+    hum = np.outer(hum, 1 + 0.1 * np.cos(np.arange(19)))  # electrodes differ a little
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes - rest + hum, time=press.time)
+    assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
+
+
+def test_counts_that_are_mirrored_are_refused(press, tmp_path):
+    counts = REST_COUNTS + press.electrodes - press.electrodes[0]
+    np.savez(tmp_path / "a.npz", electrodes=4095 - counts, time=press.time)
+    with pytest.raises(TactileError, match=r"a.npz, electrodes: levels .* seems to hold 4095 - counts: subtract"):
+        recordings.read(tmp_path / "a.npz")
+    np.savez(tmp_path / "a.npz", electrodes=counts / 4, time=press.time)  # counts of 10 bit lie there too
     assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
 
 
