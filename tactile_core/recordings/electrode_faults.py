@@ -41,7 +41,8 @@ def without_absent(
     Returns the electrodes, a mask (e,) of the filled ones, and a sentence on them. Raises TactileError where half of
     them are missing."""
     unread = ~np.isfinite(electrodes)
-    absent = np.array([not name for name in names]) | (unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES))
+    empty = unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES) & ~unread.all()  # where all are, rows are to blame
+    absent = np.array([not name for name in names]) | empty
     if not absent.any():
         return electrodes, absent, []
     named = named_electrodes(absent)

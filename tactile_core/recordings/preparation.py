@@ -182,7 +182,8 @@ def _counts_per_unit(
         return float(options.counts_per_unit)
     if kind == "raw" and (found := full_scale(readings)):
         warnings.append(
-            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else)"
+            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else: 1000 where "
+            "3.315 stands for 3,315)"
         )
         return found[0]
     if kind != "scaled":

@@ -65,9 +65,19 @@ def test_a_bad_cell_is_one_flagged_frame_named_by_line_and_field(cell, press, sl
     assert recordings.prepare(recording).electrodes[39, 2] == pytest.approx(expected)
 
 
-def test_decimal_commas_are_named_where_commas_separate(slide_lines, write):
-    lines = [slide_lines[0], *(line.replace(",2000,", ',"2000,5",', 1) for line in slide_lines[1:])]
-    with pytest.raises(TactileError, match="a number with a decimal comma, where a point is expected"):
+@pytest.mark.parametrize(
+    ("cell", "found"),
+    [
+        ('"2000,5"', "'2000,5' is a number with a decimal comma, where a point is expected"),
+        ('"2,000"', "'2,000' is a number with thousands separators or a decimal comma"),
+        ("2 000", "'2 000' is a number with thousands separators"),
+        ("2'000", '"2\'000" is a number with thousands separators'),
+        ("2,000", r"row: .* cells where the header has .* \(commas within numbers\?\); .* rows are bad"),
+    ],
+)
+def test_commas_in_numbers_are_named_where_commas_separate(cell, found, slide_lines, write):
+    lines = [slide_lines[0], *(line.replace(",2000,", f",{cell},", 1) for line in slide_lines[1:])]
+    with pytest.raises(TactileError, match=f"line 2, .*{found}"):
         recordings.read(write(lines))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import islice, pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from .table_header import COMMENTS, SPACE, Header, split
 from .truncated_cell import shown
 
 LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
+THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:([,.'’_\s])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
 MAX_BLANK = 8  # blank lines that a message names
 
 
@@ -55,7 +57,7 @@ def _bad_row(
 ) -> list[float]:
     width = len(names)
     if len(cells) > width:
-        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width}"))
+        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width} (commas within numbers?)"))
         return [np.nan] * width
     if len(cells) < width:  # the last cell that is there may be cut in its middle
         problems.append(Problem(frame, line_number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))
@@ -73,8 +75,10 @@ def _bad_row(
 
 
 def no_number(cell: str) -> str:
-    """Describe a cell that is no number; for a decimal comma, advise another setting of the export."""
+    """Describe a cell that is no number, a decimal comma or thousands separators by name."""
     comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
+    if THOUSANDS.fullmatch(cell):
+        return f"{shown(cell)} is a number with thousands separators{' or a decimal comma' * comma}"
     is_what = "a number with a decimal comma, where a point is expected" if comma else "not a number"
     return f"{shown(cell)} is {is_what}"
 

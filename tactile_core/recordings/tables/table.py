@@ -75,10 +75,10 @@ class Table:
         words, values : its distinct texts, and (T,) float, their indices"""
         found, told = words.values(values), [word for word in words if word.lower() not in MISSING]
         if told and not np.isfinite(found).any():
-            expected = "numbers, or times as 2012-11-08 17:12:03.45"
-            advice = "Leave the column out in a map: tactile info FILE --columns map.toml writes one"
-            held = no_number(told[0])
-            raise TactileError(f"{self.path}, column {name!r}", held, expected, advice)
+            expected = "numbers as 3315 or 3.315, or times as 2012-11-08 17:12:03.45"
+            advice = "Export them so, or leave the column out in a map: tactile info FILE --columns map.toml writes one"
+            line = self.lines[(words.texts(values) == told[0]).argmax()]
+            raise TactileError(f"{self.path}, line {line}, column {name!r}", no_number(told[0]), expected, advice)
         return found
 
     def labels(self, used: Collection[str]) -> dict[str, np.ndarray]:
