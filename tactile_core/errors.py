@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import os
+from typing import Any
 
 MOST = 800  # characters of what was found that a message quotes; a library's own may hold a whole line of the file
 _HEAD, _TAIL = 600, 150
@@ -35,3 +37,16 @@ class TactileError(Exception):
         if self.advice:
             text += f". {self.advice}"
         return text
+
+
+def finite_number(
+    value: Any, where: str, expected: str, least: float = -math.inf, most: float = math.inf, advice: str = ""
+) -> float:
+    """Return a value as a float; raises TactileError unless it is a finite number from ``least`` to ``most``."""
+    try:
+        number = math.nan if isinstance(value, str) else float(value)
+    except (TypeError, ValueError):
+        number = math.nan
+    if not (math.isfinite(number) and least <= number <= most):
+        raise TactileError(where, f"{value!r:.80}", expected, advice)
+    return number

@@ -1,8 +1,11 @@
 """The error type: one sentence, and the same one after a trip between processes."""
 
 import copy
+import math
 
-from tactile_core.errors import TactileError
+import pytest
+
+from tactile_core.errors import TactileError, finite_number
 
 
 def test_sentence_names_where_found_expected_and_advice():
@@ -22,3 +25,10 @@ def test_a_message_quotes_a_long_finding_in_part():
     assert "begins" in str(error) and "ends; expected a triangle mesh. Export it again" in str(error)
     assert len(str(error)) < 1000
     assert len(error.found) == 5010
+
+
+@pytest.mark.parametrize("value", [None, "1", [1, 2], math.nan, math.inf, 3, -1])
+def test_what_is_no_number_of_a_range_is_refused(value):
+    with pytest.raises(TactileError, match=r"Gel, force: .*; expected 0 to 2 N. Lift it"):
+        finite_number(value, "Gel, force", "0 to 2 N", 0.0, 2.0, "Lift it")
+    assert finite_number(2, "Gel, force", "0 to 2 N", 0.0, 2.0) == 2.0

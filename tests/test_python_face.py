@@ -143,8 +143,22 @@ def test_an_unknown_preset_is_refused_before_mitsuba_is_looked_for(monkeypatch):
         tactile.Renderer(preset="best")
 
 
-def test_a_file_of_a_calibration_is_loaded_first_and_then_drawn_by():
+def test_a_calibration_may_be_named_by_its_file():
     file = ROOT / "scenes" / "calibrations" / "gelsight_mini_dots.toml"
-    assert tactile.Renderer(tactile.load_calibration(file), "fast").calibration.markers is not None
-    with pytest.raises(tactile.TactileError, match=r"expected a Calibration.*tactile\.load_calibration"):
-        tactile.Renderer(str(file), "fast")
+    assert tactile.Renderer(str(file), "fast").calibration == tactile.load_calibration(file)
+    ball = tactile.indenters.Sphere(3e-3)
+    assert tactile.Gel("gelsight_mini", ball, calibration=file).picture().shape == (240, 320, 3)
+    for made in (
+        lambda given: tactile.Renderer(given, "fast"),
+        lambda given: tactile.Gel("digit", ball, calibration=given),
+    ):
+        with pytest.raises(tactile.TactileError, match=r"calibration: 3; expected a Calibration, or its file"):
+            made(3)
+        with pytest.raises(tactile.TactileError, match=r"no.toml: cannot be read"):
+            made("no.toml")
+
+
+@pytest.mark.parametrize("given", [["a.csv", "b.csv"], None, np.zeros((4, 19))])
+def test_what_is_no_name_of_a_file_is_refused(given):
+    with pytest.raises(tactile.TactileError, match=r"read, path: a .*; expected a file's name"):
+        tactile.read(given)

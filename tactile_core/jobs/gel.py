@@ -11,13 +11,14 @@ import dataclasses
 import functools
 import itertools
 import logging
+import os
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from .. import sensors
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..files.installed import require
 from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..mechanics.fast.active_set import UnsolvedError, Work
@@ -30,8 +31,8 @@ from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
-from ..sensors.calibration_file import load_calibration
-from .gel_contact import PUSH, GelContact, given, matrix_of, not_negative, too_far
+from ..sensors.calibration_file import calibration_of, load_calibration
+from .gel_contact import PUSH, GelContact, given, matrix_of, too_far
 
 _log = logging.getLogger(__name__)
 _NO_FORCE = 1e-5  # N, the weight of 1 mg: less is lost in rounding
@@ -57,7 +58,7 @@ class Gel:
     sensor : name of a sensor, such as "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
     friction : Coulomb's coefficient; 0 for none
-    calibration : the camera and its lights, of ``load_calibration``; None for the one that ships
+    calibration : the camera and its lights, of ``load_calibration``, or their file; None for the one that ships
     preset : of the pictures
     Raises TactileError for another sensor, and for meshes and values that no indenter can have; ModuleNotFoundError
     without the extra [fem], and without [render] for presets other than ``fast``.
@@ -65,7 +66,7 @@ class Gel:
 
     def __init__(
         self, sensor: str = sensors.TARGET, indenter: Any = None, *,
-        friction: float = FRICTION, calibration: Calibration | None = None, preset: str = FAST,
+        friction: float = FRICTION, calibration: Calibration | str | os.PathLike[str] | None = None, preset: str = FAST,
     ) -> None:  # fmt: skip
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
@@ -73,13 +74,13 @@ class Gel:
         if preset != FAST:
             require("render", "mitsuba")
         self.sensor, self.preset = sensor, preset
-        self.friction = not_negative(friction, "Gel, friction", "a coefficient of zero or more")
+        self.friction = finite_number(friction, "Gel, friction", "a coefficient of zero or more", 0.0)
         self.indenter: Indenter = as_indenter(indenter)
         self.surface = sensors.sensor_surface(sensor)
-        if calibration is not None and calibration.camera.sensor != sensor:
-            found = f"of a {sensors.title(calibration.camera.sensor)}"
+        self._calibration = None if calibration is None else calibration_of(calibration, "Gel, calibration")
+        if self._calibration is not None and self._calibration.camera.sensor != sensor:
+            found = f"of a {sensors.title(self._calibration.camera.sensor)}"
             raise TactileError("Gel, calibration", found, f"one of a {sensors.title(sensor)}")
-        self._calibration = calibration
         self.reset()
 
     def __repr__(self) -> str:
@@ -174,6 +175,7 @@ class Gel:
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
         x, z : m, place of its origin in the sensor's frame. Raises TactileError where it misses the sensor."""
+        x, z, depth = (finite_number(each, "Gel.touching", "x, z and depth in m", -1.0, 1.0) for each in (x, z, depth))
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
         return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))

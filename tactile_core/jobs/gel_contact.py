@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..files.short_text import Summary
 from ..geometry.indenters import Pose
 from ..mechanics.force_search import MOST_FORCE
@@ -70,22 +70,11 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
     """Check the pose of an indenter and its force, N, or None. Raises TactileError for an invalid pose or force."""
     if force is not None:
-        force = not_negative(force, "Gel, force", "newtons, zero or more, and finite")
+        force = finite_number(force, "Gel, force", "newtons, zero or more, and finite", 0.0)
         if force > MOST_FORCE:
             found = f"at most {MOST_FORCE:g} N, more than a plate bears at the greatest depth"
             raise TactileError("Gel, force", f"{force:g} N", found, "Press less, or to a pose")
     return Pose(*_rigid(pose), PUSH), force
-
-
-def not_negative(value: Any, where: str, expected: str) -> float:
-    """Return the value as a float; TactileError unless it is a finite number from 0, as expected says in words."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = np.nan
-    if not (np.isfinite(number) and number >= 0):
-        raise TactileError(where, repr(value), expected)
-    return number
 
 
 def matrix_of(pose: Pose) -> np.ndarray:

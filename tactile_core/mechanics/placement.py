@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 
 from .. import sensors
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..geometry.cubic_spline import on_grid
 from ..geometry.indenters import Indenter, Pose, pose_on
 from ..geometry.lattice import Lattice
@@ -225,9 +225,12 @@ class Placement:
     tilt_heading: float = 0.0
 
     def __post_init__(self) -> None:
-        if not abs(self.tilt) <= MOST_TILT:  # nan, too
-            expected = f"-{MOST_TILT} to {MOST_TILT} rad, some 45 degrees"
-            raise TactileError("Placement, tilt", f"{self.tilt:g} rad", expected, "Convert degrees: math.radians(20)")
+        for name, unit in {"x": "m", "z": "m", "tilt_heading": "rad"}.items():
+            finite_number(getattr(self, name), f"Placement, {name}", f"a finite number, {unit}")
+        expected = f"-{MOST_TILT} to {MOST_TILT} rad, some 45 degrees"
+        finite_number(
+            self.tilt, "Placement, tilt", expected, -MOST_TILT, MOST_TILT, "Convert degrees: math.radians(20)"
+        )
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from .. import sensors
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..files.installed import needing
 from ..geometry.indenters import Indenter, Pose, as_indenter
 from . import error_estimate
@@ -78,8 +78,7 @@ def solve_path(
     """
     if tier not in TIERS:
         raise TactileError("solve, tier", repr(tier), "fast, full or reference")
-    if not (np.isfinite(friction) and friction >= 0):
-        raise TactileError("solve, friction", repr(friction), "a coefficient of zero or more")
+    friction = finite_number(friction, "solve, friction", "a coefficient of zero or more", 0.0)
     indenter = as_indenter(indenter)
     pose = place if isinstance(place, Pose) else _first_touch(sensor, indenter, place)
     thick = thickness_under(sensor, indenter, pose)
@@ -117,8 +116,7 @@ def _check(step: Step, limit: float) -> None:
     name, value, unit = ("depth", step.depth, "m") if step.force is None else ("force", step.force, "N")
     if value is None or None not in (step.depth, step.force):
         raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
-    if not (np.isfinite(value) and value >= 0):
-        raise TactileError(f"solve, {name}", f"{value!r} {unit}", "zero or more, and finite")
+    finite_number(value, f"solve, {name}", f"{unit}, zero or more, and finite", 0.0)
     if step.force is not None and 0 < step.force < _LIGHTEST:
         raise TactileError("solve, force", f"{step.force:g} N", f"0, or at least {_LIGHTEST:g} N", "Press more")
     if step.force is not None and step.force > MOST_FORCE:

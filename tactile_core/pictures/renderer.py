@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ from ..errors import TactileError
 from ..files.compiled import Loop, available
 from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
-from ..sensors.calibration_file import load_calibration
+from ..sensors.calibration_file import calibration_of
 from ..sensors.camera import COLOURS
 from .background import correction, raised_light, resting_picture
 from .camera_curve import bent, ends
@@ -38,10 +39,11 @@ MOST_BELOW = 1.4e-3
 class Renderer:
     """Camera pictures of one DIGIT by one preset; the scene and the picture at rest are made once.
 
-    calibration : the unit's camera and lights, of ``load_calibration``; None for the unit that ships
+    calibration : the unit's camera and lights, of ``load_calibration``, or their file; None for the unit that ships
     preset : ``fast`` (numpy alone, 8 ms a picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
     variant : Mitsuba's, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here; unused by ``fast``
-    background : (H, W, 3) picture of the undeformed gel, levels 0 to 255; None for the calibration's
+    background : (H, W, 3) picture of the undeformed gel, levels 0 to 255 of red, green, blue (of OpenCV's blue, green,
+        red give ``picture[..., ::-1]``); None for the calibration's
     rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome is then applied to heights
     seed : seed of ``reference``'s random samples; the other presets draw none
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
@@ -53,7 +55,7 @@ class Renderer:
 
     def __init__(
         self,
-        calibration: Calibration | None = None,
+        calibration: Calibration | str | os.PathLike[str] | None = None,
         preset: str = DEFAULT,
         variant: str | None = None,
         background: np.ndarray | None = None,
@@ -61,10 +63,7 @@ class Renderer:
         seed: int = 0,
         surroundings: Surroundings = NOTHING,
     ) -> None:
-        calibration = load_calibration() if calibration is None else calibration
-        if not isinstance(calibration, Calibration):
-            advice = "Read a file with tactile.load_calibration(path)"
-            raise TactileError("Renderer, calibration", f"{calibration!r:.80}", "a Calibration", advice)
+        calibration = calibration_of(calibration, "Renderer, calibration")
         self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
@@ -89,8 +88,11 @@ class Renderer:
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
         self.rest_radiance = self._spread_radiance(resting)
         self.dots = None if calibration.markers is None else MarkerField(calibration)
-        background = resting_picture(calibration, self.rest_radiance) if background is None else background
-        self.background = camera_array(background, (*self.camera.shape, 3), "background")
+        given = resting_picture(calibration, self.rest_radiance) if background is None else background
+        self.background = camera_array(given, (*self.camera.shape, 3), "background")
+        if background is not None and not (self.background.min() >= 0 and 1 < self.background.max() <= LARGEST_LEVEL):
+            found = f"values from {self.background.min():g} to {self.background.max():g}"
+            raise TactileError("background", found, "levels 0 to 255", "Multiply shares of 1 by 255")
         self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)

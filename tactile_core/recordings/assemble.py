@@ -26,8 +26,8 @@ MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no m
 LOOKED_AT = 10_000  # rows, by which fingers that take turns are found
 MOST_FINGERS = 5
 TURNS = 5  # times the change in a whole turn, the change to the next row (assumed; without turns it is the smaller)
-# Of a reading, times TURNS 10 counts at rest, beside what all electrodes move alike, as by hum of the mains (assumed: rows
-# change by 5 counts and less; median differences of 6 real units' rests, without their mean, are 21 and more).
+# Of a reading, times TURNS 10 counts at rest, beside what all electrodes move alike, as by hum of the mains (assumed:
+# rows change by 5 counts and less; median differences of real units' rests, without their mean, are 21 and more).
 NOISE = 6e-4
 MIRRORED = -0.5  # correlation with a typical unit's rest over electrodes: .7 to .99 in 6 real units (assumed limit)
 LEAST_MIRRORED = 300.0  # counts that nine in ten electrodes exceed, which changes do not (assumed; real units 400)

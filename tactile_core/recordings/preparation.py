@@ -182,8 +182,8 @@ def _counts_per_unit(
         return float(options.counts_per_unit)
     if kind == "raw" and (found := full_scale(readings)):
         warnings.append(
-            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else: 1000 where "
-            "3.315 stands for 3,315)"
+            f"electrodes are taken as {found[1]}: {found[0]:.5g} counts a unit (--counts-per-unit says else: 1000 "
+            "where 3.315 stands for 3,315)"
         )
         return found[0]
     if kind != "scaled":
@@ -244,7 +244,8 @@ def _is_loaded(
     """Return true, and add a warning, if the calm level of a raw recording looks like that of a grip."""
     if kind != "raw" or options.tare is not None or options.rest is not None:
         return False
-    share = as_contact(rest.at(np.array([quiet.parts[-1][0]]))[0], recording.sensor)
+    level_there = rest.at(np.array([quiet.parts[-1][0]]))[0]
+    share = as_contact(level_there, recording.sensor, [recording.electrodes])
     if share is not None:
         warnings.append(Doubt(Reason.REST_LOADED, share=share))
     return share is not None

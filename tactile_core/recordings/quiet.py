@@ -229,7 +229,7 @@ def tare_frames(asked: slice | str, count: int) -> slice:
     if isinstance(asked, slice):
         tare = asked
     else:
-        ends = asked.split(":")
+        ends = asked.split(":") if isinstance(asked, str) else []
         try:
             tare = slice(*(int(end) if end.strip() else None for end in ends))
         except (ValueError, TypeError):

@@ -65,8 +65,13 @@ def read(
     >>> recording = tactile.read("touch.csv")
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
+    if not isinstance(path, str | os.PathLike):
+        advice = "numpy.savez writes arrays to one"
+        raise TactileError("read, path", f"a {type(path).__name__}", "a file's name", advice)
     path = os.fspath(path)
     columns = read_map(columns) if isinstance(columns, str | os.PathLike) else columns
+    if not isinstance(columns, ColumnMap | None):
+        raise TactileError("read, columns", f"a {type(columns).__name__}", "the name of a map's file", MAP_ADVICE)
     found = _read(path, columns, sensor, lean)
     if found.sensor != sensor:
         check_electrodes(path, found.electrodes.shape[1], f"a {title(found.sensor)}'s recording", sensor)
@@ -235,6 +240,11 @@ def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0], default=(0.0, formats))
     if best < RECOGNISED:
+        if own := next((key for key in keys if key.startswith("format=tactile-")), ""):
+            advice = (
+                "`tactile render` and `tactile convert --reverse` take what `tactile convert` wrote, h5py its numbers"
+            )
+            raise TactileError(path, f"a result of this toolkit, {own}", "a recording", advice)
         held = ", ".join(list(keys)[:6] if container == "csv" else sorted(keys)[:6])
         word = {"csv": "columns", "json": "fields"}.get(container, "arrays")
         known = " | ".join(layout.NAME for _, layout in scored) or "the names that a map gives them"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..sensors import SOURCE, divider, typical_rest
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import POLARITIES, Fluid
@@ -72,12 +72,13 @@ class PrepareOptions:
         """Raise TactileError for options that suit no recording; `tare` can only be checked against a recording."""
         if self.kind is not None and self.kind not in KINDS:
             raise TactileError("option kind", repr(self.kind), ", ".join(KINDS))
-        if self.counts_per_unit is not None and not 0 < self.counts_per_unit < 1e9:
-            raise TactileError("option counts_per_unit", f"{self.counts_per_unit:g}", "counts a unit, above 0")
-        if self.smooth is not None and not (1 <= self.smooth <= LONGEST and self.smooth % 2):
-            raise TactileError("option smooth", f"{self.smooth} frames", f"an odd number from 1 to {LONGEST}")
-        if self.film is not None and not film.LEAST <= self.film <= film.MOST:
-            raise TactileError("option film", f"{self.film:g}", f"{film.LEAST:g} to {film.MOST:g} of a typical unit's")
+        if self.counts_per_unit is not None:
+            finite_number(self.counts_per_unit, "option counts_per_unit", "counts a unit, above 0", 1e-9, 1e9)
+        if self.smooth is not None and self.smooth not in range(1, LONGEST + 1, 2):
+            raise TactileError("option smooth", f"{self.smooth!r} frames", f"an odd number from 1 to {LONGEST}")
+        if self.film is not None:
+            expected = f"{film.LEAST:g} to {film.MOST:g} of a typical unit's"
+            finite_number(self.film, "option film", expected, film.LEAST, film.MOST)
         if self.polarity not in (AUTO, *POLARITIES):
             raise TactileError("option polarity", repr(self.polarity), ", ".join((AUTO, *POLARITIES)))
 

@@ -50,6 +50,15 @@ def load_calibration(
     return found
 
 
+def calibration_of(given: Calibration | str | os.PathLike | None, where: str) -> Calibration:
+    """Return a calibration, that of a file, or for None the shipped one. Raises TactileError naming ``where``."""
+    if isinstance(given, str | os.PathLike | None):
+        return load_calibration(given)
+    if not isinstance(given, Calibration):
+        raise TactileError(where, f"{given!r:.80}", "a Calibration, or its file", "tactile.load_calibration reads one")
+    return given
+
+
 def calibration_path(sensor: str) -> Path:
     """Return the file of the calibration that a gel's descriptor names. Raises TactileError where it names none."""
     gel = of_kind(sensor, GelSensor)

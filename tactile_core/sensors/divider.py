@@ -19,7 +19,7 @@ _LEAST_LEFT = 0.05  # least share of a film that remains: the laws hold for no t
 _ENDS = 0.4, COUNT_MAX - 0.4  # counts that round to the converter's ends, where the impedance is unknown
 # Counts at rest that are converted; real ones are 3,010 to 3,670 (two units, PHAC). The noise of a dead or saturated
 # electrode, which rests elsewhere, would be amplified without limit.
-_RESTS = 500.0, 3750.0
+RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
@@ -45,7 +45,7 @@ def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) 
 
 def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
     """Convert change of a unit at counts rest to that at counts to, with equal growth of the film's impedance."""
-    rest, to = np.clip(rest, *_RESTS), np.clip(to, *_RESTS)
+    rest, to = np.clip(rest, *RESTS), np.clip(to, *RESTS)
     return of_films(_film(rest + change) / _film(rest), to) - to
 
 
@@ -69,7 +69,7 @@ def of_typical_film(
     thickness the same u makes it grow by 1 / (1 - thickness (1 - 1 / g)), for each electrode by itself. Compared with
     the conducting sheet (111 simulated contacts), 7, 9, 12 and 14 % of the change remain as error at .8, .6, .45 and
     .33, and 28, 72, 136 and 246 % without the conversion."""
-    rest = np.clip(rest, *_RESTS)
+    rest = np.clip(rest, *RESTS)
     still = film_impedance(rest)
     thinned = 1 - still / (film_impedance(rest + change) * conductivity)
     left = np.maximum(1 - thickness * thinned, _LEAST_LEFT)

@@ -163,7 +163,7 @@ def _rest(recordings: Sequence[Recording], options: PrepareOptions | None) -> Un
         found = find_rest(recordings)
     except TactileError:
         return None
-    if (share := as_contact(found.counts, recordings[0].sensor)) is not None:
+    if (share := as_contact(found.counts, recordings[0].sensor, [one.electrodes for one in recordings])) is not None:
         if not all((Preparer(options)(one).flags & Flag.NO_QUIET_PART).all() for one in recordings):
             return None
         held = f"even the least pressed recordings look like a contact, which explains {share:.0%} of their levels"

@@ -37,13 +37,17 @@ class Answer:
     contacts: int = 1
 
     def __post_init__(self) -> None:
-        """Raise ValueError for a shift longer than the gel, or for too many samples."""
-        if not all(abs(one) <= FARTHEST for one in self.mount_shift_mm):
-            raise ValueError(f"mount_shift_mm {self.mount_shift_mm}: within {FARTHEST:g} mm")
-        if not 0 <= self.samples <= MOST_SAMPLES:
-            raise ValueError(f"samples {self.samples}: 0 to {MOST_SAMPLES}")
-        if self.contacts not in CONTACTS:
-            raise ValueError(f"contacts {self.contacts}: 1 or 2")
+        """Raise TactileError for an unknown kind, a shift longer than the gel, too many samples or contacts."""
+        shift = self.mount_shift_mm
+        pair = isinstance(shift, tuple) and len(shift) == 2
+        for name, right, expected in (
+            ("kind", self.kind in (LIKELY, MEAN), f"{LIKELY} or {MEAN}"),
+            ("mount_shift_mm", pair and all(abs(one) <= FARTHEST for one in shift), f"(x, z) within {FARTHEST:g} mm"),
+            ("samples", self.samples in range(MOST_SAMPLES + 1), f"0 to {MOST_SAMPLES}"),
+            ("contacts", self.contacts in CONTACTS, "1 or 2"),
+        ):
+            if not right:
+                raise TactileError(f"Answer, {name}", repr(getattr(self, name)), expected)
 
     @property
     def follows(self) -> bool:
@@ -68,8 +72,6 @@ def parse_answer(
 ) -> Answer:  # fmt: skip
     """Return the options of a command line; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises TactileError for a
     shift or a number of samples out of range."""
-    if not 0 <= samples <= MOST_SAMPLES:
-        raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
     shift = (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift)
     return Answer(kind, frames_apart, shift, samples, contacts)
 

@@ -126,15 +126,22 @@ def translate(
     >>> touch = tactile.translate(recording)
     >>> touch.force[:, 1].max()  # N, largest force into the skin
     """
-    if not isinstance(recording, Recording):
-        advice = "Read its file with tactile.read; numpy.savez writes arrays to one"
-        raise TactileError("translate, recording", f"a {type(recording).__name__}", "a Recording", advice)
-    chosen = np.arange(len(recording))[frames]
+    prepare, answer = PrepareOptions() if prepare is None else prepare, Answer() if answer is None else answer
+    for name, given, kind in (
+        ("recording", recording, Recording), ("prepare", prepare, PrepareOptions), ("answer", answer, Answer)
+    ):  # fmt: skip
+        if not isinstance(given, kind):
+            advice = "tactile.read reads a file; numpy.savez writes arrays to one" * (kind is Recording)
+            raise TactileError(f"translate, {name}", f"a {type(given).__name__}", f"a {kind.__name__}", advice)
+    try:
+        chosen = np.arange(len(recording))[frames]
+    except (IndexError, TypeError):  # no indices
+        chosen = np.empty(0, int)
     if np.ndim(chosen) != 1 or not len(chosen) or (np.diff(chosen) <= 0).any():
         expected = f"a slice forward through {len(recording)} frames that holds at least one"
         raise TactileError("translate, frames", str(frames), expected)
     chosen_by = (None, recording.sensor) if weights is None else (os.fspath(weights), None)
-    translator, unit = _shared_translator(*chosen_by, answer or Answer()), None
+    translator, unit = _shared_translator(*chosen_by, answer), None
     if sensor is not None:
         from ..recordings import electrode_gains  # reads by msgspec, which Blender has by the extension's wheels alone
 

@@ -318,6 +318,8 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
     for friction in (-1.0, "rough"):
         with pytest.raises(TactileError, match="coefficient"):
             Gel("digit", BALL, friction=friction)
+    with pytest.raises(TactileError, match=r"Gel.touching: -8; expected x, z and depth in m"):
+        Gel("digit", BALL).touching(x=-8, z=0)
     with pytest.raises(TactileError, match="one of fast"):
         Gel("digit", BALL, preset="best")
     with pytest.raises(TactileError, match="trimesh"):

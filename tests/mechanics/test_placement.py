@@ -66,10 +66,13 @@ def test_an_edge_that_slides_past_the_nearest_nodes_touches_others():
     assert abs(pose.distance(cube, dome(near, 0.4e-3))[0].min()) < 0.5e-6  # m, as above
 
 
-@pytest.mark.parametrize("tilt", [20, -1, float("nan")])
+@pytest.mark.parametrize("tilt", [20, -1, float("nan"), None])
 def test_degrees_are_no_tilt(tilt):
-    with pytest.raises(TactileError, match=r"Placement, tilt: .* rad; .*45 degrees. Convert degrees: math.radians"):
+    with pytest.raises(TactileError, match=r"Placement, tilt: .*; .*45 degrees. Convert degrees: math.radians"):
         Placement(-6e-3, 0.0, tilt)
+    for name, value in {"x": "0", "z": None, "tilt_heading": float("nan")}.items():
+        with pytest.raises(TactileError, match=f"Placement, {name}: {value!r}; expected a finite number"):
+            Placement(**{"x": -6e-3, "z": 0.0, name: value})
     assert Placement(-6e-3, 0.0, float(np.float32(np.pi / 4))).tilt > np.pi / 4  # 45 degrees, as Blender rounds them
 
 

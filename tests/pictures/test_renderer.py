@@ -189,6 +189,12 @@ def test_a_gel_that_reaches_the_camera_is_refused(any_variant, small):
         Renderer(high, "standard", any_variant).radiance(np.full(small.camera.shape, 5.2e-3))
 
 
+@pytest.mark.parametrize("levels", [0.5, 1.0, -5.0, 30000.0])
+def test_a_background_in_other_units_is_refused(levels, small):
+    with pytest.raises(TactileError, match=rf"background: values from {levels:g} to .*; expected levels 0 to 255"):
+        Renderer(small, "fast", background=np.full((*small.camera.shape, 3), levels))
+
+
 def test_heights_in_millimetres_are_refused(small):
     """A dent of half a millimetre, as half a metre: away from the camera nothing else stops it."""
     with pytest.raises(TactileError, match=r"50\d\.\d\d mm below the undeformed gel; .* Give metres"):

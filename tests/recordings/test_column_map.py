@@ -49,6 +49,12 @@ def test_info_writes_a_map_by_which_the_file_is_the_same_recording(own, tmp_path
     assert len(parts) == 1 and np.array_equal(parts[0].recording.electrodes, known.electrodes)
 
 
+def test_channels_go_with_electrodes_whose_names_end_alike():
+    names = [f"e{i}_{side}" for side in ("right", "left") for i in range(1, 20)]
+    found = guess(["time", "pdc_left", "pdc_right", *names])
+    assert [(each.electrodes[0], each.pdc) for each in found] == [("e1_right", "pdc_right"), ("e1_left", "pdc_left")]
+
+
 def test_a_map_leads_through_convert_and_batch(own, tmp_path):
     map_file = tmp_path / "map.toml"
     assert main(["info", str(own), "--columns", str(map_file)]) == 0

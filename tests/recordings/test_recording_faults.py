@@ -5,6 +5,7 @@ import os
 import stat
 import zipfile
 
+import h5py
 import numpy as np
 import pytest
 
@@ -188,6 +189,13 @@ def test_folder_missing_file_and_locked_file(tmp_path, slide_lines, write):
             recordings.read(path)
     finally:
         os.chmod(path, stat.S_IRUSR | stat.S_IWUSR)
+
+
+def test_a_result_of_the_toolkit_is_named(tmp_path):
+    with h5py.File(tmp_path / "frames.h5", "w") as file:
+        file.attrs["format"] = "tactile-frames-1"
+    with pytest.raises(TactileError, match=r"a result of this toolkit, format=tactile-frames-1.*`tactile render`"):
+        recordings.read(tmp_path / "frames.h5")
 
 
 def test_names_that_are_no_text_are_told(press, in_layout):

@@ -8,8 +8,9 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.jobs.convert import Options, ToolOptions, convert, load_tools
-from tactile_core.recordings import electrode_gains
+from tactile_core.recordings import PrepareOptions, electrode_gains
 from tactile_core.recordings.electrode_gains import FORMAT, ElectrodeGains, SensorFile
+from tactile_core.translation.answer import Answer
 from tactile_core.translation.translate import translate
 
 NAMES = ("displacement_biotac", "displacement_digit", "force", "pressure", "contact_center", "confidence")
@@ -35,7 +36,9 @@ def test_gains_of_the_unit_are_taken_off(shipped, whole, tmp_path):
     assert np.median(halved.force[touched, 1] / whole.force[touched, 1]) < 0.8
 
 
-@pytest.mark.parametrize("frames", [slice(5, 5), slice(10, 2), slice(10, 2, -1), 5, [7, 9, 8, 10], [7, 7]])
+@pytest.mark.parametrize(
+    "frames", [slice(5, 5), slice(10, 2), slice(10, 2, -1), 5, (1, 2), slice(0.0, 5.0), [7, 9, 8, 10], [7, 7]]
+)
 def test_frames_without_order_or_content_are_refused(shipped, frames):
     with pytest.raises(TactileError, match="translate, frames"):
         translate(shipped, frames=frames)
@@ -43,5 +46,28 @@ def test_frames_without_order_or_content_are_refused(shipped, frames):
 
 @pytest.mark.parametrize("given", ["touch.csv", np.zeros((50, 19))])
 def test_what_is_no_recording_is_refused_with_the_way_to_read_one(given):
-    with pytest.raises(TactileError, match=r"a (str|ndarray); expected a Recording. Read its file with tactile.read"):
+    with pytest.raises(TactileError, match=r"a (str|ndarray); expected a Recording. tactile.read reads a file"):
         translate(given)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"prepare": {"smooth": 3}}, "translate, prepare: a dict; expected a PrepareOptions"),
+        ({"answer": "mean"}, "translate, answer: a str"),
+        ({"prepare": PrepareOptions(tare=(0, 20))}, r"option tare: \(0, 20\); expected frames A:B"),
+        ({"prepare": PrepareOptions(smooth="3")}, "option smooth: '3' frames; expected an odd number"),
+        ({"prepare": PrepareOptions(counts_per_unit="1")}, "option counts_per_unit: '1'; expected counts a unit"),
+    ],
+)
+def test_options_of_another_kind_are_refused(given, said, shipped):
+    with pytest.raises(TactileError, match=said):
+        translate(shipped, frames=slice(0, 3), **given)
+
+
+@pytest.mark.parametrize(
+    "given", [{"kind": "average"}, {"mount_shift_mm": 4.0}, {"mount_shift_mm": (4.0, 0.0, 0.0)}, {"samples": 2.5}]
+)
+def test_answers_that_there_are_not_are_refused(given):
+    with pytest.raises(TactileError, match=f"Answer, {next(iter(given))}: "):
+        Answer(**given)

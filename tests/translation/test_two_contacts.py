@@ -84,7 +84,7 @@ def test_what_cannot_tell_two_contacts_says_so(tmp_path, capsys):
     asked = ["--contacts", "2", "--gel", "solved", "--out", str(tmp_path / "out")]
     assert main(["convert", str(SHIPPED), *asked]) == 2
     assert "--contacts 2" in capsys.readouterr().err
-    with pytest.raises(ValueError, match="contacts 3"):
+    with pytest.raises(TactileError, match="Answer, contacts: 3; expected 1 or 2"):
         Answer(contacts=3)
 
 

@@ -67,14 +67,14 @@ def test_too_few_and_rectified_recordings_are_refused():
         find_rest(folded)
 
 
-def test_a_rest_of_grips_alone_is_refused(tmp_path):
+@pytest.mark.parametrize("stuck", [None, 0, 3300])
+def test_a_rest_of_grips_alone_is_refused(stuck, tmp_path):
     contacts = polarity.contact_signals()
     firm = contacts[np.argsort(np.linalg.norm(contacts, axis=1))[-50:]]
     for k in range(3):
-        noise = np.random.default_rng(k).normal(0, 1, (400, 19))
-        np.savez(
-            tmp_path / f"{k}.npz", electrodes=np.rint(REST_COUNTS + firm[10 * k] + noise), pdc=np.full(400, 1200.0)
-        )
+        counts = np.rint(REST_COUNTS + firm[10 * k] + np.random.default_rng(k).normal(0, 1, (400, 19)))
+        counts[:, 4] = counts[:, 4] if stuck is None else stuck  # a faulty electrode rests at 3,622
+        np.savez(tmp_path / f"{k}.npz", electrodes=counts, pdc=np.full(400, 1200.0))
     typical = reference_signals.read(networks.WEIGHTS_FOLDER)
     with pytest.raises(
         TactileError, match=r"^0, 1, 2: rest of the unit: .* a contact, which explains \d+% of.*\(--rest\)"

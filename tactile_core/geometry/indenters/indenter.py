@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ...errors import TactileError
+from ...errors import TactileError, finite_number
 
 # Components of a unit vector below this count as zero, so that rounding does not choose an end of a flat or a line.
 SQUARE = 1e-9
@@ -66,13 +66,8 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 def check_length(kind: str, name: str, value: float) -> None:
     """Raise TactileError for a length ``value``, m, that is no number between 0.001 mm and 1 m; kind, name : whose"""
-    if not (np.isfinite(value) and 1e-6 < value < 1.0):
-        raise TactileError(
-            f"{kind}, {name}",
-            f"{value!r} m",
-            "a length between 0.001 mm and 1 m",
-            "Check the unit: scenes give millimetres",
-        )
+    expected, advice = "a length in m, between 0.001 mm and 1 m", "Check the unit: scenes give millimetres"
+    finite_number(value, f"{kind}, {name}", expected, 1e-6, 1.0, advice)
 
 
 def sign_of(component: np.ndarray | float) -> np.ndarray:

@@ -111,8 +111,9 @@ def _is_called(word: str, name: str) -> bool:
 
 
 def _nearest(names: Iterable[str], like: str) -> str:
-    """Return the name with the longest common beginning with `like`, of such the first of the shortest; "" for none."""
-    return max(names, key=lambda name: (_alike(name, like), -len(name)), default="")
+    """Return the name that begins and ends most like `like`, of such the first of the shortest; "" for none."""
+    like = like.partition("[")[0]
+    return max(names, key=lambda name: (_alike(name, like) + _alike(name[::-1], like[::-1]), -len(name)), default="")
 
 
 def _alike(name: str, other: str) -> int:

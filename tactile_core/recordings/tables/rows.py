@@ -57,7 +57,8 @@ def _bad_row(
 ) -> list[float]:
     width = len(names)
     if len(cells) > width:
-        problems.append(Problem(frame, line_number, "row", f"{len(cells)} cells where the header has {width} (commas within numbers?)"))
+        found = f"{len(cells)} cells where the header has {width} (commas within numbers?)"
+        problems.append(Problem(frame, line_number, "row", found))
         return [np.nan] * width
     if len(cells) < width:  # the last cell that is there may be cut in its middle
         problems.append(Problem(frame, line_number, "row", f"ends after {len(cells)} of {width} cells (truncated)"))

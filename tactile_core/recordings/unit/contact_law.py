@@ -12,6 +12,8 @@ and .23 to .38 in eight hard grips; soft grips (.47 to .87) are not separable.""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...sensors import SOURCE, contact_pressures_of, contacts_of, divider, typical_rest
@@ -195,16 +197,22 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
     return None
 
 
-def as_contact(level: np.ndarray, sensor: str) -> float | None:
+def as_contact(level: np.ndarray, sensor: str, readings: Sequence[np.ndarray] = ()) -> float | None:
     """Return the share (0..1) that one contact explains of a level (e,) counts, beside the conductivity that fits best.
 
-    It is of the level's difference to a typical unit's rest. None if too little for a contact, or without a model."""
+    It is of the level's difference to a typical unit's rest. None if too little for a contact, or without a model.
+    readings : (T, e) counts of each recording; electrodes that stand still in one, or rest where none does, are faulty
+    and left out"""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None
+    used = (level > divider.RESTS[0]) & (level < divider.RESTS[1])
+    for each in readings:
+        used &= np.ptp(each, axis=0) != 0
+    level, typical = level[used], typical[used]
     rest = divider.of_films(np.exp(CONDUCTIVITIES)[:, None], typical)
     change = divider.typical(level - rest, rest, typical)
-    known = contact_signals(sensor)
+    known = contact_signals(sensor)[:, used]
     onto = (change @ (known / np.linalg.norm(known, axis=1, keepdims=True)).T).max(axis=1)
     squares = np.square(change).sum(axis=1)
     alone = np.sqrt(squares.min())
