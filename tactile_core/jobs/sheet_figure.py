@@ -46,7 +46,9 @@ class SheetFigure:
     def __init__(
         self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, snapshots: bool = False
     ) -> None:
-        """Make an empty figure. snapshots : true labels frames by number, as they have no time"""
+        """Make an empty figure for `columns` frames and a camera's gel, with warnings below the title.
+        truth : true makes room for rows of the true deformation; snapshots : true labels frames by number, not by
+            time"""
         from matplotlib.figure import Figure
 
         self._over, self._heading = ("snapshot", "snapshot {:.0f}") if snapshots else ("time, s", "{:.2f} s")

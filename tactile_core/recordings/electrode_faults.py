@@ -202,8 +202,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of readings (T, 19), of kind "raw", at an end of the 12-bit range; adds findings to
-    warnings."""
+    """Return flags (T,) of readings (T, 19), of kind "raw", at an end of the 12-bit range; extends warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)

@@ -147,9 +147,10 @@ def fine_tune(
 ) -> list[Row]:
     """Write weights with S2MPN fine-tuned on the recording; returns the rows before and after on held-out presses.
 
-    out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of. Raises
-    TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that holds
-    weights already."""
+    out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of.
+    weights_folder : the weights to begin with, None for those that ship; progress : see `train.train`
+    Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that
+    holds weights already, but to overwrite them."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)

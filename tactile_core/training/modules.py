@@ -81,7 +81,7 @@ class ContactPosterior(nn.Module):
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Return -log density (B,), nats, of the mixture of latent (B, K) at the true state (B, STATE), but a
+        """Return -log density (B,), nats, of latent's (B, K) mixture at the true state (B, STATE), but for a
         constant."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread

@@ -159,7 +159,7 @@ def deterministic() -> Iterator[None]:
 
 
 def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress: Progress) -> list[list]:
-    """Run the stages that are left; returns the log rows (stage, epoch, train, validation)."""
+    """Run the stages that are left; returns the log rows (stage, epoch, train, validation). progress : see `train`"""
     identity = {
         "pairs": contacts.pairs.sha256,
         "seed": seed,
@@ -180,7 +180,7 @@ def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress
 def run_stage(
     stage: Stage, model: Model, contacts: Contacts, seed: int, state: checkpoint.State, path: Path, progress: Progress
 ) -> None:
-    """Train the networks of one stage for its epochs, from state on, which is saved to path now and then."""
+    """Train a stage's networks for its epochs, from state on, saved to path now and then. progress : see `train`"""
     options = contacts.options
     groups = [
         {"params": list(model.get_submodule(net).parameters()), "weight_decay": options.decay(net)}
@@ -211,7 +211,7 @@ def share_done(options: Options, state: checkpoint.State) -> float:
 def epoch_losses(
     stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
 ) -> list[Callable[[], torch.Tensor]]:
-    """Return one function a step; called in order, each returns the loss of its batch."""
+    """Return one function a step of pass ``epoch``; called in order, each returns the loss of its batch."""
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))
@@ -230,7 +230,8 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss. rate : see ``take_step``"""
+    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss.
+    losses : of `epoch_losses`; rate : see ``take_step``"""
     total = 0.0
     for step, loss in enumerate(losses):
         total += take_step(optimiser, loss, (epoch * len(losses) + step + 1) / (epochs * len(losses)), rate)

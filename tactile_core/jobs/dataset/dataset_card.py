@@ -185,7 +185,8 @@ def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touche
 
 
 def page_of(recipe: Recipe, summaries: list[Summary], progress: Callable[[int, int], None]) -> str:
-    """Return the page: every recording of summaries as a strip of pictures, in one self-contained HTML file."""
+    """Return the page: every recording of summaries as a strip of pictures, in one self-contained HTML file.
+    progress : called with (recordings done, in all)"""
     choices: dict[str, set[str]] = {}
     articles = []
     for number, one in enumerate(summaries, start=1):

@@ -51,7 +51,7 @@ class Summary:
 
 
 def summarise(source: Finished, tasks: Sequence[str], progress: Callable[[int, int], None]) -> list[Summary]:
-    """Summarise all recordings; tasks : labels to learn"""
+    """Summarise all recordings; tasks : labels to learn; progress : called with (recordings done, in all)"""
     found = []
     for number, one in enumerate(source.recordings, start=1):
         found.append(_summary(one, tasks))

@@ -61,8 +61,7 @@ def write(folder: Path, job: Job) -> None:
 
 
 def check_empty(folder: Path, advice: str) -> None:
-    """Raise TactileError, with advice, for a folder without a job but with another program's files; hidden ones are
-    ignored."""
+    """Raise TactileError, with advice, for a folder without a job but with others' files; hidden ones are ignored."""
     others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if others:
         raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)

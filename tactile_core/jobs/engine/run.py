@@ -88,8 +88,8 @@ def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
 
 
 def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
-    """Do the tasks of a job that are not done yet, or part i of n of them; call inside `opened`.
-    progress : called with (tasks done, tasks known so far)
+    """Do the tasks of a job that are not done yet, or part (i, n), which is i of n, of them; call inside `opened`.
+    place : executor of the tasks; progress : called with (tasks done, tasks known so far)
     Raises TactileError when the disk cannot be written."""
     try:
         return _run(folder, job, place, part, progress)
@@ -200,7 +200,7 @@ def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
     """Do a whole job, yield its folder to be merged into `out`, and remove it after that.
-    place : function from the job's folder to the executor of tasks
+    place : function from the job's folder to the executor of tasks; progress : see `run`
     Raises TactileError for the first task that failed, and as `begun` and `run` do."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)

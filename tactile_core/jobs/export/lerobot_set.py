@@ -59,8 +59,8 @@ class Layout(Protocol):
 
 
 def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:
-    """Write all recordings; needs pyarrow of the extra [batch]. Raises TactileError where numpy does not fit pyarrow,
-    and for recordings of different rates."""
+    """Write all recordings, with progress (frames done, in all); needs pyarrow of the extra [batch]. Raises
+    TactileError where numpy does not fit pyarrow, and for recordings of different rates."""
     try:
         import pyarrow  # noqa: F401
     except ModuleNotFoundError:

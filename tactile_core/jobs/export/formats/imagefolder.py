@@ -26,7 +26,7 @@ NUMBERS: dict[str, tuple[str, int | None]] = {
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write all pictures."""
+    """Write all pictures, see `formats`."""
     source.check_kept("image", "image")
     labels = sorted({name for one in source.recordings for name in one.labels})
     head, done = ["file_name", "recording", "frame", *labels, *NUMBERS, "flags"], 0

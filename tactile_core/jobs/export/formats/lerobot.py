@@ -22,7 +22,7 @@ FILE_MB = 100  # a data file is closed at the end of the episode that takes it b
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write the data set."""
+    """Write the data set, see `formats`."""
     write_set(source, folder, progress, _Together(folder))
 
 
@@ -51,7 +51,7 @@ class _Together:
         self._writer.write_table(added)
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the file if it has become large; returns its number."""
+        """Close the file if it has become large; returns where the episode lies, for the list of episodes."""
         place = {f"data/{name}": number for name, number in self._place().items()}
         if self._path.stat().st_size > FILE_MB * 1e6:
             self._close()

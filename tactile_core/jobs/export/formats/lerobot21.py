@@ -27,7 +27,7 @@ VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write the data set. Raises TactileError where OpenCV cannot write the video."""
+    """Write the data set, see `formats`. Raises TactileError where OpenCV cannot write the video."""
     write_set(source, folder, progress, _Apart(folder))
 
 
@@ -57,7 +57,7 @@ class _Apart:
                 self._video.write(picture[..., ::-1].copy())  # OpenCV has blue first
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the episode's files."""
+        """Close the episode's files; returns no entries: its place follows from its number."""
         self._data.close()
         if self._video is not None:
             self._video.release()
