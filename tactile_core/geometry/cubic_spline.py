@@ -42,8 +42,8 @@ class EvenSpline:
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Return the matrix (n, count) from values at nodes to the spline at position (n,), or its derivative 1
-        there."""
+        """Return the matrix (n, count) from values at nodes to the spline at position (n,), by derivative 1 to its
+        slope."""
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)

@@ -102,7 +102,8 @@ _NEAR = 0.5e-3  # m, from the indenter to points whose curvature counts
 
 
 def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
-    """Return an indenter's least radius of curvature, m, at its tip and at those points (n, 3) m that are near it."""
+    """Return an indenter's least radius of curvature, m, at its tip and at those points (n, 3) m near it; inf: none
+    is."""
     points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
     gap, _ = pose.distance(indenter, points)
     near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)

@@ -233,6 +233,6 @@ class Linearised:
         return self.solid.pattern.sparse(self.blocks()).tocsc()
 
     def pressure_step(self, step: np.ndarray) -> np.ndarray:
-        """Return the change of the pressures (n_cells, 4) Pa that goes with a displacement step (n, 3) m."""
+        """Return the change of the cells' pressures (n_cells, 4) Pa that goes with a step (n, 3) m of displacement."""
         local = step.reshape(-1)[self.solid.dofs]
         return np.einsum("epi,ei->ep", self.to_pressure, local) + self.pressure_gap

@@ -69,9 +69,9 @@ def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarra
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and directions (3, n) float32 of rays: right, up, toward the camera, mm.
-    right, down : (n,) m, where they meet the plane of height zero. Rays start under the window, unless the camera is
-        nearer than the window is thick."""
+    """Return starts and unit directions (3, n) float32 of rays: right, up, toward the camera, mm.
+    right, down : (n,) m, where they meet the plane of height zero. Rays start at the window's side toward the camera;
+        at the camera if that is nearer than the window is thick."""
     camera, index = unit.camera, unit.gel_index
     air, window = air_over_window(camera, index), window_height(camera)
     if air <= 0:
