@@ -73,7 +73,7 @@ def _stored(file: Path, values: np.ndarray) -> str:
 
 
 def _checked(file: Path, stated: str) -> np.ndarray:
-    """Map an array whose file has the stated hash."""
+    """Map the array of a file whose hash is as stated; raises DamagedError otherwise."""
     with outside.open_file(file) as opened:
         found = hashlib.file_digest(opened, "sha256").hexdigest()
     if found != stated:

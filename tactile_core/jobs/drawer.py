@@ -43,7 +43,7 @@ class Drawer:
     object_reflectance: float = 0.0
 
     def gel(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return arrays by the names of frames.h5 with the gel that is drawn: the networks' or the solved one."""
+        """Return arrays, name -> (T, ...) as in frames.h5, with the gel that is drawn: the networks' or the solved."""
         return arrays if self.solve is None else self.solve(arrays)
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:

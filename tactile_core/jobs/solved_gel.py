@@ -67,7 +67,7 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
 
 
 def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str) -> Iterator[tuple[int, BodyContact]]:
-    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) m; size : (T,) N, force"""
+    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) = (x, z) m; size : (T,) N"""
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
     deepest = np.einsum("tni,ni->tn", moved, normals).argmin(axis=1)

@@ -188,7 +188,7 @@ def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> n
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    """Return the values with NaN for infinity; without a copy where nothing is infinite."""
+    """Return values of any shape with NaN for infinity; without a copy where nothing is infinite."""
     finite = np.isfinite(values)
     return values if finite.all() else np.where(finite, values, np.nan)
 

@@ -200,7 +200,8 @@ def _time_of_sp(recording: Recording) -> str:
 
 
 def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
-    """Return each electrode's median (or its unit's rest), least and largest count; against rest if known."""
+    """Return (e,) by name: each electrode's median (or its unit's rest), least and largest count; against rest if
+    known."""
     if unit is None:
         counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
     else:

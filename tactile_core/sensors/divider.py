@@ -50,7 +50,8 @@ def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarr
 
 
 def _film(counts: np.ndarray | float) -> np.ndarray:
-    """Return the film's impedance, divided by the load's; below 0 for counts higher than any film allows."""
+    """Return the film's impedance (...) at counts (...), over the load's; below 0 for more counts than a film
+    allows."""
     return COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES
 
 

@@ -157,7 +157,7 @@ def _named(pair: tuple[str, str]) -> dict[str, str]:
 def _dataset(
     file: h5py.File, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
 ) -> np.ndarray:
-    """Read one dataset, and check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
+    """Read the dataset `name`, check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
         raise TactileError(place, "no such dataset", f"the datasets {', '.join(names.values())}", ADVICE)
@@ -196,7 +196,7 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
 
 
 def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:
-    """Check that the attribute `names` is a JSON list of texts, with one for each number of `indenter`."""
+    """Check that the attribute `names` is a JSON list of texts, with one for each number of `indenter` (C,)."""
     place = f"{os.fspath(path)}, attribute indenters"
     try:
         found = json.loads(names)

@@ -151,7 +151,7 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Seque
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute time (T,) s, place (T, 2) m and force (T,) N, to a nanonewton, at 100 Hz."""
+    """Compute time (T,) s, place (T, 2) = (x, z) m and force (T,) N, to a nanonewton, at 100 Hz."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
     time = time / sensors.SAMPLE_RATE

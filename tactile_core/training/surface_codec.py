@@ -200,7 +200,7 @@ def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
 
 
 def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
-    """Compute values of all rows in parts, written into one array: separate parts would fragment memory."""
+    """Compute values(rows), (n, ...), of rows (n,) in parts, written into one array: separate ones fragment memory."""
     parts = _parts(len(rows))
     first = values(rows[parts[0]])
     found = first.new_empty(len(rows), *first.shape[1:])

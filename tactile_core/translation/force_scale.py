@@ -136,7 +136,8 @@ def _translated(
 
 
 def _scale(translated: np.ndarray, force: np.ndarray) -> float:
-    """Scale of the least mean absolute error: the median of the ratios, weighted by the translated force."""
+    """Return the scale of least mean absolute error of translated (n,) N to force (n,) N: the median of the ratios,
+    weighted by the translated force."""
     order = np.argsort(force / translated)
     reached = np.cumsum(translated[order])
     return float((force / translated)[order][np.searchsorted(reached, reached[-1] / 2)])

@@ -65,7 +65,7 @@ def _mean(x: np.ndarray) -> np.ndarray:
 
 
 def silu(x: np.ndarray) -> np.ndarray:
-    """Compute x * sigmoid(x), written with tanh because exp overflows for large negative x."""
+    """Compute x * sigmoid(x) of any shape, written with tanh because exp overflows for large negative x."""
     return x * (np.float32(0.5) * (np.float32(1.0) + np.tanh(np.float32(0.5) * x)))
 
 

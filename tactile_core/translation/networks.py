@@ -125,7 +125,8 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_source)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return expected largest node errors (T, 2) m, BioTac and DIGIT, of change (T, 19), rectified (T,) or one."""
+        """Return expected largest node errors (T, 2) m of BioTac and DIGIT, for change (T, 19), rectified (T,) or
+        one."""
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_source(self, displacement: np.ndarray) -> np.ndarray:

@@ -185,7 +185,7 @@ def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
 
 
 def _file(path: str) -> Callable[[np.ndarray], bool]:
-    """Return a function that writes pictures to a file, which is complete at every moment."""
+    """Return a function that writes a picture (H, W, 3) to a file, which is complete at every moment."""
     from ...files import atomic
     from ...files.png_writer import pack_png
 
@@ -198,7 +198,8 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
 
 
 def _window(title: str) -> Callable[[np.ndarray], bool]:
-    """Return a function that shows pictures, False once the window is closed. Raises TactileError without a display."""
+    """Return a function that shows a picture (H, W, 3), False once the window is closed. TactileError without a
+    display."""
     from matplotlib import pyplot
 
     if pyplot.get_backend().lower() == "agg":

@@ -190,7 +190,7 @@ def _labels(path: str, file: File) -> dict[str, str]:
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
-    """Return texts, one a frame: force, N, beside a recording; columns of its file. path : the file, and the finger."""
+    """Return texts (T,) by name: force, N, beside a recording; columns of its file. path : the file, and the finger."""
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():

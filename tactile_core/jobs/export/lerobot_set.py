@@ -150,7 +150,7 @@ def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int
 
 
 def _followed(one: Recorded) -> Iterator[tuple[Rows, np.ndarray]]:
-    """Yield blocks of frames with their states and the state after each block; the last state follows itself."""
+    """Yield blocks of frames with their states and the state (1, k) after each block; the last state follows itself."""
     held: Rows = {}
     for block in one.blocks():
         block["contact"] = np.isfinite(block["contact_center"]).all(axis=1)

@@ -79,7 +79,7 @@ def _columns_of(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _read(store: Store, name: str) -> np.ndarray:
-    """Return an array with its rows first."""
+    """Return an array (T, ...) with its rows first, (T,) if it has one column."""
     shape = store.shapes[name][0]
     frames = _rows(shape)[0]
     if frames > MAX_FRAMES:

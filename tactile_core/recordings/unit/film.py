@@ -89,7 +89,7 @@ class Film:
         known = known / np.linalg.norm(known, axis=1, keepdims=True)
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
-            """Return a typical unit's changes (len(frames), 19) counts, without drift."""
+            """Return a typical unit's changes (n, 19) counts in frames (n,), without drift."""
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
@@ -200,14 +200,13 @@ def _impedance_at_rest(seen: _Seen) -> float:
 
 
 def _doubt_at_rest(impedance: float) -> np.ndarray:
-    """Return minus the log probability of each thickness, nats, by impedance at rest (over a typical unit's) alone."""
+    """Return minus the log probability (k,) of each thickness, nats, by impedance at rest (over a typical unit's)."""
     of_fluid = np.log(impedance * THICKNESSES) / CONDUCTIVITY_SPREAD
     return (np.square(np.log(THICKNESSES) / THICKNESS_SPREAD) + np.square(of_fluid)) / 2
 
 
 def _believed(doubt: np.ndarray) -> float:
-    """Return the mean thickness by doubt, minus the log probability of each; 1 (typical) unless another is clearly
-    likelier."""
+    """Return the mean thickness by doubt (k,), minus log probabilities; 1 (typical) unless another is much likelier."""
     if doubt[TYPICAL] < doubt.min() + CLEARLY:
         return 1.0
     likely = np.exp(doubt.min() - doubt)
