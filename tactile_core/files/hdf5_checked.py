@@ -25,10 +25,9 @@ if TYPE_CHECKING:
 MAX_CHUNK = 256 * 2**20  # bytes of an unpacked chunk (assumed enough: HDF5 advises 1 MB, and keeps one in memory)
 MAX_RATIO = 1032  # the most that deflate packs (zlib, technical details); lzf at most 88
 FILTERS = {1: "gzip", 2: "shuffle", 3: "fletcher32", 32000: "lzf"}  # that are undone; the numbers are HDF5's
-DEFLATE, CHECKSUM, STEP = 1, 3, 2**20
+DEFLATE, STEP = 1, 2**20
 MOST_CHUNKS = 20_000  # read at a time: the library takes 4 kB for each while it reads, 80 MB
 MAX_DEPTH = 32  # groups within groups, whose names the library looks up again and again (assumed enough; ours have 2)
-MAX_PLAIN_CHUNK = 2**24  # bytes of a chunk in a file of our own; they have 0.2 MB
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enough: the library keeps at most 32 MB)
 
@@ -61,32 +60,21 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
     Refused: datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters other
     than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. Reading a row then takes at
     most one chunk of memory beyond the row, reading a dataset takes its declared size, which the caller has to limit:
-    see ``declared``.
+    see ``declared``. Every object is opened once under `bounded_memory`: fuzzing found two kinds of file with which the
+    HDF5 library (up to 2.0) uses up all memory, one with driver information of up to 4 GB, one whose list of free
+    places one changed byte makes circular.
     """
-    packed: list[tuple[str, h5py.Dataset, int, list[int]]] = []
-    with open_plain(path, lambda path, name, item: packed.extend(_check(path, name, item))) as file:
-        for name, data, size, filters in packed:  # what unpacks may take more memory than opening does
-            data.id.chunk_iter(functools.partial(_check_chunk, path, name, data, size=size, filters=filters))
-        yield file
-
-
-@contextmanager
-def open_plain(path: str | os.PathLike, look: Callable = lambda *_: None) -> Iterator[h5py.File]:
-    """Open a file of plain numbers for reading (see ``check_plain``), with values unchecked.
-
-    Every object is opened once under `bounded_memory`: fuzzing found two kinds of file with which the HDF5 library (up
-    to 2.0) uses up all memory, one with driver information of up to 4 GB, one whose list of free places one changed
-    byte makes circular.
-    look : called with path, name and object, of every group and dataset
-    Raises h5py's errors; TactileError for what `open_checked` refuses besides."""
     import h5py
 
     outside.check(path, "an HDF5 file")
+    packed: list[tuple[str, h5py.Dataset, int, list[int]]] = []
     with contextlib.ExitStack() as stack:
         with bounded_memory(MAX_OPENING):
             file = stack.enter_context(h5py.File(path, "r"))
             _visit(file.id.links, path, _check_link)
-            _visit(file, path, look)
+            _visit(file, path, lambda path, name, item: packed.extend(_check(path, name, item)))
+        for name, data, size, filters in packed:  # what unpacks may take more memory than opening does
+            data.id.chunk_iter(functools.partial(_check_chunk, path, name, data, size=size, filters=filters))
         yield file
 
 
@@ -122,17 +110,6 @@ def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
     if stop - start <= step:
         return data[start:stop]
     return np.concatenate([data[first : min(first + step, stop)] for first in range(start, stop, step)])
-
-
-def check_plain(path: str | os.PathLike, data: h5py.Dataset) -> None:
-    """Raise TactileError unless a dataset is plain, uncompressed numbers of this file, which need no further check."""
-    layout, name = data.id.get_create_plist(), data.name
-    if layout.get_external_count() or data.is_virtual or data.dtype.kind not in "fiub":
-        raise _refused(path, name, "no plain numbers", "numbers in this file")
-    if any(layout.get_filter(index)[0] != CHECKSUM for index in range(layout.get_nfilters())):
-        raise _refused(path, name, "packed values", "plain ones")
-    if data.chunks is not None and math.prod(data.chunks) * data.dtype.itemsize > MAX_PLAIN_CHUNK:
-        raise _refused(path, name, f"chunks of shape {data.chunks}", f"at most {MAX_PLAIN_CHUNK // 2**20} MB")
 
 
 def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:

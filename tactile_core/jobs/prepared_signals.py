@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, checksummed
-from ..files.hdf5_checked import check_plain, declared, open_plain
+from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import new_hdf5
 from ..recordings import Recording, Signals
 from ..recordings.chunks import read_parts
@@ -178,7 +178,7 @@ class Prepared:
 
     def _read(self, what: Any) -> Any:
         try:
-            with open_plain(self._path) as file:
+            with open_checked(self._path) as file:
                 _check(self._path, file)
                 return what(file)
         except TactileError:
@@ -189,20 +189,14 @@ class Prepared:
 
 
 def _check(path: Path, file: h5py.File) -> None:
-    """Raise ValueError or TactileError for unknown arrays, whose rows might take more memory."""
-    import h5py
-
+    """Raise ValueError or TactileError for arrays of other shapes or types, whose rows might take more memory."""
     count, electrodes = len(file["time"]), file["rest"].shape[1]
     if not 0 < electrodes <= MOST_ELECTRODES:
         raise ValueError(f"rest of {electrodes} electrodes")
-    wide = {"change", "electrodes"}
-    shapes = {name: (count, electrodes) if name in wide else (count,) for name in COLUMNS}
-    for name in (*COLUMNS, "part", "rest", "about"):
-        if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-            raise ValueError(f"{name} is a link")
-        data = file[name]
-        check_plain(path, data)
-        if name in shapes and data.shape != shapes[name]:
-            raise ValueError(f"{name} of shape {data.shape}, not {shapes[name]}")
-        if name not in shapes:
+    others = {"part": np.int64, "rest": np.float64, "about": np.uint8}
+    for name, kind in (COLUMNS | others).items():
+        data, shape = file[name], (count, electrodes) if name in ("change", "electrodes") else (count,)
+        if data.dtype != kind or (name in COLUMNS and data.shape != shape):
+            raise ValueError(f"{name} of shape {data.shape} and type {data.dtype}")
+        if name in others:
             declared(data, f"{path}, {name}")

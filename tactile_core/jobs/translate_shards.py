@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, checksummed
-from ..files.hdf5_checked import open_plain
+from ..files.hdf5_checked import open_checked
 from . import convert, prepared_signals
 from .convert import ToolOptions
 from .engine import job as jobs
@@ -76,7 +76,7 @@ def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
 def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int) -> bool:
     """Return true if a whole file is shard `number` of recording `index`, with these frames."""
     try:
-        with open_plain(file) as found:
+        with open_checked(file) as found:
             return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())
     except Exception:  # the library raises a dozen types on what is no shard
         return False

@@ -12,7 +12,6 @@ sensors. The same arrays give the same bytes. `tactile simulate --keep` writes o
 
 from __future__ import annotations
 
-import io
 import os
 from pathlib import Path
 from typing import Any
@@ -21,6 +20,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic
+from ..files.hdf5_writer import new_hdf5
 from ..sensors import COUNT_MAX, ELECTRODES, SOURCE, TARGET
 from ..sensors.fluid_sensor import FALLS, RISES
 from .array_store import Store, open_hdf5
@@ -52,69 +52,39 @@ def write_simulated(
     time : (T,) s; electrodes : (T, 19), pdc, tac, tdc : (T,) counts, raw; start_time : unix s, 0 if unknown
     made_by, note : texts, the program and what a reader must know
     Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
-    path = Path(path)
-    frames = len(time)
+    path, frames = Path(path), len(time)
     _check_shape(path, "time", time, (frames,))
-    given = {"electrodes": electrodes, "pdc": pdc, "tac": tac, "tdc": tdc}
-    counts = {
-        name: _counts(path, name, value, (frames, ELECTRODES) if name == "electrodes" else (frames,))
-        for name, value in given.items()
-        if value is not None
-    }
-    known = {"force": truth.force, "contact_center": truth.contact_center}
-    forces = {f"truth/{name}": np.asarray(value, np.float32) for name, value in known.items() if value is not None}
-    for name, value in forces.items():
-        _check_shape(path, name, value, (frames, 3 if name == "truth/force" else 2))
-    moved = {f"{_MOVED}{sensor}": values for sensor, values in truth.displacements.items()}
-    steps = {name: _steps(path, name, value, frames) for name, value in moved.items()}
-    attributes: dict[str, Any] = {
-        "format": FORMAT,
-        "simulated": True,
-        "sensor": "BioTac",
-        "scene": scene,
-        "seed": int(seed),
-        "made_by": made_by,
-        "note": note,
-        "polarity": FALLS,
-        "start_time": float(start_time),
-    }
-    plain = {"time": np.asarray(time, np.float64)} | counts
+    plain: dict[str, np.ndarray] = {"time": np.asarray(time, np.float64)}
+    for name, value in {"electrodes": electrodes, "pdc": pdc, "tac": tac, "tdc": tdc}.items():
+        if value is not None:
+            plain[name] = _counts(path, name, value, (frames, ELECTRODES) if name == "electrodes" else (frames,))
+    forces: dict[str, np.ndarray] = {}
+    for name, value, width in (("force", truth.force, 3), ("contact_center", truth.contact_center, 2)):
+        if value is not None:
+            _check_shape(path, f"truth/{name}", value, (frames, width))
+            forces[f"truth/{name}"] = np.asarray(value, np.float32)
+    moved = {f"truth/{_MOVED}{sensor}": values for sensor, values in truth.displacements.items()}
+    steps = {name: _steps(path, name, values, frames) for name, values in moved.items()}
     pressed = {f"truth/{_PRESSED}{sensor}": values for sensor, values in truth.tractions.items()}
-    tractions = {name: _of_nodes(path, name, value, frames).astype(np.float32) for name, value in pressed.items()}
-    _write_whole(path, attributes, plain, steps, forces, tractions)
-    return path
-
-
-def _write_whole(
-    path: Path,
-    attributes: dict[str, Any],
-    plain: dict[str, np.ndarray],
-    steps: dict[str, np.ndarray],
-    forces: dict[str, np.ndarray],
-    tractions: dict[str, np.ndarray],
-) -> None:
-    """Write the file whole or not at all, equal arrays to equal bytes; built in memory, as HDF5 crashes on a full disk.
-    plain, forces, tractions : name -> array, tractions in Pa; steps : name in truth -> displacements in SCALE m"""
-    import h5py
-
-    memory = io.BytesIO()
+    tractions = {name: _of_nodes(path, name, values, frames).astype(np.float32) for name, values in pressed.items()}
+    attributes: dict[str, Any] = {
+        "format": FORMAT, "simulated": True, "sensor": "BioTac", "scene": scene, "seed": int(seed), "made_by": made_by,
+        "note": note, "polarity": FALLS, "start_time": float(start_time),
+    }  # fmt: skip
     packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
-    with h5py.File(memory, "w") as file:
-        for key, value in attributes.items():
-            file.attrs[key] = value
-        for name, value in plain.items():
-            file.create_dataset(name, data=value, **packed)
-        for name, value in steps.items():
-            chunks = (min(BLOCK, len(value)), *value.shape[1:])
-            data = file.create_dataset(f"truth/{name}", data=value, chunks=chunks, **packed)
+    room = atomic.writing(path, "room in a folder that can be written to", "")
+    with room, atomic.new_file(path) as partial, new_hdf5(partial, attributes) as (file, _):
+        for name, values in plain.items():
+            file.create_dataset(name, data=values, **packed)
+        for name, values in steps.items():
+            data = file.create_dataset(name, data=values, chunks=(min(BLOCK, frames), *values.shape[1:]), **packed)
             data.attrs["scale"] = SCALE
-        for name, value in forces.items():
-            file.create_dataset(name, data=value, **packed)
-        for name, value in tractions.items():
-            chunks = (min(BLOCK, len(value)), *value.shape[1:])
-            file.create_dataset(name, data=value, chunks=chunks, **packed).attrs["unit"] = "Pa"
-    with atomic.writing(path, "room in a folder that can be written to", ""):
-        atomic.write_bytes(path, memory.getvalue())
+        for name, values in forces.items():
+            file.create_dataset(name, data=values, **packed)
+        for name, values in tractions.items():
+            chunks = (min(BLOCK, frames), *values.shape[1:])
+            file.create_dataset(name, data=values, chunks=chunks, **packed).attrs["unit"] = "Pa"
+    return path
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
@@ -200,8 +170,7 @@ def _of_nodes(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarr
 
 
 def _steps(path: Path, name: str, value: np.ndarray, frames: int) -> np.ndarray:
-    value = _of_nodes(path, f"truth/{name}", value, frames)
-    steps = np.rint(np.asarray(value, np.float64) / SCALE)
+    steps = np.rint(np.asarray(_of_nodes(path, name, value, frames), np.float64) / SCALE)
     if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):
-        raise TactileError(f"{path}, truth/{name}", "displacements beyond +-16 mm or not finite", "at most 16 mm")
+        raise TactileError(f"{path}, {name}", "displacements beyond +-16 mm or not finite", "at most 16 mm")
     return steps.astype(np.int16)
