@@ -25,7 +25,7 @@ TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
 
 class Part(NamedTuple):
-    """A part of the output: what it is, its amount in words, s of CPU, and MB of memory and of disk that it adds."""
+    """A part of the output: what it is, its extent in words, s of CPU, and MB of memory and of disk that it adds."""
 
     what: str
     extent: str

@@ -45,7 +45,8 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording; prepared : its parts' reports; frames, labels : of all of it (``recordings.labels``)"""
+    """Facts of a recording; prepared : its parts' reports; frames, labels : of all of it (``recordings.labels``)
+    start_time : unix s, 0 if unknown; film, stiffness : divided by a typical unit's"""
 
     recording: str
     layout: str

@@ -30,7 +30,7 @@ class Frame:
 
 @dataclasses.dataclass(frozen=True)
 class Skin:
-    """A skin around an axis along x, from a table of its radii. Lengths in m, angles in rad.
+    """A skin around an axis along x, from a table of its radii. Lengths in m, angles in rad; thickness : of the skin
     profile : table of stations x and angles, with the radii of outer skin, inner skin and core
     axis_y : of the axis (y, z) = (axis_y, 0); tip_x, base_x : between them the skin is a cylinder
     outer_poles, inner_poles : x where the meridians meet the axis, tip and base

@@ -96,7 +96,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Split:
-    """Row numbers of the contacts for training, validation and test; no press is in two of them."""
+    """Row numbers (int) of the contacts to train, for validation and to test; no press is in two of them."""
 
     train: np.ndarray
     validation: np.ndarray

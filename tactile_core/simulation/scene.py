@@ -23,8 +23,9 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Distribution of paired contacts: places uniform over the gel but for a rim, tilts uniform in a cone. Force grows
-    from force_min_n, each time by force_ratio, or depth by even steps from depth_min_mm to depth_max_mm."""
+    """Distribution of paired contacts: places uniform over the gel but for a rim, rim_margin_mm wide, tilts uniform in
+    a cone up to tilt_max_deg off the normal. Force grows from force_min_n, each time by force_ratio, or depth by even
+    steps from depth_min_mm to depth_max_mm."""
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
@@ -41,7 +42,8 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A point of a recorded motion: time, the indenter's place on the DIGIT's (unrolled) plane, and its force."""
+    """A point of a recorded motion: time_s, the indenter's place x_mm, z_mm on the DIGIT's (unrolled) plane,
+    force_n."""
 
     time_s: Annotated[float, Meta(ge=0, le=600)]
     x_mm: float
@@ -51,7 +53,8 @@ class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A simulated recording: which indenter moves, linearly between points, how it leans, and the electrodes' defects.
-    noise_counts : standard deviation; drift_counts : from the first to the last frame"""
+    noise_counts : standard deviation; drift_counts : from the first to the last frame
+    tilt_deg : between the indenter's axis and the surface normal, its upper end toward +x"""
 
     indenter: str
     points: Annotated[list[PointSpec], Meta(min_length=2)]

@@ -30,7 +30,7 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 
 
 class Decoded(NamedTuple):
-    """Translated frames (T,) of a recording, with their times (T,) s, signals and evidence.
+    """Translated frames (T,), by number, of a recording, with their time (T,) s, signals and evidence.
     state : (T, STATE) of the tracked contact; None where each frame is estimated alone"""
 
     frames: np.ndarray

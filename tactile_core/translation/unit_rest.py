@@ -47,7 +47,7 @@ class UnitRest:
 
 @dataclass(frozen=True)
 class Simulated:
-    """Changes (P, e) counts in simulated contacts, of a unit at rest counts (e,)."""
+    """The changes (P, e) counts in simulated contacts of a unit that reads rest (e,) counts without contact."""
 
     changes: np.ndarray
     rest: np.ndarray

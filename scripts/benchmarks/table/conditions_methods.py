@@ -42,7 +42,8 @@ NAMES = (*UNITS, "flat_bodies", *TWO_BALLS)
 
 @dataclass(frozen=True)
 class Condition:
-    """Contacts with their truth; gel : (C, M, 3) m; force : (C,) N, all contacts of a frame together."""
+    """Contacts with their truth; gel : (C, M, 3) m; force : (C,) N, all contacts of a frame together.
+    translated : translates them, to compare and to time; of : the contacts in words"""
 
     translated: Callable[[], Translation]
     gel: np.ndarray

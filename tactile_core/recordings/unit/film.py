@@ -122,7 +122,7 @@ class Film:
 
 
 class _Seen:
-    """Sampled frames of a recording: changes (n, e) counts from rest (n, e), and times (n,) s."""
+    """Sampled frames of a recording: change (n, e) counts from rest (n, e) counts, at time (n,) s."""
 
     def __init__(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> None:
         self.change, self.rest, self.sensor = change, rest, sensor
