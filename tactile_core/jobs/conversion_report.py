@@ -180,7 +180,8 @@ def _plain_matplotlib() -> Iterator[None]:
 
 
 def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
-    """Return warnings as lines that fit the sheet, first one on low confidence (k,) of the frames shown."""
+    """Return warnings as lines that fit the sheet, no more than it has room for.
+    confidence : (k,) of the frames shown; a line of its own comes first where all of it is low"""
     lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
     if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
         lines.insert(0, "Low confidence in every frame shown: take this as a guess.")

@@ -73,7 +73,7 @@ else:
 
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Part of a group: moved along the group's axes, turned about z; its lower end is ``z_mm`` above the plane of
+    """Part of a group: moved along its axes and turned about z; its lower end is ``z_mm`` above the plane of
     contact."""
 
     body: Single

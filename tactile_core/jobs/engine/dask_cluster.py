@@ -45,8 +45,8 @@ class Cluster:
     def __init__(
         self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
     ) -> None:
-        """Connect to an address; see the class. Raises TactileError for a bad address or file, and for other machines
-        without TLS unless `insecure`."""
+        """Store the address for a job's folder: see the class. Raises TactileError for a bad address or file, and for
+        other machines without TLS unless `insecure`."""
         self._say, self._insecure = say, insecure
         if address.startswith(("tcp://", "ucx://")) and not _here(address):
             self._without_tls(address)
