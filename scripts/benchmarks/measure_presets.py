@@ -17,6 +17,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 import time
+import timeit
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -123,26 +124,12 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
     """Yield every preset's error on heights (H, W) m, from converged direct light and the full model ``truth``.
     Baseline: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
-    of, levels, spread = (
-        f"{len(heights)} fields",
-        renderers[FAST].in_levels,
-        CoatingSpread(unit.camera, unit.coating.spread),
-    )
+    of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
     changes = {
         name: [levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
         for name, renderer in renderers.items()
     }
-    converged, full = zip(
-        *converge(
-            unit,
-            heights,
-            variant,
-            truth,
-            seed=0,
-            levels=lambda radiance: levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1)),
-        ),
-        strict=True,
-    )
+    converged, full = zip(*converge(unit, heights, variant, truth, seed=0), strict=True)
     for name, change in changes.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
                   baseline=rms(converged), of=of)  # fmt: skip
@@ -154,12 +141,12 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
 
 
 def converge(
-    unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int, levels: Callable
+    unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model.
-    heights : (H, W) m of each field; levels : converts radiance (H, W, LED) to grey levels"""
+    heights : (H, W) m of each field"""
     rest = of_unit(rest_height_map(unit.camera), unit)
-    light = MatteLight(unit, truth, variant, rest, seed)
+    light, levels = MatteLight(unit, truth, variant, rest, seed), spread_in_levels(unit)
     resting, seen = light.direct(rest)
     whole = light.completed(rest, resting, seen)
     for number, height in enumerate(heights, 1):
@@ -167,6 +154,12 @@ def converge(
         direct, seen = light.direct(height)
         yield levels(direct - resting), levels(light.completed(height, direct, seen) - whole)
         print(f"reference, seed {seed}: {number} of {len(heights)}", file=sys.stderr)
+
+
+def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
+    """Return a function from a light's radiance (H, W, 3) to grey levels (H, W, 3), spread by the coating."""
+    in_levels, spread = Renderer(unit, FAST).in_levels, CoatingSpread(unit.camera, unit.coating.spread)
+    return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
 
 
 def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
@@ -184,29 +177,23 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """Row of the preset ``name``'s CPU ms a frame on one thread: median over heights (H, W) m of the best of some
-    calls."""
+    """Row of the preset ``name``'s CPU ms a frame on one thread: median over heights (H, W) m of the least of
+    a few calls, as other programs only lengthen it."""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
     slow = name == REFERENCE.name
+    repeats = 1 if slow else REPEATS
     if not slow:
         renderer(heights[0])
-    spent = [best_ms(renderer, height, 1 if slow else REPEATS) for height in heights[: 1 if slow or quick else None]]
+    spent = [
+        1e3 * min(timeit.repeat(lambda h=height: renderer(h), timer=time.process_time, repeat=repeats, number=1))
+        for height in heights[: 1 if slow or quick else None]
+    ]
     small = unit.camera.width == 240
     target = MS_TARGET.get((name, None if name == FAST else variant)) if small else None
     label = "numpy" if name == FAST else variant
     size = f"{unit.camera.width}x{unit.camera.height}"
     return row(f"{name}_{label}_{size}_ms", float(np.median(spent)), "ms", target, of=f"{size}, one core, CPU time")
-
-
-def best_ms(renderer: Renderer, height: np.ndarray, repeats: int) -> float:
-    """Return the least CPU time, ms, of ``repeats`` drawings of height (H, W) m: other programs only lengthen it."""
-    spent = []
-    for _ in range(repeats):
-        start = time.process_time()
-        renderer(height)
-        spent.append(1e3 * (time.process_time() - start))
-    return min(spent)
 
 
 def one_thread(variant: str) -> None:

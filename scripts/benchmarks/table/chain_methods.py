@@ -6,11 +6,10 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks.measure_presets import QUICK_PASSES, one_thread, rms
+from benchmarks.measure_presets import QUICK_PASSES, converge, one_thread, rms
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.jobs.frame_pass import CHUNK
-from tactile_core.pictures.height_map import gel_mapper, of_unit, rest_height_map
-from tactile_core.pictures.mitsuba.matte_light import MatteLight
+from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE
 from tactile_core.pictures.renderer import Renderer
@@ -20,7 +19,6 @@ from tactile_core.training.step_errors import true_displacement
 from tactile_core.translation.translate import load_translator
 
 from .method import TEST_SET, Method, best_ms, peak_mb
-from .pictures_methods import spread_in_levels
 from .translation_methods import plain_signals
 
 NAMES = ("truth", FAST, "standard", "quality")
@@ -70,7 +68,6 @@ def _contacts(count: int) -> Pairs:
 def _draw_truth(unit, mapper, pairs, passes, file) -> None:  # noqa: ANN001
     variant = choose_variant().name
     one_thread(variant)
-    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
-    light = MatteLight(unit, dataclasses.replace(REFERENCE, passes=passes), variant, rest, 0)
-    resting, true = light.radiance(rest), true_displacement(pairs, "digit", np.arange(len(pairs.press)))
-    np.savez(file, pictures=[in_levels(light.radiance(of_unit(height, unit)) - resting) for height in mapper(true)])
+    heights = list(mapper(true_displacement(pairs, "digit", np.arange(len(pairs.press)))))
+    drawn = converge(unit, heights, variant, dataclasses.replace(REFERENCE, passes=passes), seed=0)
+    np.savez(file, pictures=[full for _, full in drawn])

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+import time
 
 import numpy as np
 
-from benchmarks.measure_presets import QUICK_PASSES, fields, one_thread, rms
+from benchmarks.measure_presets import QUICK_PASSES, converge, fields, one_thread, rms
 from tactile_core.accuracy import row
-from tactile_core.pictures.coating_spread import CoatingSpread
-from tactile_core.pictures.height_map import of_unit, rest_height_map
-from tactile_core.pictures.mitsuba.matte_light import MatteLight
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE, preset_named
 from tactile_core.pictures.renderer import Renderer
@@ -50,30 +47,19 @@ def measure(name: str, quick: bool, truth: str) -> Method:
     return Method("pictures", label, ms, mb, rms(levels, list(true)), "levels", rms(list(true)), of, tuple(more))
 
 
-def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function from a light's radiance (H, W, 3) to grey levels (H, W, 3), spread by the coating."""
-    in_levels, spread = Renderer(unit, FAST).in_levels, CoatingSpread(unit.camera, unit.coating.spread)
-    return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
-
-
-def _reference(unit, heights, quick, truth) -> Method:  # noqa: ANN001
-    """Measure the reference, whose error is its noise: half of the squared difference between two seeds. heights : (H,
-    W) m of each field; truth : file for its pictures"""
-    import time
-
+def _reference(unit: Calibration, heights: list[np.ndarray], quick: bool, truth: str) -> Method:
+    """Measure the reference, whose error is its noise: half of the squared difference between two seeds. Each seed's
+    first time includes the picture at rest. heights : (H, W) m of each field; truth : file for its pictures"""
     preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE
     variant = choose_variant().name
     one_thread(variant)
-    rest, in_levels = of_unit(rest_height_map(unit.camera), unit), spread_in_levels(unit)
     pictures, ms = [], []
-    for seed in (0, 1):
-        light = MatteLight(unit, preset, variant, rest, seed)
-        resting = light.radiance(rest)
-        for height in heights if seed == 0 else heights[:1]:
+    for seed, some in ((0, heights), (1, heights[:1])):
+        drawn = converge(unit, some, variant, preset, seed)
+        for _ in some:
             began = time.process_time()
-            found = light.radiance(of_unit(height, unit))
+            pictures.append(next(drawn)[1])
             ms.append(1e3 * (time.process_time() - began))
-            pictures.append(in_levels(found - resting))
     mb, true, other = peak_mb(), pictures[:-1], pictures[-1:]
     of = f"{len(true)} contact fields against the reference, {preset.passes} passes"
     np.savez(truth, pictures=true, of=of)
