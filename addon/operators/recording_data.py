@@ -18,7 +18,7 @@ from ...tactile_core.recordings import PrepareOptions, Recording, Signals, reade
 from ...tactile_core.recordings.opened_file import opened
 from ...tactile_core.recordings.recording import split
 from ...tactile_core.recordings.tables import column_map
-from ...tactile_core.recordings.tables.mapped_files import guess_map
+from ...tactile_core.recordings.tables.mapped import guess_map
 from ...tactile_core.translation.answer import Answer
 from ...tactile_core.translation.translate import PreparedRows, load_translator, translated_parts
 from ...tactile_core.translation.translator import Translation, Translator

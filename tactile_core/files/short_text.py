@@ -1,13 +1,26 @@
-"""Short texts of results that hold large arrays, for ``print`` and notebooks."""
+"""Short texts: of what messages quote, and of results that hold large arrays, for ``print`` and notebooks."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+SHOWN = 40  # characters of a cell or header that a message repeats
 LONGEST = 9  # numbers: an array up to this long (a force, a rotation) is written out
+
+
+def shown(text: str) -> str:
+    """Quote the text for a message, cut when long."""
+    return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """List names for a message, the first few (`most`) and the number of the others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 class Summary:

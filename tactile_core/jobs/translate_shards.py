@@ -1,4 +1,5 @@
-"""Recordings to shards of translated frames: each recording's signals are prepared once, then its shards are made.
+"""Recordings to shards of translated frames: the recipe of such a job, and its tasks. Each recording's signals are
+prepared once, then its shards are made.
 
 A shard is a checksummed HDF5 file in the layout of ``frames_file``, pictures included. Its attributes name the
 recording and its hash, the recipe's hash, its number and the number of shards; its rows are frames from `number *
@@ -7,30 +8,71 @@ shard_frames` up to those of the next."""
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
 from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import open_checked
+from ..pictures.mitsuba.variant import variant_for
+from ..pictures.presets import FAST
+from ..recordings import readers
+from ..sensors.calibration_file import load_calibration
 from . import convert, prepared_signals
 from .convert import ToolOptions
+from .drawer import describe_gel
 from .engine import job as jobs
 from .engine.inputs import unit_hash
-from .engine.recipes import InputFacts
+from .engine.recipes import MAX_SHARD_FRAMES, InputFacts, Translate
 from .frame_pass import FramePass, Tools
 from .prepared_signals import Prepared
 
 if TYPE_CHECKING:
     from .engine.job import Job
-    from .engine.recipes import Translate
 
 GROWS = False
 # kB a frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
 ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
+
+
+def completed(
+    wanted: Translate, paths: Sequence[Path], say: Callable[[str], None], weights: str | None, calibration: str | None
+) -> Translate:
+    """Return the recipe of a job on these recordings, with the hashes, source and variant that follow from its files.
+
+    wanted : what was asked for; its preset is empty for fast pictures, if any
+    say : called with sentences on approximations of the gel; weights, calibration : folder and file, None for those
+        that ship
+    Raises TactileError for options that do not go together, and for unknown names."""
+    wanted.prepare.options().check()
+    source = None if weights else readers.sensor_of_first(paths, wanted.prepare.columns)
+    tools = ToolOptions(weights, answer=wanted.answer, gel=wanted.gel, target=wanted.target, source=source)
+    network, solves = tools.load_networks()
+    if wanted.shard_frames > MAX_SHARD_FRAMES:
+        raise TactileError("--shard-frames", str(wanted.shard_frames), f"1 to {MAX_SHARD_FRAMES}")
+    if solves:
+        from . import solved_gel
+
+        solved_gel.check_installed()
+    unit = load_calibration(calibration, wanted.target)
+    for sentence in describe_gel(wanted.target, network.target):
+        say(sentence)
+    if wanted.preset and "image" not in wanted.keep:
+        raise TactileError("--preset", wanted.preset, "--keep image", "Keep the pictures that it makes")
+    if "marker_motion" in wanted.keep:
+        from ..pictures.marker_field import MarkerField
+
+        MarkerField(unit)  # refused here where the unit has no dots
+    preset = wanted.preset or FAST
+    return msgspec.structs.replace(
+        wanted, weights=network.sha256, source=network.source, preset=preset, variant=variant_for(preset),
+        calibration="" if calibration is None else unit_hash(Path(calibration)),
+    )  # fmt: skip
 
 
 def translated(frames: int, job: Job[Translate]) -> int:

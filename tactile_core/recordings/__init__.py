@@ -3,7 +3,7 @@
 ``read(path)`` gives a :class:`Recording`, the file as it is; ``prepare(recording, options)`` gives :class:`Signals`,
 the changes against rest that the networks take. A new file layout is one new file in ``formats/``."""
 
-from .answers import prepare
+from .preparer import prepare
 from .readers import layouts, read
 from .recording import Recording, Truth
 from .signals import PrepareOptions, Signals

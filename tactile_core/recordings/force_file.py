@@ -11,7 +11,7 @@ from .opened_file import opened
 from .recording import Recording, split
 from .tables.array_table import table_of
 from .tables.json_table import read_json
-from .tables.mapped_files import open_store
+from .tables.mapped import open_store
 from .tables.table import Table, read_table
 from .time_stamps import seconds_of
 

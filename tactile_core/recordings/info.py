@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..files.short_text import listed
 from ..sensors import SAMPLE_RATE, electrode_count, title, typical_rest
 from .flags import Flag, names
 from .formats import HAND
@@ -17,7 +18,6 @@ from .readers import pac_columns, read, sensor_of
 from .recording import Recording
 from .signal_kind import detect
 from .signals import PrepareOptions, Signals
-from .tables.truncated_cell import listed
 
 if TYPE_CHECKING:
     from .electrode_gains import ElectrodeGains, SensorFile

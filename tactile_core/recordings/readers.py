@@ -12,6 +12,7 @@ from types import ModuleType
 
 from ..errors import TactileError
 from ..files.registry import modules_of
+from ..files.short_text import shown
 from ..sensors import SOURCE, electrode_count, title
 from . import formats
 from .array_store import Store
@@ -26,11 +27,9 @@ from .tables.column_map import ColumnMap, refuse_bag
 from .tables.column_map import read as read_map
 from .tables.json_table import read_json
 from .tables.map_guess import is_time
-from .tables.mapped import read_mapped
-from .tables.mapped_files import open_store, read_by_map
+from .tables.mapped import open_store, read_by_map, read_mapped
 from .tables.table import Table, read_header, read_table
 from .tables.table_header import NUMBERED
-from .tables.truncated_cell import shown
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 PAC = re.compile(r"pac\d+")

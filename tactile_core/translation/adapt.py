@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from ..errors import TactileError
+from ..files.short_text import listed
 from ..recordings import PrepareOptions, Recording, Signals, read
 from ..recordings.electrode_faults import named_electrodes
 from ..recordings.electrode_gains import LEAST, MOST, ElectrodeGains, SensorFile, units_file
@@ -19,7 +20,6 @@ from ..recordings.preparer import Preparer
 from ..recordings.readers import each_finger, sensor_of
 from ..recordings.recording import FINGERS, short_of, split
 from ..recordings.tables.column_map import ColumnMap
-from ..recordings.tables.truncated_cell import listed
 from ..recordings.unit import film
 from ..recordings.unit.contact_law import as_contact
 from ..recordings.unit.gain_matching import PRIOR, Match, match

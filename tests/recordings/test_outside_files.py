@@ -21,7 +21,7 @@ from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.opened_file import opened
 from tactile_core.recordings.tables import column_map
-from tactile_core.recordings.tables.mapped_files import guess_map
+from tactile_core.recordings.tables.mapped import guess_map
 from tactile_core.sensors import REST_COUNTS
 
 NAMES = ["pdc_raw", *(f"E{i}" for i in range(1, 20))]

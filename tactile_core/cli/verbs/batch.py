@@ -166,7 +166,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     """Return the recipe that the options describe, of these recordings."""
-    from ...jobs import results, translate_recipe
+    from ...jobs import results, translate_shards
     from ...jobs.engine.recipes import SHARD_FRAMES, Prepare, Translate
     from ...recordings import electrode_gains
     from ...translation.answer import parse_answer
@@ -181,7 +181,7 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
         ),
         gel=options.gel, shard_frames=SHARD_FRAMES if options.shard_frames is None else options.shard_frames,
     )  # fmt: skip
-    return translate_recipe.completed(wanted, paths, say, options.weights, options.calibration)
+    return translate_shards.completed(wanted, paths, say, options.weights, options.calibration)
 
 
 def _status(folder: Path, job: Job) -> int:

@@ -79,7 +79,7 @@ def _write_columns(options: argparse.Namespace) -> None:
     """Write the map that the first recording suggests."""
     from ...recordings.opened_file import opened
     from ...recordings.tables import column_map
-    from ...recordings.tables.mapped_files import guess_map
+    from ...recordings.tables.mapped import guess_map
 
     with opened(options.recordings[0]) as (container, where, _, file):
         guessed, held = guess_map(where, container, file)

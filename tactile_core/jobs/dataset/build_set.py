@@ -22,7 +22,7 @@ from ...recordings.force_file import read_columns, read_force
 from ...recordings.recording import split as chosen
 from ...sensors import TARGET
 from ...translation.answer import Answer
-from .. import export, translate_recipe
+from .. import export, translate_shards
 from ..engine import inputs
 from ..engine import job as jobs
 from ..engine import run as runs
@@ -135,7 +135,7 @@ def _translated(
             list(KEEP), "", prepare=recipe.prepare, sensor=sensor, target=asked.target, preset=asked.preset or "",
             answer=Answer(frames_apart=recipe.snapshots), every=recipe.every,
         )  # fmt: skip
-        whole = translate_recipe.completed(wanted, paths, asked.say, asked.weights, asked.calibration)
+        whole = translate_shards.completed(wanted, paths, asked.say, asked.weights, asked.calibration)
         job = jobs.make(listed, whole, asked.weights, asked.calibration)
         if not jobs.exists(place):
             jobs.write(place, job)

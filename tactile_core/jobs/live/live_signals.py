@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...recordings.answers import prepare
 from ...recordings.doubt import REST, Reason, reason_of
 from ...recordings.electrode_faults import STALE, alike, repeats, silent
 from ...recordings.flags import Flag
-from ...recordings.preparer import DOUBTS
+from ...recordings.preparer import DOUBTS, prepare
 from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
 from ...recordings.rest_level import Baseline, Changes

@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 
 from ...errors import TactileError
 from ...files import installed, outside
+from ...files.short_text import listed
 from ..array_store import damage_reported
-from ..tables.truncated_cell import listed
 from .ros_messages import Definition, definitions
 from .ros_sensors import sensors_in
 

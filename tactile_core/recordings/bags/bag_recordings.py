@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import TactileError
+from ...files.short_text import listed
 from ..assemble import MAX_FRAMES, assemble, check_electrodes, sensor_with
 from ..recording import Chosen, Recording, named
-from ..tables.truncated_cell import listed
 from .bag import Bag, Topic, refused
 from .ros_messages import Decoder
 from .ros_sensors import channels, in_message, not_read, sensors_in, stamp_of

@@ -1,27 +1,34 @@
-"""Read the recording of a table by a map of its columns, also where each row holds one channel (a long table)."""
+"""Read recordings of any container but bags by a map of their columns, also where each row holds one channel (a long
+table); and guess the map."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ...errors import TactileError
 from ...sensors import ELECTRODES, SAMPLE_RATE, SP, electrode_count
+from ..array_store import Store, open_hdf5, open_npz
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
 from ..time_stamps import SECONDS
-from .column_map import CHANNELS, ColumnMap
-from .map_guess import NUMBERED
-from .table import Table
+from .array_table import names_of, table_of
+from .column_map import CHANNELS, ColumnMap, refuse_bag
+from .json_table import read_json
+from .map_guess import NUMBERED, guess, with_unit
+from .matlab import open_matlab
+from .table import Table, read_header, read_table, read_tables
 
 TITLES = {"csv": "CSV", "json": "JSON", "hdf5": "HDF5", "npz": "NPZ", "mat": "MATLAB"}
 STAMPED = 1.5  # stamps for each value of a channel, up to which rows of one stamp are a frame (assumed)
 MOST_SERIES = 5  # values of a column that tells fingers apart; more are places in a buffer (assumed)
 LOOKED_AT = 10_000  # rows
+GUESSED_BY = 2**18  # bytes of a text by which its map is guessed: some hundred frames (assumed enough)
 MILLIVOLTS = re.compile(r"(?:^|[^a-z])mv(?:[^a-z]|$)")
 TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers have 0.5 (assumed)
 
@@ -157,3 +164,40 @@ def _readings(table: Table, names: Sequence[str]) -> np.ndarray:
     found = np.full((len(counts), len(names)), np.nan)
     found[:, [place for place, name in enumerate(names) if name]] = counts
     return found
+
+
+def read_by_map(
+    path: str, container: str, file: BinaryIO, columns: ColumnMap, left_out: Callable[[str], bool] | None = None
+) -> Recording:
+    """Read an open file by a map, without columns `left_out`. Raises TactileError for a missing column or array."""
+    if container in ("csv", "json"):
+        table = read_json(path, file) if container == "json" else read_table(path, file, left_out)
+        found, taken = read_mapped(table, columns, container), table.taken
+        held = table.header if container == "json" else read_header(path, file)
+    else:
+        with open_store(path, container, file) as store:
+            found = read_mapped(table_of(store, columns.names()), columns, container)
+            held, taken = tuple(store.shapes), store.taken
+    return replace(found, not_taken=tuple(name for name in held if name not in taken))
+
+
+@contextmanager
+def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
+    """Open the arrays of a file whose container is hdf5, npz or mat."""
+    opened = {"hdf5": lambda: open_hdf5(path), "npz": lambda: open_npz(path, file)}
+    with opened.get(container, lambda: open_matlab(path, file))() as store:
+        yield store
+
+
+def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap], tuple[str, ...]]:
+    """Guess the maps of an open file's fingers; return its columns, too. Raises TactileError, also for a bag."""
+    refuse_bag(path, container)
+    if container in ("csv", "json"):
+        table = read_json(path, file) if container == "json" else next(read_tables(path, file, GUESSED_BY, 0))[0]
+        return guess(table.header, table), table.header
+    with open_store(path, container, file) as store:
+        names = names_of(store)
+        found = guess(names)
+        return [with_unit(each, table_of(store, [each.time])) if each.time else each for each in found], tuple(
+            store.shapes
+        )

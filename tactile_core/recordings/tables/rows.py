@@ -1,4 +1,5 @@
-"""Parse the rows of a text table: clean ones together, others cell by cell, with an error for each bad cell."""
+"""Parse the rows of a text table: clean ones together, others cell by cell, with an error for each bad cell, and doubt
+the last cell of a file that does not end in a newline: it may be cut off."""
 
 from __future__ import annotations
 
@@ -7,10 +8,10 @@ from itertools import islice, pairwise
 
 import numpy as np
 
+from ...files.short_text import shown
 from ..assemble import Problem
 from .cells import Cells, number
 from .table_header import COMMENTS, SPACE, Header, split
-from .truncated_cell import shown
 
 LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:([,.'’_\s])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")
@@ -96,3 +97,30 @@ def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
     if count == 1:
         return (f"line {where}: blank, a comment or the header again; no frame is made of it",)
     return (f"lines {where}: blank, comments or the header again ({count} in all); no frames are made of them",)
+
+
+def doubt_last_cell(
+    kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
+) -> None:
+    """Report the last number of a file without final newline as a problem where it may be cut off: every other row ends
+    in a separator and this one does not, or else its value looks cut (`_looks_cut`). Complete files that merely lack it
+    are common. kept : number and text of each line; values : (T, C) of them, of which the last becomes NaN"""
+    number, line = kept[-1]
+    if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
+        return
+    closed = kept[-2][1].rstrip(" ").endswith(separator)
+    if closed or _looks_cut(values[:, -1]):
+        cell = line.split(separator)[-1].strip()
+        values[-1, -1] = np.nan
+        found = f"the file ends in this cell, {shown(cell)}" + ("" if closed else ", far below the rows before")
+        problems.append(Problem(len(kept) - 1, number, header[-1], f"{found} (truncated)"))
+
+
+def _looks_cut(column: np.ndarray) -> bool:
+    """Return true if the last value of a column (T,) looks like the first digits of a longer number: below half the
+    value before (assumed; a missing digit makes a count ten times smaller), and no step in the column is as large. A
+    signal that swings around 0 passes; lost decimals change little."""
+    before = column[:-1][np.isfinite(column[:-1])]
+    if not len(before) or abs(column[-1]) >= 0.5 * abs(before[-1]):
+        return False
+    return bool(abs(column[-1] - before[-1]) > np.abs(np.diff(before)).max(initial=0.0))

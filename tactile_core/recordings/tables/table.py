@@ -14,9 +14,8 @@ from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
 from .cells import LABEL, MISSING, Words, unquoted
-from .rows import clean, is_row, no_number, row, tell_blank_lines
+from .rows import clean, doubt_last_cell, is_row, no_number, row, tell_blank_lines
 from .table_header import Header
-from .truncated_cell import doubt_last_cell
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)

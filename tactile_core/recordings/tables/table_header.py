@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from ...errors import TactileError
+from ...files.short_text import shown
 from .cells import INSIDE, LOOKED_AT, OUTSIDE, Cells, number
-from .truncated_cell import shown
 
 MAX_COLUMNS = 1000  # the widest layout has 50 (assumed enough)
 COMMENTS = "#", "%", "//"
