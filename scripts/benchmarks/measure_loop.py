@@ -1,19 +1,23 @@
-"""Measure contacts in a simulator's loop: alone and along paths, and whole steps of a ``Gel`` with their pictures.
+"""Measure contacts in a simulator's loop: alone and along paths, their pictures, and whole steps of a ``Gel``.
 
     python scripts/benchmarks/measure_loop.py --count 500 --json FILE   docs/in_the_loop.md's
     python scripts/benchmarks/measure_loop.py --count 18                                  a quick look
 
 Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
 same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
-to the goal and five slides of 0.1 mm along the finger. Median, 95 and 99 % of CPU and wall ms a contact on one core,
-warm. Beside them the fast tier's error against the full one (`mechanics_tiers.json`). Needs the extra [fem].
+to the goal and five slides of 0.1 mm along the finger. As meshes: four bodies by formula and, at the same places and
+depths, as meshes of up to 82,000 triangles, each from nothing, and how long a mesh takes to load. Median, 95 and 99 %
+of CPU and wall ms a contact on one core, warm. Beside them the fast tier's error against the full one
+(`mechanics_tiers.json`). Needs the extra [fem].
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import tempfile
 import time
+import unittest.mock
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -33,12 +37,15 @@ from benchmarks.mechanics.random_contacts import RandomContact, random_contacts 
 from tactile_core.accuracy import Row, row  # noqa: E402
 from tactile_core.errors import TactileError  # noqa: E402
 from tactile_core.files import compiled  # noqa: E402
+from tactile_core.geometry.indenters import Box, Cylinder, Indenter, MeshIndenter, Sphere  # noqa: E402
 from tactile_core.jobs.gel import Gel  # noqa: E402
 from tactile_core.mechanics.error_estimate import measured  # noqa: E402
 from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
 from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
-from tactile_core.mechanics.fast.press import CorrectedPress  # noqa: E402
+from tactile_core.mechanics.fast.press import CorrectedPress, FastContact  # noqa: E402
 from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under  # noqa: E402
+from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: E402
+from tactile_core.pictures.renderer import Renderer  # noqa: E402
 
 STEPS, SEED = 10, 20261125
 SLIDE = 0.1e-3  # m a step
@@ -83,34 +90,98 @@ def as_rows(name: str, times: Times, error: str) -> list[Row]:
 def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
     """Yield each measured thing's name, times, and error in words; count : contacts a sensor"""
     for sensor in ("digit", "biotac"):
-        yield from of_sensor(sensor, count)
+        for name, times, error, last in of_sensor(sensor, count):
+            yield name, times, error
+            if sensor == "digit" and name.endswith("path"):
+                yield from pictures(last)
     yield "digit, step and picture", gel_steps(count), "see above"
+    yield from meshes(count)
 
 
-def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield name, times, and error in words, of a sensor's ``count`` contacts alone and on paths."""
+def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
+    """Yield name, times, error in words and last contacts, of a sensor's ``count`` contacts alone and on paths."""
     tier = measured()["tiers"]["fast"][sensor]["bins"][1]
     stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
     for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
-        times, settled = measure(sensor, steps, contacts)
-        yield f"{sensor}, {name}", times, f"{stated}; {settled:.1%} of paths settled"
+        times, last = measure(sensor, steps, contacts)
+        settled = sum(each is not None for each in last) / len(last)
+        yield f"{sensor}, {name}", times, f"{stated}; {settled:.1%} of paths settled", list(filter(None, last))
 
 
-def measure(sensor: str, steps: int, count: int) -> tuple[Times, float]:
+def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
     """Measure ``count`` random contacts, each reached in ``steps`` even steps of depth, from 2 on the first not timed.
-    Returns times of the steps, and the part of the paths at whose end a contact is found."""
+    Returns times of the steps, and the contacts at the ends, None where none is found."""
     times: Times = []
-    settled = []
+    last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):
         pose = pose_at(sensor, contact.indenter, contact.place)
         thick = thickness_under(sensor, contact.indenter, pose)
         press = CorrectedPress(compliance_of(sensor), contact.indenter, pose, DEPTH_LIMIT * thick, FRICTION)
         for step in range(1, steps + 1):
-            took, found = timed(lambda p=press, d=contact.depth * thick * step / steps: found_at(p, d))
+            took, solved = timed(lambda p=press, d=contact.depth * thick * step / steps: at_depth(p, d))
             if number >= WARM and (step > 1 or steps == 1):
                 times.append(took)
-        settled.append(found)
-    return times, float(np.mean(settled))
+        last.append(solved)
+    return times, last
+
+
+def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
+    """Yield the times of loading four meshes, and of contacts by formula and as meshes with the difference of force."""
+    import trimesh
+
+    made = trimesh.creation
+    bodies: list[tuple[Indenter, Any]] = [
+        (Sphere(3e-3), made.icosphere(5, 3e-3)),
+        (Sphere(12e-3), made.icosphere(6, 12e-3)),
+        (Cylinder(1.5e-3, 0.1e-3), made.cylinder(1.5e-3, 10e-3, sections=128)),
+        (Box((8e-3,) * 3, 0.1e-3), made.box((8e-3,) * 3)),
+    ]
+    compliance_of("digit")
+    loads: Times = []
+    pairs: list[tuple[Indenter, MeshIndenter]] = []
+    with tempfile.TemporaryDirectory() as folder, unittest.mock.patch.dict(os.environ, TACTILE_CACHE=folder):
+        MeshIndenter.from_trimesh(made.box((2e-3,) * 3))  # compiles the loops
+        for formula, mesh in bodies:
+            mesh.apply_translation([0, 0, -mesh.bounds[0, 2]])
+            took, loaded = timed(lambda m=mesh: MeshIndenter.from_trimesh(m))
+            loads.append(took)
+            pairs.append((formula, loaded))
+    off = f"within {1e6 * max(mesh.error[0] for _, mesh in pairs):.2g} um rms of the mesh"
+    yield "digit, a mesh is loaded", loads, off
+    times: tuple[Times, Times] = ([], [])
+    apart = []
+    for number, contact in enumerate(random_contacts(count + WARM, SEED)):
+        forces = []
+        for taken, indenter in zip(times, pairs[number % len(pairs)], strict=True):
+            try:
+                pose = pose_at("digit", indenter, contact.place)
+            except TactileError:  # another body than the place was drawn for may pass the sensor by
+                break
+            thick = thickness_under("digit", indenter, pose)
+            press = CorrectedPress(compliance_of("digit"), indenter, pose, DEPTH_LIMIT * thick, FRICTION)
+            took, solved = timed(lambda p=press, d=contact.depth * thick: at_depth(p, d))
+            if number >= WARM:
+                taken.append(took)
+            forces.append(np.nan if solved is None else solved.axial_force)
+        if len(forces) == 2 and forces[0]:  # a light touch may fall between the surface's nodes
+            apart.append(abs(forces[1] / forces[0] - 1))
+    yield "digit, alone, four bodies by formula", times[0], "see alone"
+    yield "digit, alone, as meshes", times[1], f"{np.nanmedian(apart):.2%} of force from the formula (median)"
+
+
+def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
+    """Yield the height map's and the fast picture's times."""
+    renderer = Renderer(preset="fast")
+    mapper = gel_mapper(renderer.camera)
+    heights: Times = []
+    shading: Times = []
+    for contact in contacts:
+        with folds_counted():
+            took, height = timed(lambda c=contact: mapper(c.corrected.displacement))
+        heights.append(took)
+        shading.append(timed(lambda h=height: renderer(h))[0])
+    yield "digit, height map", heights, "0.1 um"
+    yield "digit, fast picture", shading, "see optics.md"
 
 
 def gel_steps(count: int) -> Times:
@@ -139,12 +210,13 @@ def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
     return poses
 
 
-def found_at(press: CorrectedPress, depth: float) -> bool:
-    """Solve the contact at a depth, m; False where none is found, whose time counts too."""
+def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:
+    """Return the contact at a depth, m; None where none is found, whose time counts too."""
     try:
-        return press.at_depth(depth).linear.converged
+        found = press.at_depth(depth)
     except (TactileError, UnsolvedError):
-        return False
+        return None
+    return found if found.linear.converged else None
 
 
 def timed(work: Callable[[], Any]) -> tuple[tuple[float, float], Any]:

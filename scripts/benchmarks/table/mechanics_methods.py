@@ -79,7 +79,7 @@ def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
         return []
     count = IN_LOOP_QUICK if quick else IN_LOOP
     found = list(measure_loop.of_sensor(sensor, count))
-    return [each for name, times, error in found for each in measure_loop.as_rows(name, times, error)]
+    return [each for name, times, error, _ in found for each in measure_loop.as_rows(name, times, error)]
 
 
 def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
