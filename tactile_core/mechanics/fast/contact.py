@@ -125,8 +125,7 @@ class ContactProblem:
         return contact
 
     def _steps(self, pose: Pose, axial_force: float | None, start: Contact | None, steps: int) -> Contact:
-        """Go from the start to the goal, a pose or, if not None, an axial_force N along the motion, in several
-        steps."""
+        """Go from the start to the goal in steps. axial_force : N along the motion, None for the pose's depth"""
         first = contact = start or self._nothing(self.pose)
         for share in np.arange(1, steps + 1) / steps:
             goal = None if axial_force is None else first.axial_force + share * (axial_force - first.axial_force)
