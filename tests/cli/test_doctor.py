@@ -68,10 +68,6 @@ def test_an_old_llvm_is_not_trusted(said, words):
     assert bool(variant._too_old(said)) == bool(words)
 
 
-def test_a_path_to_nothing_is_trouble():
-    assert "which is not there" in variant.llvm_trouble("/no/such/libLLVM.so")
-
-
 def test_nothing_is_imported_from_the_current_folder(tmp_path, monkeypatch):
     """A stranger's folder may hold an h5py.py; the probe of Mitsuba's LLVM is started in the same way."""
     (tmp_path / "h5py.py").write_text("open('ran', 'w')\n")

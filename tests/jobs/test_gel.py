@@ -327,27 +327,11 @@ def test_meshes_and_sensors_that_cannot_be_are_refused():
 
 
 def test_first_touch_is_looked_for_once_a_line(monkeypatch):
-    """It is the same at every depth, and costs as much as a small contact; numbers are those without it."""
-    gel, looked, whole = Gel("digit", indenter=Sphere(3e-3)), [], gel_module.first_touch_on_line
-
-    def first_touch_on_line(lattice, indenter, pose):
-        looked.append(pose)
-        return whole(lattice, indenter, pose)
-
-    pose = gel.touching(x=-8e-3, z=0.5e-3)
-    monkeypatch.setattr(gel_module, "first_touch_on_line", first_touch_on_line)
-    forces = []
+    """It is the same at every depth, and costs as much as a small contact."""
+    gel, looked, whole = Gel("digit", BALL), [], gel_module.first_touch_on_line
+    pose = gel.touching(-8e-3, 0.5e-3)
+    monkeypatch.setattr(gel_module, "first_touch_on_line", lambda *given: looked.append(given) or whole(*given))
     for depth in (0.1e-3, 0.2e-3, 0.3e-3):
-        there = pose.copy()
-        there[1, 3] += depth
-        forces.append(gel.press(there).force)
+        gel.press(shifted(pose, y=depth))
     assert len(looked) == 1
-    there[0, 3] += 0.1e-3  # slid
-    slid = gel.press(there)
-    assert len(looked) == 2 and slid.depth > 0
-    again = Gel("digit", indenter=Sphere(3e-3))
-    for number, depth in enumerate((0.1e-3, 0.2e-3, 0.3e-3)):
-        there = pose.copy()
-        there[1, 3] += depth
-        again._touch = None
-        np.testing.assert_allclose(again.press(there).force, forces[number], rtol=1e-9)
+    assert gel.press(shifted(pose, x=0.1e-3, y=0.3e-3)).depth > 0 and len(looked) == 2  # slid

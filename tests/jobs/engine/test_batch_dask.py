@@ -163,14 +163,6 @@ def test_a_queue_file_is_checked(tmp_path):
         _read("here:8786")
 
 
-def test_the_script_that_a_slurm_cluster_would_submit(tmp_path):
-    jobqueue = pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
-    options = {"cores": 1, "memory": "4GB", "walltime": "01:00:00", "queue": "cpu", "interface": "lo"}
-    with jobqueue.SLURMCluster(**options, scheduler_options={"dashboard_address": None}) as cluster:
-        script = cluster.job_script()
-    assert "#SBATCH -p cpu" in script and "#SBATCH -t 01:00:00" in script and "distributed.cli.dask_worker" in script
-
-
 @pytest.mark.parametrize("address", ["tcp://10.0.0.1:8786", "tcp://head:8786", "tcp://127.0.0.1.evil.example:8786"])
 def test_a_scheduler_elsewhere_without_tls_has_to_be_asked_for(address, tmp_path):
     with pytest.raises(TactileError, match="--insecure"):

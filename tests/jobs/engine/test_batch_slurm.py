@@ -1,4 +1,4 @@
-"""SLURM of one node where there is one; everywhere its stand-ins, that start and end processes of this machine.
+"""A real SLURM of one node, where there is one; test_batch_run and test_batch_dask have its parts everywhere.
 
 What a cluster would do with several nodes, limits and accounting is not tried.
 """
@@ -21,41 +21,6 @@ from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.dask_cluster import Cluster
 from tactile_core.translation import translate
 
-SBATCH = """#!{python}
-import os, re, subprocess, sys
-words = sys.argv[1:]
-array = next((re.fullmatch(r"--array=(\\d+)-(\\d+)", word) for word in words if word.startswith("--array")), None)
-# The script is read at once, as the real one does: it is removed as soon as this returns.
-command = words[words.index("--wrap") + 1] if "--wrap" in words else open(words[-1]).read()
-ids = range(int(array[1]), int(array[2]) + 1) if array else [0]
-log = open(os.environ["FAKE_LOG"], "a")
-started = []
-for number in ids:
-    environment = dict(os.environ, SLURM_ARRAY_TASK_ID=str(number))
-    started.append(
-        subprocess.Popen(["bash", "-c", command], env=environment, stdout=log, stderr=log, start_new_session=True)
-    )
-print("Submitted batch job", started[-1].pid)
-for process in started if array else ():  # the real one returns at once
-    process.wait()
-"""
-SCANCEL = "#!/bin/sh\nfor id; do kill -- -$id 2>/dev/null || true; done\n"
-
-
-@pytest.fixture
-def slurm(tmp_path, monkeypatch):
-    """A folder of commands in front of the path; what the jobs print is in log."""
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    tactile = f'#!/bin/sh\nexec {sys.executable} -m tactile_core "$@"\n'
-    for name, text in (("sbatch", SBATCH.format(python=sys.executable)), ("scancel", SCANCEL), ("tactile", tactile)):
-        (folder / name).write_text(text)
-        (folder / name).chmod(stat.S_IRWXU)
-    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setenv("FAKE_LOG", str(tmp_path / "log"))
-    monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    return tmp_path
-
 
 @pytest.fixture(scope="module")
 def calm(shared_recordings, tmp_path_factory):
@@ -74,16 +39,20 @@ def calm(shared_recordings, tmp_path_factory):
 
 
 @pytest.fixture
-def real_slurm(slurm, monkeypatch):
-    """The stand-ins' folder, with SLURM's own commands in their place; ours is found beside this Python."""
+def slurm(tmp_path, monkeypatch):
+    """A folder in which SLURM runs, with this checkout's command in front of the path."""
     if absent := one_node_slurm.missing():
         pytest.skip(absent)
-    for name in ("sbatch", "scancel"):
-        (slurm / "bin" / name).unlink()
-    with one_node_slurm.slurm(slurm / "slurm") as environment:
+    (tmp_path / "bin").mkdir()
+    command = tmp_path / "bin" / "tactile"
+    command.write_text(f'#!/bin/sh\nexec {sys.executable} -m tactile_core "$@"\n')
+    command.chmod(stat.S_IRWXU)
+    monkeypatch.setenv("PATH", f"{command.parent}{os.pathsep}{os.environ['PATH']}")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    with one_node_slurm.slurm(tmp_path / "slurm") as environment:
         for name in ("SLURM_CONF", "PATH"):
             monkeypatch.setenv(name, environment[name])
-        yield slurm
+        yield tmp_path
 
 
 def the_page_s(command, other):
@@ -98,11 +67,11 @@ def queue_is_empty():
     return not said.stdout.strip()
 
 
-def test_an_array_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatch):
+def test_an_array_of_a_real_slurm(slurm, calm, tmp_path, content, monkeypatch):
     """Cancelled once on its way, and submitted again."""
     folder, begin = calm
     other, job = begin(tmp_path / "array")
-    monkeypatch.chdir(real_slurm)
+    monkeypatch.chdir(slurm)
     for shards in (1, 5):
         subprocess.run(["bash", "-c", the_page_s("sbatch ", other)], check=True, timeout=300, capture_output=True)
         wait(lambda shards=shards: len(list((other / "shards").rglob("*.h5"))) >= shards or queue_is_empty())
@@ -111,17 +80,17 @@ def test_an_array_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypat
         wait(queue_is_empty)
     with runs.opened(other, None):
         done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
-    said = [path.read_text() for path in real_slurm.glob("slurm-*.out")]
+    said = [path.read_text() for path in slurm.glob("slurm-*.out")]
     assert (done.kept, done.made) == (5, 0), said
     assert content(folder) == content(other)
 
 
-def test_workers_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatch):
+def test_workers_of_a_real_slurm(slurm, calm, tmp_path, content, monkeypatch):
     pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
     folder, begin = calm
     other, job = begin(tmp_path / "queue")
-    monkeypatch.chdir(real_slurm)
-    toml = real_slurm / "slurm.toml"
+    monkeypatch.chdir(slurm)
+    toml = slurm / "slurm.toml"
     toml.write_text(
         'queue = "slurm"\njobs = 1\n[options]\ncores = 1\nmemory = "2GB"\nwalltime = "00:10:00"\nqueue = "cpu"\n'
     )
@@ -129,28 +98,3 @@ def test_workers_of_a_real_slurm(real_slurm, calm, tmp_path, content, monkeypatc
         done = runs.run(other, job, Cluster(other, str(toml)), None, lambda done, total: None)
     assert done.made == 5 and content(folder) == content(other)
     wait(queue_is_empty)
-
-
-def test_the_page_s_array(slurm, calm, tmp_path, content):
-    folder, begin = calm
-    other, job = begin(tmp_path / "array")
-    command = the_page_s("sbatch ", other)
-    subprocess.run(["bash", "-c", command], check=True, timeout=300, capture_output=True)
-    with runs.opened(other, None):
-        done = runs.run(other, job, local.Local(other, 1), None, lambda done, total: None)
-    assert content(folder) == content(other)
-    assert done.kept + done.made == 5, (slurm / "log").read_text()
-
-
-def test_workers_that_a_queue_starts(slurm, calm, tmp_path, content):
-    pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is absent: pip install tactile-core[batch]")
-    folder, begin = calm
-    other, job = begin(tmp_path / "queue")
-    toml = slurm / "slurm.toml"
-    toml.write_text(
-        'queue = "slurm"\njobs = 1\n[options]\ncores = 1\nmemory = "2GB"\nwalltime = "00:10:00"\ninterface = "lo"\n'
-        f'local_directory = "{slurm}"\nlog_directory = "{slurm}"\nscheduler_options = {{ dashboard_address = ":0" }}\n'
-    )
-    with runs.opened(other, None):
-        done = runs.run(other, job, Cluster(other, str(toml)), None, lambda done, total: None)
-    assert done.made == 5 and content(folder) == content(other)
