@@ -120,13 +120,6 @@ class AxisymmetricSolid:
         f[..., _ENTRIES] = h
         return f.reshape(*self.weight.shape, 3, 3) + np.eye(3), plane + hoop + plane * hoop
 
-    def energy(self, state: State) -> float:
-        """Stored elastic energy, J."""
-        f, change = self._deformation(state.displacement)
-        p = state.pressure @ self.linear.T
-        density = self.law.energy(f, 1 + change) + p * change - p**2 / (2 * self.law.bulk)
-        return float((density * self.weight).sum())
-
     def linearise(self, state: State) -> Linearised:
         """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
         f, change = self._deformation(state.displacement)

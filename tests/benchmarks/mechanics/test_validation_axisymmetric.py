@@ -16,33 +16,14 @@ RUBBER = Material(1e6, 0.49)
 
 @pytest.fixture(scope="module")
 def solid():
-    return AxisymmetricSolid(disc(np.linspace(0, 2e-3, 7), np.linspace(0, 1e-3, 5)), NeoHookean.from_material(RUBBER))
-
-
-def disturbed(solid):
-    random = np.random.default_rng(0)
-    state, loose = solid.rest(), ~solid.mesh.fixed.reshape(-1, 3)
-    state.displacement = loose * 2e-5 * random.standard_normal(loose.shape)
-    state.pressure = 1e4 * random.standard_normal(state.pressure.shape)
-    return state, loose * random.standard_normal(loose.shape)
-
-
-def test_volume_and_thickness(solid):
-    assert solid.weight.sum() == pytest.approx(np.pi * 4e-6 * 1e-3, rel=1e-12)
-
-
-def test_force_is_the_derivative_of_the_energy(solid):
-    state, direction = disturbed(solid)
-    ahead, behind = state.copy(), state.copy()
-    ahead.displacement += 1e-9 * direction
-    behind.displacement -= 1e-9 * direction
-    slope = (solid.energy(ahead) - solid.energy(behind)) / 2e-9
-    force = solid.linearise(state).internal_force(condensed=False)
-    assert slope == pytest.approx(force @ direction.ravel(), rel=1e-7)  # central difference: step^2 and round-off
+    return AxisymmetricSolid(disc(np.linspace(0, 2e-3, 5), np.linspace(0, 1e-3, 5)), NeoHookean.from_material(RUBBER))
 
 
 def test_newton_step_is_second_order(solid):
-    state, direction = disturbed(solid)
+    random = np.random.default_rng(0)
+    state, loose = solid.rest(), ~solid.mesh.fixed.reshape(-1, 3)
+    state.displacement = loose * 2e-5 * random.standard_normal(loose.shape)
+    direction = loose * random.standard_normal(loose.shape)
     state.pressure += solid.linearise(state).pressure_step(np.zeros_like(direction))
     lines = solid.linearise(state)
     left = []
@@ -55,10 +36,9 @@ def test_newton_step_is_second_order(solid):
     assert np.log10(left[0] / left[1]) > 1.9
 
 
-def test_squeezed_rod_has_the_analytic_stress():
+def test_squeezed_rod_has_the_analytic_stress(solid):
     """Stretches (s, s, t) everywhere: the axial force over the area at rest is the first Piola-Kirchhoff stress."""
     s, t = 1.2, 0.8
-    solid = AxisymmetricSolid(disc(np.linspace(0, 2e-3, 5), np.linspace(0, 1e-3, 5)), NeoHookean.from_material(RUBBER))
     state = solid.rest()
     state.displacement = solid.mesh.nodes * [s - 1, t - 1, 0]
     state.pressure += solid.linearise(state).pressure_step(np.zeros_like(state.displacement))
