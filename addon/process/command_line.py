@@ -136,7 +136,8 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
 
 
 def simulate(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Write the simulated scene ``path`` as a .blend, its recording beside it, into a folder, by options as given."""
+    """Simulate the scene.toml ``path``, or that of the folder ``path``, and write it as a .blend into a folder, its
+    recording beside it. options : of the command line"""
     file = path / "scene.toml" if path.is_dir() else path
     _fresh()
     bpy.ops.tactile.import_scene(filepath=str(file.resolve()))

@@ -228,7 +228,8 @@ def _renderer(folder: Path, preset: str) -> Any:
 
 
 def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
-    """Write the scene of unit.toml and heights.npy to job["path"]; in Blenders with their own OpenEXR that crashes."""
+    """Write Mitsuba's scene of FOLDER/unit.toml and heights.npy, (H, W) m, to job["path"] (.xml). Done here, as it
+    crashes inside a Blender that brings its own OpenEXR. progress : not used"""
     from tactile_core.pictures.mitsuba.scene_file import write_scene
     from tactile_core.sensors.calibration_file import load_calibration
 

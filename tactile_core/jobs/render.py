@@ -111,8 +111,8 @@ def render(
 
 
 def claimed(out: Path, options: Options) -> str:
-    """Raise TactileError where `out` cannot be written or the options are wrong (`choose_preset`); return the
-    preset."""
+    """Return the preset (`choose_preset`) once `out` and ``scene_out`` are known to be writable, and sweep away what
+    killed runs left beside `out`. Raises TactileError where one exists and may not be replaced."""
     results.check_free(out, options.overwrite, MAKER)
     if options.scene_out is not None and not options.overwrite:
         for file in scene_files(options.scene_out):

@@ -199,7 +199,8 @@ def _ball(dent: _Dent) -> Sphere:
 
 
 def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
-    """Press a body at ``aim`` (2,) m by the dent's motion; None if that is impossible, or touches no node."""
+    """Press a body at ``aim`` (x, z) m as deep and as leaning as the dent's deepest node has moved, which sticks to it;
+    None if that is impossible, or touches no node."""
     place = leaning(float(aim[0]), float(aim[1]), dent.motion, roll_up(aim, SENSOR)[1])
     try:
         solution = solve(SENSOR, body, place, depth=float(np.linalg.norm(dent.motion)))

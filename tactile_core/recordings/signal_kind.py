@@ -53,10 +53,13 @@ def median(column: np.ndarray) -> float:
 
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
-    """Return counts a unit, and the unit in words, of raw readings in another unit than counts; None for all others.
+    """Return counts per unit of measurement, and that unit in words, of raw readings in volts, shares or other bits;
+    None for counts and for what is not raw.
     electrodes : (T, e) float, finite; readings are raw if most electrodes rest high in the range and stay far from 0"""
-    beyond, within = (((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX))
-    if beyond > 1 - MOST_OF and within < MOST_OF:  # counts, seen without sorting them
+    past_10_bit, past_12_bit = (
+        ((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX)
+    )
+    if past_10_bit > 1 - MOST_OF and past_12_bit < MOST_OF:  # counts, seen without sorting them
         return None
     low, levels, high = np.transpose([np.percentile(column, [1, 50, 99]) for column in electrodes.T])
     for full, words in FULL_SCALES.items():

@@ -140,9 +140,9 @@ class Signals:
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
-        """Convert change (T, e) counts of a typical unit, at rest counts `at` (e,), to this unit's raw readings. The
-        unit's gains and the fluid's drift are not put back; changes that are not raw (or without `at`) stay as they
-        are."""
+        """Convert change (T, e) counts of a typical unit, which rests at counts `at` (e,), to the change (T, e) that
+        this unit would show. Its gains and the fluid's drift are not put back. Returned as it is where this recording
+        is not raw, or `at` is None."""
         if self.kind != "raw" or at is None:
             return change
         own = divider.of_unit(change, self.rest, at)

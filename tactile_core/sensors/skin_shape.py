@@ -82,9 +82,9 @@ class SkinShape:
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
-        """Return nodes (stations, columns, 3) m of a layer of skin, ``"outer"`` or ``"inner"``. Stations run from the
-        tip pole to the base pole, each pole one point repeated over the columns; outer and inner points of one station
-        and column face each other."""
+        """Return nodes (stations, columns, 3) m, sensor frame, of a layer of skin, ``"outer"`` or ``"inner"``. Stations
+        run from the tip pole to the base pole, each pole one point repeated over the columns; columns lie at
+        ``angles``. Outer and inner points of one station and column face each other."""
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:

@@ -77,7 +77,8 @@ class Contacts:
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts of rows (B,), as of `Contacts`, with signal (B, 20) as SVB takes it."""
+        """Return the contacts rows (B,), SILENT for none and C + i for the mirror image of contact i, as a `Batch`.
+        signal : (B, 20), changes in counts and, last, 1 where they are rectified; of `read`"""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])

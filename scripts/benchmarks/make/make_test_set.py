@@ -2,10 +2,10 @@
 
     python3 scripts/benchmarks/make/make_test_set.py --work DIR --out FILE [--presses 210] [--seed 1] [--workers 1]
 
-Stop it at any time: presses that are solved stay in DIR and are not solved again. At its end all presses in DIR are
-merged into FILE, replacing it, with its card beside it; ``--presses 0`` solves none and merges what there is so far.
-Presses with an odd number lie in the region that networks can be kept from. About half a minute a press on one core.
-The set that ships has the presses 0 to 129, of which 11 found no contact.
+Stop it at any time: presses that are solved stay in DIR and are not solved again. At its end all presses of this
+seed in DIR are merged into FILE, replacing it, with its card beside it; ``--presses 0`` solves none and merges what
+there is so far. Presses with an odd number lie in the region that networks can be kept from. About half a minute per
+press on one core. The set that ships has the presses 0 to 129, of which 11 found no contact.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ def solve_one(job: Job) -> str:
 
 
 def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
-    """Join all solved presses of a folder into one file of pairs of the full tier, and its card; returns the card."""
+    """Join the solved presses of a seed in a folder into ``out``, one file of pairs of the full tier, and write
+    its card beside it; returns the card."""
     files = sorted(folder.glob(f"press_{seed}_*.h5"))
     counts, wanted, lost = [], 0, {}
     for path in files:

@@ -18,7 +18,8 @@ HELD_OUT = 5  # one value in so many is for testing where the recipe names none 
 
 @dataclass(frozen=True)
 class File:
-    """File of a data set. unit : name of the unit that made it; labels : from its name; split : train or test."""
+    """File of a data set. labels : name -> value, from the file's name; unit : value of the label that tells units
+    apart, "" where the recipe names none; split : train or test"""
 
     path: Path
     unit: str

@@ -90,10 +90,10 @@ class ComplianceRows:
 class ComplianceBlock:
     """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
 
-    nodes : (k,) sorted numbers of the rows, twice where one touches two faces
-    inner : (c,) sorted sensing points
+    nodes : (k,) sorted, out of ``rows.near``, twice where one touches two faces of the indenter
+    inner : (c,) sorted indices of sensing points
     rows : the entries of the nodes near an indenter, all of these among them
-    matrix : (3 k + c, 3 k + c) float32, m/N: surface axes first
+    matrix : (3 k + c, 3 k + c) float32, m/N: x, y, z of each node in turn, then the inner points' motion off the core
     """
 
     def __init__(
