@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import TactileError
 from . import atomic, checksummed
 from .hdf5_checked import open_checked
+from .outside import damage_reported
 
 
 def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -38,13 +39,8 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
         if isinstance(item, h5py.Dataset) and (not names or name in names):
             found[name] = item[rows] if item.shape else item[()]
 
-    try:
-        with open_checked(file) as opened:
-            opened.visititems(note)
-    except TactileError:
-        raise
-    except Exception as error:  # the library raises a dozen types on damaged bytes
-        raise TactileError(file, f"damaged ({error})", "a shard", "Run the job again, which makes it again") from error
+    with damage_reported(file, "shard", "Run the job again, which makes it again"), open_checked(file) as opened:
+        opened.visititems(note)
     return found
 
 

@@ -8,6 +8,8 @@ import json
 import os
 import re
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -101,3 +103,21 @@ def _regular(path: str | os.PathLike, found: os.stat_result, expected: str) -> o
 
 def _size(count: int) -> str:
     return f"{count // 2**20} MB" if count >= 2**20 else f"{count} bytes"
+
+
+@contextmanager
+def damage_reported(
+    where: str | os.PathLike, what: str, advice: str = "Copy or export the recording again"
+) -> Iterator[None]:
+    """Turn any error of a file library into a TactileError on `what`, a word for the file, damaged at `where`."""
+    try:
+        yield
+    except (TactileError, MemoryError):
+        raise
+    except Exception as error:  # the file libraries raise a dozen types on damaged bytes
+        raise TactileError(where, f"damaged {what} ({_short(error)})", "a whole file", advice) from error
+
+
+def _short(error: BaseException) -> str:
+    text = str(error).strip().splitlines()
+    return f"{type(error).__name__}: {text[0][:80]}" if text else type(error).__name__

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Annotated, Any, NotRequired, TypedDict
 import msgspec
 import numpy as np
 
-from ..errors import TactileError
 from ..files import atomic, checksummed
 from ..files.hdf5_checked import declared, open_checked
 from ..files.hdf5_writer import new_hdf5
+from ..files.outside import damage_reported
 from ..recordings import Recording, Signals
 from ..recordings.chunks import read_parts
 from ..recordings.labels import Runs, extend
@@ -178,15 +178,10 @@ class Prepared:
         return self._read(read)
 
     def _read(self, what: Any) -> Any:
-        try:
-            with open_checked(self._path) as file:
-                _check(self._path, file)
-                return what(file)
-        except TactileError:
-            raise
-        except Exception as error:  # the library raises a dozen types on damaged bytes
-            found, advice = f"damaged ({error})", "Run the job again, which makes it again"
-            raise TactileError(self._path, found, "a prepared recording", advice) from error
+        advice = "Run the job again, which makes it again"
+        with damage_reported(self._path, "prepared recording", advice), open_checked(self._path) as file:
+            _check(self._path, file)
+            return what(file)
 
 
 def _check(path: Path, file: h5py.File) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked, read_rows
+from ..files.outside import damage_reported
 from .assemble import MAX_FRAMES
 from .labels import LONGEST
 
@@ -97,11 +98,6 @@ class Store:
             return np.asarray(self.load(name))
 
 
-def _short(error: BaseException) -> str:
-    text = str(error).strip().splitlines()
-    return f"{type(error).__name__}: {text[0][:80]}" if text else type(error).__name__
-
-
 @contextmanager
 def open_hdf5(path: str) -> Iterator[Store]:
     """Open for reading; arrays are named by their full path without the first slash."""
@@ -129,19 +125,6 @@ def open_hdf5(path: str) -> Iterator[Store]:
             return read_rows(file[name], rows)
 
         yield Store(path, shapes, load, attributes, attributes_of, load)
-
-
-@contextmanager
-def damage_reported(where: str, what: str) -> Iterator[None]:
-    """Turn any error of a file library into a TactileError on `what`, a word for the file, damaged at `where`."""
-    try:
-        yield
-    except (TactileError, MemoryError):
-        raise
-    except Exception as error:  # the file libraries raise a dozen types on damaged bytes
-        raise TactileError(
-            where, f"damaged {what} ({_short(error)})", "a whole file", "Copy or export the recording again"
-        ) from error
 
 
 def _plain(value: Any) -> Any:

@@ -17,7 +17,6 @@ from .common import NOTHING, UNIT, add, columns_of
 if TYPE_CHECKING:
     import numpy as np
 
-    from ...jobs.live import Shown
     from ...jobs.live.playback import Output
     from ...recordings.electrode_gains import ElectrodeGains
 
@@ -166,12 +165,7 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
 
         server = opened.enter_context(contextlib.closing(FrameServer(options.serve)))
         say(f"serving frames at {server.address}, to programs of this machine alone")
-
-        def publish(shown: Shown, seen: dict[str, np.ndarray]) -> bool:
-            server.send(shown, seen)
-            return True
-
-        outputs.append(publish)
+        outputs.append(server.send)
     if options.out is not None:
         outputs.append(_drawn(_file(options.out)))
     return outputs or [_drawn(_window(path))]

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import TactileError
 from ...files import checksummed
 from ...files.hdf5_checked import declared, open_checked
-from ...recordings.array_store import damage_reported
+from ...files.outside import damage_reported
 from ...recordings.labels import unfold
 from ...sensors import PAIR
 from .. import translate_shards

@@ -47,12 +47,14 @@ class FrameServer:
         self._places = threading.BoundedSemaphore(MOST)
         threading.Thread(target=self._accept, daemon=True).start()
 
-    def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> None:
-        """Publish a frame and its arrays by name, as ``message`` writes them; never waits for a reader."""
+    def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> bool:
+        """Publish a frame and its arrays by name, as ``message`` writes them; never waits for a reader. Returns true,
+        as an output of `watch` that goes on does."""
         content = message(shown, arrays)
         with self._news:
             self._message, self._sent = b"\x02" + len(content).to_bytes(8, "big") + content, self._sent + 1
             self._news.notify_all()
+        return True
 
     def close(self) -> None:
         """Close the port; readers lose the connection."""

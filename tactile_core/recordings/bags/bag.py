@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 
 from ...errors import TactileError
 from ...files import installed, outside
+from ...files.outside import damage_reported
 from ...files.short_text import listed
-from ..array_store import damage_reported
 from .ros_messages import Definition, definitions
 from .ros_sensors import sensors_in
 

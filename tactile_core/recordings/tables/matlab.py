@@ -13,7 +13,8 @@ import numpy as np
 
 from ...errors import TactileError
 from ...files import installed
-from ..array_store import Store, damage_reported
+from ...files.outside import damage_reported
+from ..array_store import Store
 
 START, START_OF_HDF5 = b"MATLAB 5", b"MATLAB 7"  # of MATLAB 7.3
 CLASSES = {

@@ -73,7 +73,7 @@ def test_what_is_told_of_a_recording_is_checked(finished, about):
     with h5py.File(file, "r+") as data:
         del data["about"]
         data["about"] = np.frombuffer(about, np.uint8)
-    with pytest.raises(TactileError, match="a prepared recording"):
+    with pytest.raises(TactileError, match="damaged prepared recording"):
         prepared_signals.Prepared(file).read(np.arange(1))
     assert checksummed.verified_checksum(file) is None  # so that the next run makes it again
     with open(file, "r+b") as spoiled:

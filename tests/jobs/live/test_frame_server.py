@@ -141,8 +141,9 @@ def test_watch_publishes_every_picture(slide_csv, monkeypatch, capsys):
         def __init__(self, port: int) -> None:
             assert port == 7311
 
-        def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> None:
+        def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> bool:
             published.append((shown.frame, arrays["picture"]))
+            return True
 
         def close(self) -> None:
             published.append(None)
