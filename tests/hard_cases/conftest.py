@@ -1,12 +1,13 @@
-"""Hard cases need scipy; the slow ones run when asked for, and a run of them all makes docs/hard_cases.md.
+"""Hard cases need scipy; a run of them all, slow ones too, renews the table of docs/hard_cases.md and its CSV.
 
-python -m pytest tests/hard_cases --slow-cases     minutes; needs the extras [fem] and [render]
+python -m pytest tests/hard_cases -m ""     minutes; needs the extras [fem] and [render]
 """
 
 import csv
 import io
 
 import pytest
+from benchmarks.measured_rows import renew_tables
 from conftest import ROOT
 
 pytest.importorskip("scipy", reason="extra [fem] is not installed")
@@ -15,52 +16,21 @@ from hard_cases.case import COLLECTED, HARD, ROWS
 from tactile_core.accuracy import Row
 from tactile_core.files import atomic
 
-HEAD = """# Hard cases
 
-Made by `python -m pytest tests/hard_cases --slow-cases`. A case is *ok* where it converges within its target and breaks
-no law of its stage (no node over 1 um in the indenter, no tension, forces balanced, Coulomb's cone, no cell inside out,
-finite numbers), or where it says in words that it cannot: an error that names field and remedy, a flag, a stated error
-that is as large.
-*Of stated*: the error found over the error that the result states of itself. Truth: the full tier for the fast one, the
-reference tier for the full one, finer meshes, double precision, formulas; the shipped recording's own meshes; the gel's
-nodes for heights; Mitsuba's standard preset for the fast picture. Every case, what was expected and what was found:
-[hard_cases.csv](hard_cases.csv).
-"""
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Declare the mark of the slow cases."""
-    config.addinivalue_line("markers", "slow_case: takes long; left out unless --slow-cases is given")
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option that runs the slow cases."""
-    parser.addoption("--slow-cases", action="store_true", help="hard cases that take long too; writes their page")
-
-
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out the slow cases, unless they are asked for."""
-    if not config.getoption("--slow-cases", default=False):
-        items[:] = [item for item in items if not item.get_closest_marker("slow_case")]
-
-
-def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Write the page, once every case of every difficulty has found something."""
-    whole = {*COLLECTED} == ROWS.keys() and {row["case"] for row in ROWS.values()} == {*HARD}
-    if whole and session.config.getoption("--slow-cases", default=False):
+def pytest_sessionfinish() -> None:
+    """Write the page's tables, once every case of every difficulty has found something."""
+    if {*COLLECTED} == ROWS.keys() and {row["case"] for row in ROWS.values()} == {*HARD}:
         rows = [ROWS[name] for name in COLLECTED]
-        atomic.write_bytes(ROOT / "docs" / "hard_cases.md", page(rows).encode())
+        head = "| difficulty | cases | ok |"
+        renew_tables(ROOT / "docs" / "hard_cases.md", {head: [head, "|---|---|---|", *counts(rows)]})
         atomic.write_bytes(ROOT / "docs" / "hard_cases.csv", table(rows).encode())
 
 
-def page(rows: list[Row]) -> str:
-    """Lay out how many cases of each difficulty are ok as Markdown."""
-    lines = [HEAD, f"{sum(bool(row['ok']) for row in rows)} of {len(rows)} cases are ok.\n"]
-    lines += ["| difficulty | cases | ok |", "|---|---|---|"]
-    for hard in HARD:
-        ok = [bool(row["ok"]) for row in rows if row["case"] == hard]
-        lines.append(f"| {hard} | {len(ok)} | {sum(ok)} |")
-    return "\n".join([*lines, ""])
+def counts(rows: list[Row]) -> list[str]:
+    """Lay out how many cases there are and how many are ok, of each difficulty and of all."""
+    by_hard = {hard: [bool(row["ok"]) for row in rows if row["case"] == hard] for hard in HARD}
+    by_hard["all"] = [bool(row["ok"]) for row in rows]
+    return [f"| {hard} | {len(ok)} | {sum(ok)} |" for hard, ok in by_hard.items()]
 
 
 def table(rows: list[Row]) -> str:

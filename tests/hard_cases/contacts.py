@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from tactile_core import sensors
 from tactile_core.geometry.indenters import Indenter, Pose
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.press import CorrectedPress, FastContact
@@ -120,8 +119,3 @@ def over_stated(fast: Solution, truth: Solution) -> tuple[float, str]:
         f"(states {fast.shape_error * 1e6:.1f}), single nodes {off.max() * 1e6:.0f} um"
     )
     return max(force / fast.force_error, shape / fast.shape_error), words
-
-
-def rest(sensor: str) -> np.ndarray:
-    """Nodes (n, 3) m of a sensor's resting surface."""
-    return sensors.sensor_surface(sensor).rest
