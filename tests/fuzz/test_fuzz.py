@@ -1,21 +1,15 @@
-"""Whatever the bytes, a loader ends well or in a TactileError. ``hostile.py`` runs the same for a given time."""
+"""Whatever the bytes, a loader ends well or in a TactileError."""
 
 from __future__ import annotations
 
-import importlib.util
+import os
 import random
 import resource
-import sys
-from pathlib import Path
 
+import hostile
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-found = importlib.util.spec_from_file_location("hostile", Path(__file__).with_name("hostile.py"))
-hostile = importlib.util.module_from_spec(found)
-sys.modules["hostile"] = hostile
-found.loader.exec_module(hostile)
 
 NAMES = [
     *("csv", "npz", "hdf5", "growing", "ros1", "mcap", "sqlite3", "metadata"),
@@ -24,7 +18,7 @@ NAMES = [
     *("safetensors", "weights_card", "job", "pairs", "prepared", "seal"),
 ]
 FEW = settings(
-    max_examples=40,
+    max_examples=int(os.environ.get("SPOILED", 40)),
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],

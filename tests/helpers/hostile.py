@@ -1,49 +1,39 @@
-"""Every loader that meets files of strangers, a good file for each, and ways to spoil it.
+"""Every loader that meets files of strangers, a good file for each, and ways to spoil it, for test_fuzz.
 
-As a script it runs for a while: ``python tests/fuzz/hostile.py --seconds 60 [--only NAME]`` spoils files until the CPU
-time is spent, under a limit on the process's memory, and exits 1 at the first loader that raises anything but
-TactileError; the spoiled file is left beside it.
+SPOILED=5000 in the environment spoils so many files of each kind in place of a few.
 """
 
 from __future__ import annotations
 
-import argparse
 import importlib.util
 import io
 import json
 import random
-import resource
 import shutil
 import struct
-import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from small_pairs import write_pairs
+
+from tactile_core import recordings
+from tactile_core.errors import TactileError
+from tactile_core.files import checksummed, exr_file
+from tactile_core.geometry.indenters import mesh_file
+from tactile_core.jobs import gel_frames, prepared_signals
+from tactile_core.jobs.engine import dask_cluster, inputs, recipes
+from tactile_core.jobs.engine import job as jobs
+from tactile_core.jobs.live import Growing
+from tactile_core.pictures import background
+from tactile_core.recordings import chunks, electrode_gains
+from tactile_core.sensors import calibration_file, descriptor, gel_shape
+from tactile_core.simulation import pairs_file, scene
+from tactile_core.translation import networks, translate, weights
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "scripts"), str(ROOT / "tests" / "helpers")]
-
-from small_pairs import write_pairs  # noqa: E402
-
-from tactile_core import recordings  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.files import checksummed, exr_file  # noqa: E402
-from tactile_core.geometry.indenters import mesh_file  # noqa: E402
-from tactile_core.jobs import gel_frames, prepared_signals  # noqa: E402
-from tactile_core.jobs.engine import dask_cluster, inputs, recipes  # noqa: E402
-from tactile_core.jobs.engine import job as jobs  # noqa: E402
-from tactile_core.jobs.live import Growing  # noqa: E402
-from tactile_core.pictures import background  # noqa: E402
-from tactile_core.recordings import chunks, electrode_gains  # noqa: E402
-from tactile_core.sensors import calibration_file, descriptor, gel_shape  # noqa: E402
-from tactile_core.simulation import pairs_file, scene  # noqa: E402
-from tactile_core.translation import networks, translate, weights  # noqa: E402
-
-MEMORY = 4 * 2**30  # bytes of address space for the script; numpy's threads and libraries reserve the first of them
 WORDS = [b"nan", b"-1", b"1e308", b"99999999999999999999", b"../../x", b"\n", b",", b'"', b"[", b"{", b"\0", b"null"]
 NUMBERS = [0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**64 - 1]
 Loader = Callable[[Path], object]
@@ -273,35 +263,3 @@ def survives(path: Path, data: bytes, load: Loader) -> None:
     except TactileError as error:
         if len(str(error)) > 2000:
             raise AssertionError(f"a message of {len(str(error))} characters") from error
-
-
-def main() -> int:
-    """Spoil files until the time is spent; the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60, help="CPU time for each loader (default: 60)")
-    parser.add_argument("--only", help="this loader alone")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
-    with tempfile.TemporaryDirectory() as name:
-        table = loaders(Path(name))
-        for word in [options.only] if options.only else table:
-            data, load = table[word]
-            chance, count, end = random.Random(options.seed), 0, time.process_time() + options.seconds
-            while time.process_time() < end:
-                bad = spoil(data, chance)
-                try:
-                    survives(Path(name) / "spoiled", bad, load)
-                except Exception as error:
-                    kept = Path(f"spoiled_{word}_{options.seed}_{count}")
-                    kept.write_bytes(bad)
-                    print(f"{word}: {type(error).__name__}: {error!s:.300} ({kept})")
-                    return 1
-                count += 1
-            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-            print(f"{word}: {count} spoiled files, largest memory so far {peak} MB", flush=True)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
