@@ -42,12 +42,14 @@ def add_gel(
 def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """Return the displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
 
-    Raises TactileError for a gel that is hidden, which Blender leaves at rest, or whose mesh itself was moved, where
+    Raises TactileError for a gel that is hidden or edited, which Blender leaves at rest, whose mesh itself moved, where
     modifiers have changed the number of vertices, and where they lack the file that moves the gel.
     """
     if not any(each.object.original == gel for each in depsgraph.object_instances):
         found = f"hidden in view layer {depsgraph.view_layer.name}"
         raise TactileError(gel.name, found, "a gel that is shown", "Show it, and its collection, in renders too")
+    if gel.mode == "EDIT":
+        raise TactileError(gel.name, "in Edit Mode, where it is at rest", "Object Mode", "Press Tab over the 3D view")
     mesh_cache.check(gel)
     motion.check_rest(gel)
     rest = properties.surface_of(gel).rest

@@ -101,18 +101,40 @@ def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera
     return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
 
 
-def left_out(scene: bpy.types.Scene) -> list[str]:
-    """Say what pictures ignore or change of the scene: lamps that are no points, motion blur, view transforms."""
+def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormatSettings:
+    """Return whose colour management rendered files have: the scene's, or the output's own."""
+    image = scene.render.image_settings
+    return image if image.color_management == "OVERRIDE" else scene
+
+
+def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") -> list[str]:
+    """Say what pictures ignore or change of the scene: lamps, motion blur, frames without motion, colour management."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
+    points = [lamp.name for lamp in lamps if lamp.data.type == "POINT" and lamp.data.energy > 0]
+    found += [f"{name}: left out by the preset fast" for name in points if preset == "fast"]
+    action = gel.animation_data and gel.animation_data.action
+    if action and not action.frame_range[0] <= scene.frame_current_final <= action.frame_range[1]:
+        first, last = action.frame_range
+        found.append(f"Frame {scene.frame_current}: {gel.name} stands still, it moves from {first:g} to {last:g}")
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
-    view = scene.view_settings.view_transform
-    if view == "Raw" and scene.render.image_settings.file_format.startswith("OPEN_EXR"):
-        found.append("EXR holds linear light: the view transform Standard shows it as the picture is")
-    return found + [f"View transform {view} changes the levels; Set Up Render sets Raw"] * (view not in _VIEWS)
+    output = output_of(scene)
+    view, device = output.view_settings, output.display_settings.display_device
+    if scene.render.image_settings.file_format.startswith("OPEN_EXR"):
+        words = "EXR holds linear light: the view transform Standard shows it as the picture is"
+        return found + [words] * (view.view_transform == "Raw")
+    changes = {
+        f"View transform {view.view_transform}": view.view_transform not in _VIEWS,
+        f"Look {view.look}": view.look != "None",
+        "Exposure": view.exposure != 0, "Gamma": view.gamma != 1, "Curves": view.use_curve_mapping,
+        "White balance": getattr(view, "use_white_balance", False),  # since Blender 4.3
+        f"Display {device}": device != "sRGB" and view.view_transform != "Raw",
+    }  # fmt: skip
+    names = ", ".join(name for name, there in changes.items() if there)
+    return found + [f"{names} changes the levels; Set Up Render sets Raw alone"] * bool(names)
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202

@@ -51,18 +51,17 @@ class TactileRenderEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph: bpy.types.Depsgraph) -> None:
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval.name
         gel = properties.needed_gel(scene)
-        for left_out in digit_unit.left_out(scene):
-            self.report({"WARNING"}, left_out)
         size, preset = (self.resolution_x, self.resolution_y), render_settings.preset_of(scene)
+        for left_out in digit_unit.left_out(scene, gel, preset):
+            self.report({"WARNING"}, left_out)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
 
         for name, channels in PASSES.items():
             self.add_pass(name, len(channels), channels, layer=layer)
         fields = pictures.fields(gel, depsgraph, size)
         # Raw writes the levels as they are; EXR holds linear light whatever the window shows.
-        raw = scene.view_settings.view_transform == "Raw" and not scene.render.image_settings.file_format.startswith(
-            _EXR
-        )
+        exr = scene.render.image_settings.file_format.startswith(_EXR)
+        raw = digit_unit.output_of(scene).view_settings.view_transform == "Raw" and not exr
 
         def show(picture: np.ndarray) -> None:
             self._show({"Combined": to_linear(picture, raw)} | fields, scene.render, layer)

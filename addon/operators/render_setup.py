@@ -85,9 +85,12 @@ class TACTILE_OT_set_up_render(OnGel, TactileOperator):
         right, down = camera.pixel_size
         render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, right / down), max(1.0, down / right)
         render.dither_intensity = 0.0  # noise of a grey level that the camera does not have
-        scene.view_settings.view_transform, scene.view_settings.look = "Raw", "None"
-        scene.view_settings.exposure, scene.view_settings.gamma = 0.0, 1.0
-        image = render.image_settings
+        view, image = scene.view_settings, render.image_settings
+        view.view_transform, view.look, view.exposure, view.gamma = "Raw", "None", 0.0, 1.0
+        view.use_curve_mapping = False
+        if bpy.app.version >= (4, 3, 0):
+            view.use_white_balance = False
+        image.color_management = "FOLLOW_SCENE"
         if bpy.app.version >= (5, 0, 0):  # Blender 5.0 cannot write an EXR of parts whose pixels are not square
             image.media_type, image.use_exr_interleave = "IMAGE", True
         image.file_format, image.color_mode = "PNG", "RGB"
@@ -163,7 +166,7 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     layout.prop(gel.tactile, "object_reflectance")
     if not digit_body.has_body(gel):
         layout.label(text="No LEDs of its own: Set Up Render adds them", icon="INFO")
-    for words in digit_unit.left_out(context.scene)[:3]:
+    for words in digit_unit.left_out(context.scene, gel)[:3]:
         layout.label(text=words, icon="INFO")
     row = layout.row(align=True)
     row.operator("tactile.reset_to_calibration", text="Reset", icon="LOOP_BACK")

@@ -165,6 +165,7 @@ def _channels(path):
         (lambda scene, gel: setattr(scene.camera.data, "sensor_fit", "HORIZONTAL"), "sensor fit HORIZONTAL"),
         (lambda scene, gel: setattr(gel, "hide_render", True), "DIGIT gel: hidden in view layer ViewLayer"),
         (lambda scene, gel: setattr(scene.collection.children[0], "hide_render", True), "hidden in view layer"),
+        (lambda scene, gel: _edit(gel), "DIGIT gel: in Edit Mode, where it is at rest; expected Object Mode"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(ready, change, words):
@@ -173,22 +174,51 @@ def test_what_cannot_be_drawn_is_refused(ready, change, words):
         bpy.ops.render.render()
 
 
+def _edit(gel):
+    bpy.context.view_layer.objects.active = gel
+    bpy.ops.object.mode_set(mode="EDIT")
+
+
 def test_what_is_left_out_is_said(ready, part, capfd):
     ready.render.use_motion_blur = ready.camera.data.dof.use_dof = True
-    ready.view_settings.view_transform = "Filmic"
-    area = bpy.data.objects.new("softbox", bpy.data.lights.new("softbox", "AREA"))
-    ready.collection.objects.link(area)
+    ready.view_settings.view_transform, ready.view_settings.exposure = "Filmic", 1.0
+    for name, kind in (("softbox", "AREA"), ("bulb", "POINT")):
+        ready.collection.objects.link(bpy.data.objects.new(name, bpy.data.lights.new(name, kind)))
+    ready.frame_set(5000)
     bpy.ops.render.render()
     said = capfd.readouterr()
-    for words in ("softbox: no point lamp", "depth of field", "Motion blur", "View transform Filmic"):
+    for words in (
+        "softbox: no point lamp", "bulb: left out by the preset fast", "depth of field", "Motion blur",
+        "Frame 5000: DIGIT gel stands still, it moves from 70 to 89",
+        "View transform Filmic, Exposure changes the levels",
+    ):  # fmt: skip
         assert words in said.out + said.err
+
+
+def test_colours_of_the_output_alone_are_seen_and_set_back(ready, part, tmp_path):
+    """They override the scene's: by Standard the same levels are written, by an exposure others, which is said."""
+    left_out, gel, image = (
+        part("addon.objects.digit_unit").left_out,
+        ready.objects["DIGIT gel"],
+        ready.render.image_settings,
+    )
+    image.color_management, image.view_settings.view_transform = "OVERRIDE", "Standard"
+    ready.render.filepath = str(tmp_path / "frame.png")
+    bpy.ops.render.render(write_still=True)
+    wanted = _wanted(part, ready.frame_current).astype(float)
+    assert left_out(ready, gel) == []
+    assert np.abs(np.rint(255 * _pixels(tmp_path / "frame.png")) - wanted).max() <= 1
+    image.view_settings.exposure, ready.view_settings.use_curve_mapping = 1.0, True
+    assert left_out(ready, gel) == ["Exposure changes the levels; Set Up Render sets Raw alone"]
+    bpy.ops.tactile.set_up_render()
+    assert left_out(ready, gel) == [] and image.color_management == "FOLLOW_SCENE"
 
 
 def test_exr_by_raw_says_how_to_look_at_it(ready, part):
     left_out = part("addon.objects.digit_unit").left_out
-    assert left_out(ready) == []
+    assert left_out(ready, ready.objects["DIGIT gel"]) == []
     ready.render.image_settings.file_format = "OPEN_EXR"
-    (words,) = left_out(ready)
+    (words,) = left_out(ready, ready.objects["DIGIT gel"])
     assert "view transform Standard" in words
 
 
