@@ -72,6 +72,9 @@ class TACTILE_OT_simulate(JobOperator):
         if gel is not None:
             pictures.show_result(self, context, gel)
         self.report({"INFO"}, summary)
+        if not result.force.any():
+            words = "touched no sensor: press with it lower, or select the indenter that presses"
+            self.report({"WARNING"}, f"{self._thing} {words}")
 
     def _keep(self, context: bpy.types.Context) -> None:
         """Save the simulated recording beside the .blend, so that it can be translated like a real one.

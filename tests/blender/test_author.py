@@ -152,6 +152,19 @@ def test_too_deep_a_press_is_reported_by_object_frame_and_depth(gel_alone):
     assert "/tmp" not in str(caught.value) and "scene.toml" not in str(caught.value)
 
 
+def test_an_indenter_that_touches_nothing_is_said_and_a_hidden_one_refused(gel_alone, capfd):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    ball = bpy.context.object
+    gel_alone.frame_start, gel_alone.frame_end, ball.location.z = 1, 2, 20.0
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    assert "sphere touched no sensor: press with it lower" in capfd.readouterr().out
+    ball.hide_viewport = True
+    with pytest.raises(
+        RuntimeError, match="sphere: hidden, so that it stands still; expected an indenter that is shown"
+    ):
+        bpy.ops.tactile.simulate()
+
+
 def test_pressing_by_height_finds_the_force(gel_alone, part):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
