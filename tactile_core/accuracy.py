@@ -2,7 +2,7 @@
 
 The truth is a finite-element mesh or a known load.
 Each metric has a baseline, its value for no displacement, no force or the mean position.
-All displacements are (C, n, 3) m, one contact a row; every function treats each contact by itself.
+All displacements are (C, n, 3) m, one contact per row; every function treats each contact by itself.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class DamagedError(Exception):
 
 
 def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Map arrays that `store` wrote, by name, read-only, after checking their hashes (0.6 ms CPU a MB). Raises
+    """Map arrays that `store` wrote, by name, read-only, after checking their hashes (0.6 ms CPU per MB). Raises
     DamagedError."""
     try:
         stated = json.loads(outside.read(folder / HASHES, _MOST))

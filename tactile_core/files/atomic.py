@@ -17,7 +17,7 @@ from typing import Any
 from ..errors import TactileError
 from . import lock
 
-# What json.dumps writes for a number, name or constant, and for a list of them, one a line. Strings hold no line feed.
+# What json.dumps writes for a number, name or constant, and for a list of them, one per line. Strings hold no newline.
 _PLAIN = re.compile(r'"(?:[^"\\]|\\.)*"|[-+.\w]+')
 _PLAIN_LIST = re.compile(rf"\[\n\s*(?:{_PLAIN.pattern})(?:,\n\s*(?:{_PLAIN.pattern}))*\n\s*\]")
 _LONGEST = 200  # bytes of a name; with a dot, a word and a token it stays below the 255 of common file systems

@@ -1,4 +1,4 @@
-"""Lock that allows one job a folder; the system drops it when its holder dies."""
+"""Lock that allows one job per folder; the system drops it when its holder dies."""
 
 from __future__ import annotations
 

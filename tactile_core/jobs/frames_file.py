@@ -1,4 +1,4 @@
-"""``frames.h5``: the numbers of a converted recording, one row a frame, T first, SI units, float32 (time: float64)."""
+"""``frames.h5``: numbers of a converted recording, one row per frame, T first, SI units, float32 (time: float64)."""
 
 from __future__ import annotations
 
@@ -76,14 +76,14 @@ KEPT = {
     },
 }
 PICTURES = {"image": ("1", "(T, 320, 240, 3) sRGB pictures of the DIGIT")}  # in shards; elsewhere they are PNG files
-# Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms a frame
+# Displacements and codes are stored plain: measured on smooth dents, gzip saves 21 % of the bytes for 1.5 ms per frame
 # (plain: 0.15 ms). Height maps, the largest and smoothest, are worth it.
 PACKED = {
     "height_map": {"compression": "gzip", "compression_opts": 1, "shuffle": True},
     "image": {"compression": "gzip", "compression_opts": 4},
     "traction_digit": {"compression": "gzip", "compression_opts": 1, "shuffle": True},  # zero outside the patch
 }
-LARGE = 4096  # numbers a frame, from which on a shard gives each frame a chunk of its own
+LARGE = 4096  # numbers per frame, from which on a shard gives each frame a chunk of its own
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
@@ -133,7 +133,7 @@ class FramesFile:
         pair : the sensor that was read and the gel; they name datasets
         path : new file; count : T; attributes : of the file itself, beside format and version
         room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's checksum; the file then holds
-            pictures, too, and a large array has one chunk a frame"""
+            pictures, too, and a large array has one chunk per frame"""
         self._about = arrays_of(keep, shard=bool(room))
         self._count, self._framed, self._pair = count, bool(room), pair
         about = {"format": FORMAT, "tactile_core": __version__, **attributes}

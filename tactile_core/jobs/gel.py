@@ -48,7 +48,7 @@ _BEGUN_INSIDE = 0.2e-3  # m: a first step deeper than this has begun inside (ass
 class Gel:
     """A DIGIT's gel or a BioTac's skin that one indenter presses; each contact goes on from the one before.
 
-    Keep one a thread: instances share nothing that changes. The same poses give the same numbers.
+    Keep one per thread: instances share nothing that changes. The same poses give the same numbers.
 
     >>> gel = Gel("digit", indenter=Sphere(3e-3))        # m
     >>> pose = gel.touching(x=-8e-3, z=0.0, depth=0.3e-3)
@@ -125,7 +125,7 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one a pose.
+        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one per pose.
 
         For an invalid pose or force the contact before comes again, flagged ``refused``, and the reason is logged.
         Raises TactileError where poses and forces differ in number."""

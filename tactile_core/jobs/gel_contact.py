@@ -15,7 +15,7 @@ from ..geometry.indenters import Pose
 from ..mechanics.force_search import MOST_FORCE
 
 PUSH = np.array([0.0, 1.0, 0.0])  # into the gel: along +y of the sensors' frame
-# Farther, or turned by more, in one step a contact is another one, assumed: at 100 Hz that is 0.3 m/s and 2 turns a s.
+# Farther, or turned by more, in one step a contact is another, assumed: at 100 Hz that is 0.3 m/s and 2 turns per s.
 _LONGEST_STEP, _LARGEST_TURN = 3e-3, 0.13  # m, rad
 FLAGS = {
     "refused": "in follow: what was given is no pose or force; the values are those of the contact before",

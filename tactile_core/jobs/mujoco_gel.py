@@ -58,7 +58,7 @@ class MujocoGel:
         """Return the gel's contact at MuJoCo's state; None before anything touched.
 
         Its force along +y is MuJoCo's; that along the surface follows MuJoCo's within a few frames. Call it after
-        ``mj_step`` or ``mj_forward``, at least 100 times a second while something moves."""
+        ``mj_step`` or ``mj_forward``, at least 100 times per second while something moves."""
         pressing = {geom: force for geom, force in self.forces(data).items() if self._presses(geom)}
         if not pressing:
             self._shift = np.zeros(3)

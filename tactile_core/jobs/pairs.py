@@ -32,7 +32,7 @@ from .engine.recipes import InputFacts, Pairs
 from .engine.run import Place, Progress
 
 GROWS = True
-BLOCK = 4  # presses a block: a few seconds of work
+BLOCK = 4  # presses per block: a few seconds of work
 COUNT = "count"  # the array of a block that says how many contacts it holds
 GROWTH = 8  # times as many blocks as there are, at most, are asked for at once: the estimate is better then
 MOST = 10**8  # contacts of a file, 4 TB

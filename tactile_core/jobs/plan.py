@@ -150,7 +150,7 @@ def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept:
 
 
 def _preset_ms(name: str) -> float:
-    """Return a preset's time a picture, ms, in the slowest of the measured variants of Mitsuba."""
+    """Return a preset's time per picture, ms, in the slowest of the measured variants of Mitsuba."""
     from ..pictures.presets import measured
 
     return max(measured()["presets"][name]["ms"].values())

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .engine.job import Job
     from .engine.recipes import Translate
 
-CHUNK = 1024  # rows a chunk: 160 kB of changes
+CHUNK = 1024  # rows per chunk: 160 kB of changes
 COLUMNS = {
     "time": np.float64, "change": np.float64, "electrodes": np.float32, "quiet": bool, "flags": np.uint16,
     "pdc": np.float64,

@@ -5,7 +5,7 @@ DIR/exr/%05d.exr     if asked for: linear radiance of the coating in float32, R,
 DIR/rest.exr         the same of the undeformed gel
 DIR/camera.exr       from radiance to camera levels: response.R.red ... and ambient.R ..., see UNITS
 DIR/note.json        input, calibration, preset, versions; same input, same bytes
-DIR/timings.json     ms a frame of each stage on this machine; differs from run to run"""
+DIR/timings.json     ms per frame of each stage on this machine; differs from run to run"""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> di
 
 @functools.lru_cache(maxsize=2)
 def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
-    """Make the renderer, once a process; heights : (H, W) of height maps, None for displacements."""
+    """Make the renderer, once per process; heights : (H, W) of height maps, None for displacements."""
     check_unit(calibration, recipe.calibration)
     options = Options(
         calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise,

@@ -4,7 +4,7 @@
 <recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
 <recording>/contact_sheet.png   a few frames to look at
 <recording>/note.json           where it came from: versions, weights, options, warnings; same input, same bytes
-<recording>/timings.json        ms a frame of each stage on this machine; differs from run to run
+<recording>/timings.json        ms per frame of each stage on this machine; differs from run to run
 """
 
 from __future__ import annotations

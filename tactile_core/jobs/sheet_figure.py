@@ -143,7 +143,7 @@ class SheetFigure:
     def skin_row(
         self, label: str, displacement: np.ndarray, largest: float, centers: np.ndarray | None, sensor: str
     ) -> None:
-        """Draw maps of displacement (k, N, 3) m on the unrolled skin of a sensor, one a column; label : before the row
+        """Draw maps of displacement (k, N, 3) m on a sensor's unrolled skin, one per column; label : before the row
         largest : m, where colours end; centers : (k, c, 2) = (x, z) m of contacts, or None"""
         plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from .engine.job import Job
 
 GROWS = False
-# kB a frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
+# kB per frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
 ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}
 
@@ -144,7 +144,7 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
 
 @functools.lru_cache(maxsize=2)
 def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
-    """Load the networks and the unit, once a process. Raises TactileError where they are not the job's."""
+    """Load the networks and the unit, once per process. Raises TactileError where they are not the job's."""
     check_unit(options.calibration, unit_sha256)
     tools = convert.load_tools(options)
     if tools.translator.sha256 != sha256:

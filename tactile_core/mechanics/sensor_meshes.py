@@ -202,7 +202,7 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the touchable side's mesh nodes (n,) and triangles (m, 3), outward: eight a quadratic face."""
+    """Return the touchable side's mesh nodes (n,) and triangles (m, 3), outward: eight per quadratic face."""
     faces = outer_faces(mesh).reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T

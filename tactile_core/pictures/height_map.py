@@ -28,7 +28,7 @@ from .height_loops import heights_above
 _log = logging.getLogger(__name__)
 _folded: contextvars.ContextVar[list[int] | None] = contextvars.ContextVar("folded", default=None)
 
-REFINEMENT = 2  # grid for the sideways search, intervals a node interval; measured in tests/pictures/test_height_map.py
+REFINEMENT = 2  # grid for the sideways search, intervals per node interval; measured: tests/pictures/test_height_map.py
 MOVE_TOLERANCE = 1e-7  # m, of the sideways search: times a slope of 1, below a tenth of a grey level
 MOVE_ITERATIONS = 12  # 2 or 3 do for presses, 6 for firm grips; where 12 do not, the surface folds over itself
 BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
@@ -175,8 +175,8 @@ class HeightMapper:
         return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate k splines of coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, to .1 nm a
-        mm."""
+        """Evaluate k splines of coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, to .1 nm
+        per mm."""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
@@ -239,7 +239,7 @@ def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def gel_mapper(camera: Camera | None = None) -> HeightMapper:
-    """Return the mapper of the gel that a camera looks at, made once a camera; None for the shipped DIGIT's."""
+    """Return the mapper of the gel that a camera looks at, made once per camera; None for the shipped DIGIT's."""
     return _gel_mapper(camera or load_calibration().camera)
 
 

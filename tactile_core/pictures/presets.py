@@ -34,7 +34,7 @@ class Preset:
 
     points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
     bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
-    paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths a pixel; 0 for our own integrator
+    paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths per pixel; 0 for our own integrator
 
     Without LLVM, on a matte coating:
     passes : pictures to average, each from other points of the LEDs and the pixels; 1 takes each pixel's middle

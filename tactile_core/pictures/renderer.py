@@ -40,7 +40,7 @@ class Renderer:
     """Camera pictures of one DIGIT by one preset; the scene and the picture at rest are made once.
 
     calibration : the unit's camera and lights, of ``load_calibration``, or their file; None for the unit that ships
-    preset : ``fast`` (numpy alone, 8 ms a picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
+    preset : ``fast`` (numpy alone, 8 ms per picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
     variant : Mitsuba's, "llvm_ad_rgb" or "scalar_rgb"; None for the faster one that works here; unused by ``fast``
     background : (H, W, 3) picture of the undeformed gel, levels 0 to 255 of red, green, blue (of OpenCV's blue, green,
         red give ``picture[..., ::-1]``); None for the calibration's

@@ -19,8 +19,8 @@ from .tables.column_map import ColumnMap, refuse_bag
 from .tables.table import read_header, read_tables
 
 TEXT_BYTES = 32 * 2**20  # a part's text: about 150,000 frames, 25 minutes at 100 Hz
-ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB a frame
-PART_FRAMES = 100_000  # most frames of a part: 17 minutes at 100 Hz; preparing them takes 15 MB a copy
+ARRAY_BYTES = 256 * 2**20  # of a part's arrays, as the file declares them; a simulated one has 150 kB per frame
+PART_FRAMES = 100_000  # most frames of a part: 17 minutes at 100 Hz; preparing them takes 15 MB per copy
 CONTEXT = 200  # frames that a part shares with the one before: glitches are looked for over 50, smoothing over 101
 
 

@@ -33,7 +33,7 @@ Row = Annotated[list[float], Meta(min_length=1, max_length=MOST_ELECTRODES)]
 class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
     """Gains of a unit relative to the simulated one: reading - rest = gain * simulated change + offset, E1 .. E19.
 
-    gain : counts a count; offset_counts : counts; note : how it was made
+    gain : counts per count; offset_counts : counts; note : how it was made
     rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
         single recordings; rest_pdc : counts
     film : thickness of its fluid film, divided by a typical unit's, where known

@@ -172,7 +172,7 @@ def _flags(flags: np.ndarray) -> str:
 
 
 def _of_counts(recording: Recording, unit: ElectrodeGains | None, pac: int) -> list[tuple[str, str]]:
-    """Return the rows for a recording whose changes are unknown, because its unit's rest is; pac : samples a frame"""
+    """Return the rows for a recording whose changes are unknown, because its unit's rest is; pac : samples per frame"""
     electrodes = recording.electrodes
     finger = recording.about.get("finger")
     name = f", {HAND[finger]} ({finger})" if finger else ""

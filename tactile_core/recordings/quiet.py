@@ -25,7 +25,7 @@ LOOKED_AT, CALMER, APART = 2000, 0.3, 3
 QUIET_PDC = 2.0  # counts over rest (a tare is right below 2: docs/sources.md, BioTac read-out)
 RECTIFIED_LEVEL = 4.0  # counts; without PDC a quiet electrode of a rectified recording stays below (noise folds to 1.2)
 RECTIFIED_LEVEL_PDC = 15.0  # counts; where PDC says that nothing touches, the rest is drift since the tare (assumed)
-# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts an hour = 0.024/s).
+# Counts and counts/s by which two quiet parts may differ (Ruppel: 88 counts per hour = 0.024/s).
 LEVEL, LEVEL_RATE = 3.0, 0.1
 LEVEL_PDC, LEVEL_PDC_RATE = 15.0, 0.2  # the same where PDC confirms both (assumed: skin creep after a contact)
 PDC_RATE = 0.1  # counts/s of drift allowed to PDC itself (assumed as for electrodes)
@@ -186,7 +186,7 @@ def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
     """Mark windows (W,) bool with means, sums (C, W) over n, within ``level`` of a level that follows them.
-    It starts at the window ``anchor`` and moves by at most ``rate`` a second: drift over an hour can exceed a press.
+    It starts at the window ``anchor`` and moves by at most ``rate`` per second: drift over an hour can exceed a press.
     middle : (W,) s, of the windows; possible : (W,) bool, those that the level may follow"""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)

@@ -67,7 +67,7 @@ class Truth(Summary):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Summary):
-    """Content of a recording's file, unchanged: one frame a data row, in file order, nothing resampled or dropped.
+    """Content of a recording's file, unchanged: one frame per data row, in file order, nothing resampled or dropped.
 
     name : file name without its extension
     sensor : "biotac" or "biotac_sp"

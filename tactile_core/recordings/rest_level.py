@@ -29,7 +29,7 @@ class Baseline:
 
     @functools.cached_property
     def _slopes(self) -> np.ndarray:
-        """Slope (P, 19), counts a frame, after each of the frames; 0 after the last."""
+        """Slope (P, 19), counts per frame, after each of the frames; 0 after the last."""
         return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
 
     def at(self, frames: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ Root attributes: ``format`` = "tactile-recording-1", ``simulated`` = True, ``sen
 if unknown).
 Datasets, T first: ``time`` (T,) float64 s; ``electrodes`` (T, 19), ``pdc``, ``tac``, ``tdc`` (T,) int16 raw 12-bit
 counts; ``truth/displacement_biotac`` (T, N, 3) and ``truth/displacement_digit`` (T, M, 3) int16 with attribute
-``scale`` (m a unit); ``truth/force`` (T, 3) float32 N; ``truth/contact_center`` (T, 2) float32 m; where asked for
+``scale`` (m per unit); ``truth/force`` (T, 3) float32 N; ``truth/contact_center`` (T, 2) float32 m; where asked for
 ``truth/traction_biotac`` (T, N, 3) and ``truth/traction_digit`` (T, M, 3) float32 Pa; likewise those of further
 sensors. The same arrays give the same bytes. `tactile simulate --keep` writes only some of them besides ``time`` and
 ``truth/force``; a file without ``electrodes`` is no recording to translate."""
@@ -28,9 +28,9 @@ from .assemble import assemble
 from .recording import Recording, Truth
 
 FORMAT = "tactile-recording-1"
-SCALE = 5e-7  # m a unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
+SCALE = 5e-7  # m per unit of the truth's int16: steps of 0.5 um (0.14 um rms, below any error measured), reach +-16 mm
 _MOVED, _PRESSED = "displacement_", "traction_"  # before a sensor's name
-BLOCK = 16  # frames a chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
+BLOCK = 16  # frames per chunk of the truth: a chunk stays below 300 kB at 2,700 nodes
 
 
 def write_simulated(

@@ -40,7 +40,7 @@ COUNT_MAX = 2**_READOUT.bits - 1
 # (docs/sources.md, BioTac read-out). E1 and E11, whose film is thinnest, respond 1.8 times as strongly as E2 to E5.
 REST_COUNTS = places_of(SOURCE).rest_counts
 COUNT_SIGN = -1.0 if _READOUT.polarity == FALLS else 1.0  # of a change where the film over an electrode thins
-PRESSURE_PER_COUNT = _READOUT.pressure  # Pa a count of PDC
+PRESSURE_PER_COUNT = _READOUT.pressure  # Pa per count of PDC
 
 
 def electrode_count(sensor: str) -> int:

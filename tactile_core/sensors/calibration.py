@@ -104,7 +104,7 @@ AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient li
 # m: the unit of ambient light is an LED's light on a coating that faces it at this distance, so that it depends on the
 # LED's power, not on its place.
 AMBIENT_DISTANCE = 20e-3
-MOST_RISE = 2.0  # a mm, of the ambient light's unit
+MOST_RISE = 2.0  # per mm, of the ambient light's unit
 MOST_INDEX = 4.0  # germanium's: no clear solid has more
 LARGEST_LEVEL = 255.0  # of 8 bits
 
@@ -112,8 +112,8 @@ LARGEST_LEVEL = 255.0  # of 8 bits
 @dataclasses.dataclass(frozen=True)
 class Response:
     """Matrix (channel, led) from radiance to the camera's grey levels, linear over the picture.
-    centre : (3, 3) levels a level in the picture's middle; rows are channels of the picture, columns LEDs' colours
-    along_right, along_down : (3, 3) levels a level and metre of the plane of height zero"""
+    centre : (3, 3) levels per level in the picture's middle; rows are channels of the picture, columns LEDs' colours
+    along_right, along_down : (3, 3) levels per level and metre of the plane of height zero"""
 
     centre: tuple[tuple[float, ...], ...] = number(length=3)
     along_right: tuple[tuple[float, ...], ...] = number("per_mm", length=3)
@@ -167,7 +167,7 @@ class Calibration:
     unit : its name, free text
     leds : red, green, blue
     response : the camera's response to each LED's light
-    ambient : (3, 21) or (3, 36), a row a LED: its light scattered in gel and acrylic, in units of its radiance on a
+    ambient : (3, 21) or (3, 36), a row per LED: its light scattered in gel and acrylic, in units of its radiance on a
         coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i +
         j, then by j
     object_reflectance : 0 black to 1 white, of what touches the gel

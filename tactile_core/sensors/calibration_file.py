@@ -1,4 +1,4 @@
-"""Calibrations as readable TOML: one file a unit, lengths in mm, each number explained beside it. Unknown and missing
+"""Calibrations as readable TOML: one file per unit, lengths in mm, each number explained beside it. Unknown and missing
 fields are refused."""
 
 from __future__ import annotations

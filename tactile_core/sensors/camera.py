@@ -21,7 +21,7 @@ from .toml_fields import IN_PYTHON, number
 
 HEIGHT_ZERO_Y = of_kind("digit", GelSensor).camera.height_zero_y  # of a DIGIT's cameras
 MOST_PIXELS = 10_000_000  # 2.5 GB for a fast picture; the camera has 76,800 (assumed enough)
-FINEST = 1000.0  # pixels a millimetre; the shipped unit's camera has 20 (assumed enough)
+FINEST = 1000.0  # pixels per millimetre; the shipped unit's camera has 20 (assumed enough)
 LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a camera that is higher
 
 
@@ -32,7 +32,7 @@ class Camera:
     Its position is the apparent one, after refraction by gel and acrylic. A gel point appears at its central projection
     onto the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
     width, height : pixels
-    px_per_mm_x, px_per_mm_y : pixels a millimetre of gel at height zero, along the picture's rows (x) and columns (y)
+    px_per_mm_x, px_per_mm_y : pixels per millimetre of gel at height zero, along the picture's rows (x) and columns (y)
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
     apparent_height : m, height of the pinhole above the plane of height zero
     right_z, down_x : +1 or -1, the direction of z to the right and of x down the picture

@@ -110,7 +110,7 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """Voltage dividers and a converter. bits : of a count; rate : Hz; load : ohm, of a divider; pressure : Pa a count
+    """Voltage dividers and a converter. bits : of a count; rate : Hz; load : ohm, of a divider; pressure : Pa per count
     polarity : whether counts fall or rise as a film thins"""
 
     bits: int = number(above=0, below=32)

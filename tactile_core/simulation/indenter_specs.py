@@ -1,4 +1,4 @@
-"""The indenters that a scene can name: one struct a kind, millimetres in, metres out. Structs of simple shapes are made
+"""The indenters that a scene can name: one struct per kind, millimetres in, metres out. Those of simple shapes are made
 from the shapes' own files; meshes and groups are defined here."""
 
 from __future__ import annotations

@@ -44,7 +44,7 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "indenter": ((), "i"),
 }
 SCALED = ("displacement_biotac", "displacement_digit")
-SCALE = 1e-7  # m a unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
+SCALE = 1e-7  # m per unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
 KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's surface, with its unit
 
@@ -210,7 +210,7 @@ def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> N
 
 
 def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attributes: dict[str, str]) -> str:
-    """Return the SHA-256 over names, types, shapes and values of arrays, their scales (m a unit), and attributes."""
+    """Return the SHA-256 over names, types, shapes and values of arrays, their scales (m per unit), and attributes."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())

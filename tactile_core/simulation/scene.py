@@ -36,7 +36,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     slide_share: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses end with a slide at constant force
     slide_max_mm: Annotated[float, Meta(ge=0, le=3)] = 0.0  # slides are evenly long up to this
     random_bodies: Annotated[float, Meta(ge=0, le=1)] = 0.0  # of the presses are of a body drawn for each
-    depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts a press, paired by depth; 0: paired by force
+    depth_steps: Annotated[int, Meta(ge=0, le=100)] = 0  # contacts per press, paired by depth; 0: paired by force
     depth_min_mm: Annotated[float, Meta(gt=0, le=3)] = 0.05
     depth_max_mm: Annotated[float, Meta(gt=0, le=3)] = 1.2
 

@@ -38,8 +38,8 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return each tier's largest error, um, up to a share of the thickness (fast adds full's), and ms a contact. Raises
-    TactileError for a sensor without measured errors."""
+    """Return each tier's largest error, um, up to a share of the thickness (fast adds full's); ms per contact.
+    Raises TactileError for a sensor without measured errors."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
         raise TactileError("--error", f"no errors are measured on the {title(sensor)}", expected, advice)

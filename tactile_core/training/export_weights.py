@@ -39,7 +39,7 @@ UNITS = {
 def export(
     model: Model, contacts: Contacts, parts: dict[str, np.ndarray], bodies: Bodies, seed: int, folder: Path
 ) -> dict:  # fmt: skip
-    """Write one safetensors file a network and the card; returns the card. The errors in the card are those of the
+    """Write one safetensors file per network and the card; returns the card. The errors in the card are those of the
     files: `networks.py` computes them from the rounded weights.
     parts : tensors of the network that separates two contacts"""
     model.cpu()

@@ -31,13 +31,13 @@ class Options:
     beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
     astray : weight of the distance, in cells, of a translated place on the DIGIT from the true one, against the same
         loss
-    noise : counts, standard deviation of the reading; gain : relative standard deviation a channel (docs/sources.md)
+    noise : counts, standard deviation of the reading; gain : relative standard deviation per channel (docs/sources.md)
     unit : share of signed training samples with a real unit's uncertainty, whose rest is found from recordings in
         contact throughout. unit_gain : standard deviation of the logarithm of a channel's gain; unit_offset : counts,
         of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
     misfit : error of each channel, as a share of the whole signal's size, in these samples and rectified ones. The
-        simulated contacts nearest to real slides leave .3 of the signal, .07 a channel (commit d537259); 0.1 was chosen
-        against 0.05 (docs/train.md)
+        simulated contacts nearest to real slides leave .3 of the signal, .07 per channel (commit d537259); 0.1 was
+        chosen against 0.05 (docs/train.md)
     rectified : share of training samples that lose their sign (assumed). Of these: rectified_gain, standard deviation
         of the logarithm of a channel's gain (0.5: a real unit's against the simulated one); rectified_offset, counts,
         of the tare before rectifying (assumed); rectified_missing, share of channels without reading (assumed)

@@ -18,7 +18,7 @@ from ..translation.networks import Networks
 
 ROWS = 128  # contacts at a time, to bound memory
 LEAST_PATCH = 20  # nodes: on smaller patches a share says little
-Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number a contact; NaN where it does not apply
+Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number per contact; NaN where it does not apply
 
 
 @dataclass(frozen=True)

@@ -186,7 +186,7 @@ def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np
 
 
 def check_tables(card: dict[str, Any], where: str) -> None:
-    """Raise TactileError unless a card has bounds, and rising quantiles, one a level, for confidence and silence."""
+    """Raise TactileError unless a card has bounds, and rising quantiles, one per level, for confidence and silence."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
     distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
@@ -224,7 +224,7 @@ def check_pair(card: dict[str, Any], source: str | None, target: str | None, whe
 
 
 def check_bounds(card: Mapping[str, object], where: str) -> None:
-    """Raise TactileError unless the card has REGIONS positive numbers a surface for signed and rectified signals."""
+    """Raise TactileError unless the card has REGIONS positive numbers per surface for signed and rectified signals."""
     bounds = card.get("error_bounds")
     for kind in KINDS:
         for name in SURFACES:

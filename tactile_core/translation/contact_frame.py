@@ -18,7 +18,7 @@ from ..sensors import TARGET
 
 STILL = 1e-9  # m: below, there is no dent to follow and the frame stays in the middle
 FADE = 5  # cells (assumed)
-PLACE_UNIT = 10.0  # cells a unit of the networks' inputs: places then are of the order of one (assumed)
+PLACE_UNIT = 10.0  # cells per unit of the networks' inputs: places then are of the order of one (assumed)
 
 
 @dataclass(frozen=True)

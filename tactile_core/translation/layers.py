@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import TactileError
 
 Pass = Callable[[np.ndarray], np.ndarray]  # a block of frames through a network
-BLOCK = 64  # frames a block: enough for matrix products at full speed
+BLOCK = 64  # frames per block: enough for matrix products at full speed
 Tensors = dict[str, np.ndarray]
 COUNT_SCALE = 15.0  # counts: noise of 1.5 counts over a gain error of 10 %, see `compress`
 COMPRESSED_LIMIT = 8.0  # arcsinh(4095 / 15) is 6.3: no 12-bit reading lies outside, and sinh cannot overflow

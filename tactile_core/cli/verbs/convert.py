@@ -28,7 +28,7 @@ of several topics gives one a topic and finger, <name>_<topic>_finger0; hands.ba
 
 --error 0.6levels picks the cheapest preset of `tactile render` whose measured error, rms grey levels of a picture of
 the same gel, is at most that (without --error: fast). The networks' own error is in frames.h5 and on the sheet."""
-# 4 B a number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
+# 4 B per number of 3,650 + 2,867 nodes; pictures measured at 28 kB (mean of the simulated recording) to 50 kB (of a
 # noisy real one), packed height maps at 200 kB.
 SIZES = "displacement 50 MB, latent 0.3 MB, image 20 to 35 MB, height about 140 MB (the default: 70 to 85 MB)"
 EPILOG = f"""\

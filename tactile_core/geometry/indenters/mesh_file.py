@@ -61,7 +61,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
 
 def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
-    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; ``scale`` m a unit.
+    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; ``scale`` m per file unit.
 
     Raises TactileError as ``solid`` does.
     """

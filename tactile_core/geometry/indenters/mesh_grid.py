@@ -18,14 +18,14 @@ MAX_NODES = 8_000_000  # 32 MB kept, 200 to 650 MB more while it is built
 _STEP_UP = 1.1  # step in the search of a spacing
 REACH = 5e-3  # m above the lowest point: deeper than any dent of a gel or skin (assumed)
 _STEM = 4  # times the spacing, at least, beyond what may touch
-_SPARE = 6  # extra nodes on each side for the fit of the spline: the effect of its ends fades by 0.27 a node
+_SPARE = 6  # extra nodes on each side for the fit of the spline: the effect of its ends fades by 0.27 per node
 _FINEST = 0.1e-3  # m, finer than either sensor's spacing of nodes
 _CHECKED = 500  # points near the surface at which the error is measured
 _CHECKED_WITHIN_MM = 0.3  # how near
 _ROUNDING_MM = 1e-9
 _CELLS = 200  # along a body's diagonal, at most
-# Spacings from the surface up to which distances are exact. In the spline, errors beyond fade by 0.27 a node: to half a
-# percent at the surface. Not a whole number, since flat faces lie whole spacings from nodes and rounding would decide.
+# Spacings from the surface up to which distances are exact. In the spline, errors beyond fade by 0.27 per node: to
+# 0.5 % at the surface. Not a whole number, since flat faces lie whole spacings from nodes and rounding would decide.
 _NEAR = 4.1
 _FAR = 12  # spacings (assumed)
 _ROWS = 500_000  # pairs of a column and a triangle looked at together: about 200 MB

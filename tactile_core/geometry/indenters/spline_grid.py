@@ -28,11 +28,11 @@ class SplineGrid(Summary):
     coefficients: np.ndarray
 
     def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
+        """Return the values (n,) and gradients (n, 3) per metre at points (n, 3) m."""
         return _spline(contiguous(points), self.origin, self.spacing, self.coefficients, False)[:2]
 
     def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
+        """Return gradients (n, 3) per metre and second derivatives (n, 3, 3) per square metre at points (n, 3) m."""
         return _spline(contiguous(points), self.origin, self.spacing, self.coefficients, True)[1:]
 
 
@@ -115,7 +115,7 @@ class TipGrid(Summary):
     top: float
 
     def value_and_gradient(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the values (n,) and gradients (n, 3) a metre at points (n, 3) m."""
+        """Return the values (n,) and gradients (n, 3) per metre at points (n, 3) m."""
         if not (points[:, 2] > self.top).any():
             return self.fine.value_and_gradient(points)
         share, slope, _ = self._share(points[:, 2])
@@ -123,7 +123,7 @@ class TipGrid(Summary):
         return near + share * (far - near), _mixed_gradient(along, beyond, share, slope * (far - near))
 
     def gradient_and_hessian(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gradients (n, 3) a metre and second derivatives (n, 3, 3) a square metre at points (n, 3) m."""
+        """Return gradients (n, 3) per metre and second derivatives (n, 3, 3) per square metre at points (n, 3) m."""
         if not (points[:, 2] > self.top).any():
             return self.fine.gradient_and_hessian(points)
         share, slope, bend = self._share(points[:, 2])

@@ -28,10 +28,10 @@ from ...sensors import SOURCE, TARGET
 from ...translation.answer import Answer
 from ..results import TRANSLATED, GelKind
 
-SHARD_FRAMES = 1000  # frames a task: seconds of work, so that little is lost when a worker dies (assumed)
+SHARD_FRAMES = 1000  # frames per task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
 Law = Literal["sheet"]  # of electrodes; there was another, so files of jobs name it
-PICTURE_FRAMES = 50  # rendered frames a shard: some seconds of work, and 80 MB with OpenEXR
+PICTURE_FRAMES = 50  # rendered frames per shard: some seconds of work, and 80 MB with OpenEXR
 
 
 class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
@@ -53,7 +53,7 @@ class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """Recordings to shards of translated frames.
 
-    keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames a shard
+    keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames per shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
     answer : options of the estimated contact; gel : the networks' gel, or the contact solved on the target
@@ -91,7 +91,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to one recording for each input, with values of its own; see ``jobs.simulate``.
-    seed : of the first input, each next one has one more; values : one dict an input, name -> value
+    seed : of the first input, each next one has one more; values : one dict per input, name -> value
     keep : words of ``scene_recording.outputs``"""
 
     seed: int

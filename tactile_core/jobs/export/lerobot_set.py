@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Rows = dict[str, np.ndarray]
 Features = dict[str, dict[str, Any]]  # name -> type, shape and names, as info.json has them
-CHUNK = 1000  # files a folder
+CHUNK = 1000  # files per folder
 SAME_RATE = 0.1  # that recordings may differ by: clocks and lost frames do, 100 Hz and 50 Hz do not (assumed)
 TASK = "touch, BioTac to DIGIT"
 PICTURE, STATE, ACTION = "observation.images.digit", "observation.state", "action"
@@ -48,7 +48,7 @@ class Layout(Protocol):
     picture: Literal["image", "video"]
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows of an episode (its number). rate : frames a second"""
+        """Add rows of an episode (its number). rate : frames per second"""
 
     def end_episode(self) -> dict[str, Any]:
         """Close an episode's files; returns its place for the list of episodes."""
@@ -103,7 +103,7 @@ def _splits(source: Finished) -> dict[str, str]:
 
 
 def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
-    """Describe the columns of a frame; rate : frames a second"""
+    """Describe the columns of a frame; rate : frames per second"""
     arrays = source.recordings[0].arrays()
     shapes = {name: list(shape) or [1] for name, (shape, _) in arrays.items()} | {"contact": [1]}
     found: Features = {}
@@ -129,7 +129,7 @@ def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
 
 
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
-    """Yield columns of some rows of an episode. start : its first row in the whole data set; rate : frames a second"""
+    """Yield columns of some rows of an episode. start : its first row in the data set; rate : frames per second"""
     for block, following in _followed(one):
         frame = block["frame"].astype(np.int64) // one.every
         own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {
@@ -167,7 +167,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _one_rate(source: Finished) -> int:
-    """Return the recordings' common rate, whole frames a second. Raises TactileError for different ones, or below 1."""
+    """Return the recordings' common rate, whole frames per second. TactileError for different ones, or below 1."""
     first = _rate(source.recordings[0])
     for one in source.recordings:
         rate = _rate(one)

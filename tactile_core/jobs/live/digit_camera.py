@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import TactileError
 
 _WIDTH, _HEIGHT, _RATE = 320, 240, 60  # the DIGIT's faster mode (digit-interface, QVGA)
-_LEAST_RATE = 1.0  # frames a second of a video file that states less
+_LEAST_RATE = 1.0  # frames per second of a video file that states less
 _LONGEST_READ = 2.0  # s, waited at the end for a camera that hangs
 
 

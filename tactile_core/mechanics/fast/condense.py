@@ -19,7 +19,7 @@ from ..solids.hex_mesh import HexMesh
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
 
-_LEAF = 8  # cells a group: smaller groups cost calls, larger ones dense work on zeros
+_LEAF = 8  # cells per group: smaller groups cost calls, larger ones dense work on zeros
 _BLOCK = 64  # rows mirrored at a time
 _SAME_PLACE = 1e-8  # m, between a node and the mirror image of its partner
 _MIRROR = np.array([1.0, 1.0, -1.0])

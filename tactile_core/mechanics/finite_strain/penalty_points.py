@@ -65,7 +65,7 @@ class Push:
 
 
 class PenaltyPoints:
-    """Points at which springs keep an obstacle out between nodes of quadratic faces (f, 9): 16 a face, halfway.
+    """Points at which springs keep an obstacle out between nodes of quadratic faces (f, 9): 16 per face, halfway.
 
     Node 3 b + a of a face is at (xi, eta) = (a, b) - 1."""
 

@@ -1,4 +1,4 @@
-"""Small-strain, nearly incompressible elasticity: Q2 displacement with a discontinuous linear pressure a cell.
+"""Small-strain, nearly incompressible elasticity: Q2 displacement with a discontinuous linear pressure per cell.
 
 The pressure is eliminated cell by cell, so the global matrix is symmetric positive definite in the displacement.
 Q2/P1 is inf-sup stable and does not lock: Boffi, Brezzi, Fortin, Mixed Finite Element Methods, 2013, section 8.6.

@@ -1,4 +1,4 @@
-"""Finite-strain, nearly incompressible solid: Q2 displacement with a discontinuous linear pressure a cell.
+"""Finite-strain, nearly incompressible solid: Q2 displacement with a discontinuous linear pressure per cell.
 
 Energy W(F) + p (J - 1) - p^2 / (2 kappa), p linear in each cell: the pressure is an independent Newton iterate,
 eliminated cell by cell. Simo, Taylor, Pister, Comput. Methods Appl. Mech. Eng. 51, 1985.

@@ -7,7 +7,7 @@ import numpy as np
 from .elasticity import reference_gradients
 from .finite_strain import FiniteStrainSolid, State
 
-_BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB a point
+_BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB per point
 
 
 def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:

@@ -75,7 +75,7 @@ def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibratio
 
 
 GAIN_STEPS = 2  # by Gauss and Newton's method, from the gain of the last cost
-GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels a unit of radiance, of C; levels a mm, of its slopes; assumed
+GAIN_SPREAD = (100.0, 20.0, 20.0)  # levels per unit of radiance, of C; levels per mm, of its slopes; assumed
 PRESS_STEP = 10e-3  # mm
 
 
@@ -253,7 +253,7 @@ class UnitResiduals:
             return self._pictures(with_parameters(self._bench.calibration, numbers - moved)), -1
 
     def _steps_of_press(self, x: np.ndarray, k: int) -> np.ndarray:
-        """Return derivatives (3, 3, p), levels a mm, of press k's picture at x (n,): channel; right, down, depth; p."""
+        """Return derivatives (3, 3, p), levels per mm, of press k's picture at x (n,): channel, right/down/depth, p."""
         ball, lights, sight = self.balls(x)[k], self._last[k], self._sights[k]
         after = [self._lights(self._bench, ball + step, sight).terms for step in PRESS_STEP * np.eye(3)]
         return np.stack([self.gain @ (terms - lights.terms) / PRESS_STEP for terms in after], axis=1)

@@ -12,7 +12,7 @@ from ...files import installed
 
 SUFFIXES = (".avi", ".mp4", ".mov", ".mkv")
 SMALL = (40, 40)  # px, of the pictures from which frames are chosen
-MOST_FRAMES = 20_000  # at 60 a second five minutes; 100 MB of small pictures
+MOST_FRAMES = 20_000  # at 60 per second five minutes; 100 MB of small pictures
 MOST_PIXELS = 4_000_000  # of a frame
 MOST_PRESSES, UNTOUCHED = 24, 8  # frames that are taken
 CHANGE = 12.0  # grey levels in some channel, of a small pixel that a press has changed (assumed)

@@ -1,6 +1,6 @@
 """Where pixels' rays meet the gel, and which light points are visible from there, by Mitsuba.
 
-One persistent scene a tracer; only the gel's vertices change. Both variants trace the same mesh with the same rays, so
+One persistent scene per tracer; only the gel's vertices change. Both variants trace one mesh with the same rays, so
 they agree but for rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from typing import Any
 from .ros_messages import ARRAY, NAME, NUMBERS, SEQUENCE, TIME, Definition
 
 MOST = 100  # sensors, or lists of them, of one type of message (assumed enough: the drivers have one list)
-MOST_PAC = 1000  # samples of PAC a message (assumed enough: the drivers have 2 and 22)
+MOST_PAC = 1000  # samples of PAC per message (assumed enough: the drivers have 2 and 22)
 ELECTRODES = re.compile(r"electrodes?(_(data|values?|vals?|raw|counts))?$", re.IGNORECASE)
 SLOW = {name: re.compile(rf"(^|.*_){name}(_(data|value|val|raw))?$", re.IGNORECASE) for name in ("pdc", "tac", "tdc")}
 PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)

@@ -22,7 +22,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Read counts (T, 19), pdc, tac, tdc and 22 samples of pac a line. Raises TactileError as `of_table` does."""
+    """Read counts (T, 19), pdc, tac, tdc and 22 samples of pac per line. Raises TactileError as `of_table` does."""
     held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")

@@ -1,4 +1,4 @@
-"""JSON as a table: an array of records, a record a line, or an object of arrays; fields are named ``a.b[2]``."""
+"""JSON as a table: an array of records, one per line, or an object of arrays; fields are named ``a.b[2]``."""
 
 from __future__ import annotations
 

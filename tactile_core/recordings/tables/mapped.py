@@ -30,7 +30,7 @@ MOST_SERIES = 5  # values of a column that tells fingers apart; more are places 
 LOOKED_AT = 10_000  # rows
 GUESSED_BY = 2**18  # bytes of a text by which its map is guessed: some hundred frames (assumed enough)
 MILLIVOLTS = re.compile(r"(?:^|[^a-z])mv(?:[^a-z]|$)")
-TURNS = 0.6  # stamps a row, below which rows share them; those of two fingers have 0.5 (assumed)
+TURNS = 0.6  # stamps per row, below which rows share them; those of two fingers have 0.5 (assumed)
 
 
 def refuse_several(table: Table, columns: ColumnMap) -> None:

@@ -18,7 +18,7 @@ from .rows import clean, doubt_last_cell, is_row, no_number, row, tell_blank_lin
 from .table_header import Header
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
-MAX_LINE = 2**20  # bytes; the widest layout has 500 a line (assumed enough)
+MAX_LINE = 2**20  # bytes; the widest layout has 500 per line (assumed enough)
 WHOLE = 8 * 2**20  # bytes of text up to which a file is parsed at once; of a longer one BLOCK at a time
 BLOCK = 2 * 2**20
 OVERLAP = 200  # rows of the block before by which the last cell of a file is judged

@@ -80,7 +80,7 @@ def _width(line: str) -> int:
 
 
 def _separator(line: str) -> str:
-    """Return the separator of a line's cells; commas, at most one a cell, are decimals beside semicolons or tabs."""
+    """Return the separator of a line's cells; commas, at most one per cell, are decimals beside semicolons or tabs."""
     commas = line.count(",")
     return next((mark for mark in ";\t" if mark in line and commas <= line.count(mark) + 1), "," if commas else SPACE)
 

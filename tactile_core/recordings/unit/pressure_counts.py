@@ -1,4 +1,4 @@
-"""Detect the unit of the fluid's pressure beside raw electrodes: 12-bit counts, the electrodes' own, or a pressure."""
+"""Detect the unit of measurement of raw PDC: 12-bit counts, that of the electrodes, or one of pressure."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from ...sensors.fluid_sensor import Fluid
 PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
 # For pressures converted from counts: how well readings lie on steps of one count (1: all do), and steps they span.
 ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
-AT_REST = 800.0, 3000.0  # counts between which untared PDC rests: 915 to 2,405 in three units (assumed: some room)
+AT_REST = 800.0, 3000.0  # counts between which untared PDC rests: 915 to 2,405 in three fingers (assumed: some room)
 NOISE, LEAST_NOISE = 4.0, 0.2  # counts, limits of the neighbours' median difference; below, averaged (assumed)
 MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Return pdc (T,), as in the file, in counts; None if its unit is unknown. unit : counts a unit of electrodes"""
+    """Return pdc (T,) of a file in counts; None if unknown how. unit : counts that an electrode's 1 there means"""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -31,7 +31,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return counts a unit of pdc (T,), 0 if unknown; and a pressure unit's name, else ""; unit : as of `in_counts`"""
+    """Return the counts that 1 in pdc (T,) means (0: unknown) and its pressure unit or ""; unit : as of electrodes"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):

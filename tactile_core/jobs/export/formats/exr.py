@@ -16,7 +16,7 @@ BRIEF = "a folder of OpenEXR files a recording: heights, pictures"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one folder a recording: see `formats`. TactileError for a job that kept neither heights nor pictures."""
+    """Write one folder per recording: see `formats`. TactileError for a job that kept neither heights nor pictures."""
     if not {"height_map", "image"} & set(source.recordings[0].arrays()):
         found, advice = "holds neither heights nor pictures", "Make the job with --keep height or image"
         raise TactileError(source.folder, found, "a job that kept one of them", advice)

@@ -1,4 +1,4 @@
-"""LeRobot's dataset layout v3.0: rows in Parquet, many episodes a file, pictures inside as PNG; see ``lerobot_set``.
+"""LeRobot's dataset layout v3.0: rows in Parquet, many episodes per file, pictures inside as PNG; see ``lerobot_set``.
 meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet,
 data/chunk-CCC/file-FFF.parquet"""
 

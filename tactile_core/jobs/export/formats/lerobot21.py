@@ -1,4 +1,4 @@
-"""LeRobot's dataset layout v2.1: a Parquet file and a video an episode, lists in JSON lines; see ``lerobot_set``.
+"""LeRobot's dataset layout v2.1: a Parquet file and a video per episode, lists in JSON lines; see ``lerobot_set``.
 
 meta/info.json, meta/stats.json, meta/episodes.jsonl, meta/episodes_stats.jsonl, meta/tasks.jsonl, meta/modality.json,
 data/chunk-CCC/episode_EEEEEE.parquet, videos/chunk-CCC/observation.images.digit/episode_EEEEEE.mp4
@@ -32,7 +32,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 class _Apart:
-    """A data file and a video an episode."""
+    """A data file and a video per episode."""
 
     version = "v2.1"
     picture: Literal["image", "video"] = "video"

@@ -15,7 +15,7 @@ TIME = (1980, 1, 1, 0, 0, 0)  # of the files inside: the same job gives the same
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one file a recording, see `formats`."""
+    """Write one file per recording, see `formats`."""
     done = 0
     for one in source.recordings:
         with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:

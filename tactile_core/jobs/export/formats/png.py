@@ -12,7 +12,7 @@ BRIEF = "a folder of PNG pictures a recording"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one folder a recording, see `formats`."""
+    """Write one folder per recording, see `formats`."""
     source.check_kept("image", "image")
     done = 0
     for one in source.recordings:
