@@ -5,7 +5,7 @@
     python3 scripts/build_extension.py --python 3.13 --debian        Debian's 4.3, whose Python is another
     python3 scripts/build_extension.py --no-wheels                   42 MB, any platform: numpy alone, see Preferences
 
-A zip holds the files that git tracks, and the wheels of what simulating and rendering need: 173 to 229 MB a platform
+A zip holds the files that git tracks, and the wheels of what simulating and rendering need: 173 to 229 MB per platform
 and Python, so each has a zip of its own. The same commit, platform and wheels give the same bytes.
 """
 

@@ -105,7 +105,7 @@ def try_wheel(wheel: Path, version: str) -> None:
 
 
 def build_zips(out: Path) -> None:
-    """Build the extension's zip without wheels, and one a platform and Python."""
+    """Build the extension's zip without wheels, and one per platform and Python."""
     wanted = [["--no-wheels"]]
     wanted += [["--platform", one, "--python", python, *["--debian"] * debian] for one, python, debian in ZIPS]
     for options in wanted:

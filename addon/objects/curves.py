@@ -58,7 +58,7 @@ def write_curve(
 
 
 def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, lines: int = LINEAR) -> None:
-    """Write one F-curve a column of ``values`` (T, k) at ``frames`` (T,); owner, path, lines as in ``write_curve``."""
+    """Write one F-curve per column of ``values`` (T, k) at ``frames`` (T,); owner, path, lines: see ``write_curve``."""
     for index in range(values.shape[1]):
         write_curve(owner, path, frames, values[:, index], index, lines)
 

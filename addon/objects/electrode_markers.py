@@ -1,4 +1,4 @@
-"""Small balls under the skin, one an electrode, coloured by their signal."""
+"""Small balls under the skin, one per electrode, coloured by their signal."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from . import axes
 
 
 def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes and units, ``per_metre`` a
+    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes and units, ``per_metre`` per
     metre."""
     right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right

@@ -38,7 +38,7 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
 
 
 def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
-    """Make an image of values (H, W) bool, packed as a PNG of one bit a pixel, in place of one of its name.
+    """Make an image of values (H, W) bool, packed as a PNG of one bit per pixel, in place of one of its name.
 
     Set as pixels, a long recording's values would take gigabytes for a moment.
     """

@@ -48,7 +48,7 @@ class Writer:
         """Begin with the header; frames : in the file; per_metre : Blender units in a metre"""
         self._sensor, self._per_metre, self._file = sensor, per_metre, file
         self._rest = axes.to_blender(sensors.sensor_surface(sensor).rest, per_metre)
-        # PC2: "POINTCACHE2", version 1, points, first frame, frames a sample, samples; then float32 x, y, z
+        # PC2: "POINTCACHE2", version 1, points, first frame, frames per sample, samples; then float32 x, y, z
         self._file.write(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, len(self._rest), 0.0, 1.0, frames))
         self._dent: list[np.ndarray] = []
         self._patch: list[np.ndarray] = []
@@ -69,7 +69,7 @@ class Writer:
 
 @contextlib.contextmanager
 def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[Writer]:
-    """Yield the writer of a file of ``frames`` frames, ``per_metre`` Blender units a metre, that appears whole or not
+    """Yield the writer of a file of ``frames`` frames, ``per_metre`` Blender units per metre, that appears whole or not
     at all. Raises TactileError where there is no room."""
     room = atomic.writing(file, "room in a writable folder", "Save the .blend elsewhere")
     with room, atomic.new_file(file) as partial, open(partial, "wb") as stream:

@@ -1,4 +1,4 @@
-"""Animate a surface: a shape key a frame, or a mesh cache beside the .blend."""
+"""Animate a surface: a shape key per frame, or a mesh cache beside the .blend."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
 
 
 def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:
-    """Write one key a frame, shown one after the other by one F-curve of ``eval_time``.
+    """Write one key per frame, shown one after the other by one F-curve of ``eval_time``.
 
     rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,) of the scene
     """

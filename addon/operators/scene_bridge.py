@@ -32,7 +32,7 @@ class Authored:
 
 
 def rate_of(scene: bpy.types.Scene) -> float:
-    """Return a scene's frames a second."""
+    """Return a scene's frames per second."""
     return scene.render.fps / scene.render.fps_base
 
 

@@ -133,7 +133,7 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
 
 
 def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "") -> TactileObject:
-    """Set an object's role, ``per_metre`` Blender units a metre and, for a skin or gel, sensor; return its
+    """Set an object's role, ``per_metre`` Blender units per metre and, for a skin or gel, sensor; return its
     properties."""
     about = thing.tactile
     about.role, about.per_metre, about.sensor, about.format = role, per_metre, sensor, FORMAT

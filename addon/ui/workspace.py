@@ -19,7 +19,7 @@ _LOOKS = 50
 
 
 class TACTILE_OT_open_workspace(TactileOperator):
-    """Open a workspace with the sensors, the gel's picture, properties and a timeline; it is made once a file"""
+    """Open a workspace with the sensors, the gel's picture, properties and a timeline; it is made once per file"""
 
     bl_idname = "tactile.open_workspace"
     bl_label = "Tactile Workspace"

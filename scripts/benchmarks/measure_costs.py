@@ -74,7 +74,7 @@ def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, flo
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """Return a part's cost a frame and at its start; costs, sizes (bytes), frames : of a run on few and one on many"""
+    """Return a part's cost per frame and at its start; costs, sizes (bytes), frames : of runs on few and on many"""
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
@@ -126,7 +126,7 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
 
 
 def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
-    """Return two rows a part, ms a frame and MB, and a row for each time of a full tier's contact, ms."""
+    """Return two rows per part, ms per frame and MB, and a row for each time of a full tier's contact, ms."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))

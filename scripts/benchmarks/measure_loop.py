@@ -7,7 +7,7 @@ Random contacts of nine indenters on each sensor, with friction. Alone: each fro
 same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
 to the goal and five slides of 0.1 mm along the finger. As meshes: four bodies by formula and, at the same places and
 depths, as meshes of up to 82,000 triangles, each from nothing, and how long a mesh takes to load. Median, 95 and 99 %
-of CPU and wall ms a contact on one core, warm. Beside them the fast tier's error against the full one
+of CPU and wall ms per contact on one core, warm. Beside them the fast tier's error against the full one
 (`mechanics_tiers.json`). Needs the extra [fem].
 """
 
@@ -48,7 +48,7 @@ from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: 
 from tactile_core.pictures.renderer import Renderer  # noqa: E402
 
 STEPS, SEED = 10, 20261125
-SLIDE = 0.1e-3  # m a step
+SLIDE = 0.1e-3  # m per step
 LEVELS, LEVELS_SHOWN = (0.5, 0.95, 0.99), "median | 95 % | 99 %"
 WARM = 9  # contacts before the first that counts, one of each indenter
 Times = list[tuple[float, float]]  # CPU and wall, ms
@@ -88,7 +88,7 @@ def as_rows(name: str, times: Times, error: str) -> list[Row]:
 
 
 def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield each measured thing's name, times, and error in words; count : contacts a sensor"""
+    """Yield each measured thing's name, times, and error in words; count : contacts per sensor"""
     for sensor in ("digit", "biotac"):
         for name, times, error, last in of_sensor(sensor, count):
             yield name, times, error

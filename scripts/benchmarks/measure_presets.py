@@ -5,7 +5,7 @@
     python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
 
 Errors are grey levels rms over the picture, its channels and the fields, before rounding: ``_error_direct`` from
-converged direct light, others from the full model of a matte coating: 64 pictures from 512 points an LED, four bounces
+converged direct light, others from the full model of a matte coating: 64 pictures from 512 points per LED, four bounces
 gathered over horizons, the window. It shares no code with our integrator and has next to no noise; Mitsuba's own path
 integrator, the preset `reference`, is held against it too.
 Times are CPU time on one core, so that other programs do not count. Prints a table; exits 1 when an error row misses
@@ -177,7 +177,7 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """Row of the preset ``name``'s CPU ms a frame on one thread: median over heights (H, W) m of the least of
+    """Row of the preset ``name``'s CPU ms per frame on one thread: median over heights (H, W) m of the least of
     a few calls, as other programs only lengthen it."""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)

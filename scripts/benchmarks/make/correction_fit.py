@@ -19,7 +19,7 @@ from tactile_core.mechanics.fast.correction import (
     squares,
 )
 
-FIELDS = 32  # learned fields a sensor
+FIELDS = 32  # learned fields per sensor
 _WIDTHS = 2.0, 4.0, 8.0, 16.0  # of the kernel, in standard deviations of a feature
 # Ridge over the kernel's mean diagonal. With a hundredth of it the fit extrapolated worse: a ring without tilt was 25 %
 # off in force.

@@ -1,6 +1,6 @@
 """Condense the sensors that ship and write them compressed, so that nobody waits for their matrices.
 
-    python scripts/benchmarks/make/make_compliance.py                    a minute and 2.4 GB a sensor
+    python scripts/benchmarks/make/make_compliance.py                    a minute and 2.4 GB per sensor
     python scripts/benchmarks/make/make_compliance.py digit --out DIR
 
 Raise ``_FORMAT`` of tactile_core/mechanics/fast/compliance.py first where a file changes, so that no cache keeps arrays

@@ -6,7 +6,7 @@ Each sequence is 40 frames with one of the training's nine indenters, anywhere o
 normal: rest, force up to 0.2 to 2 N, 20 frames in which it stays (press), leans over by 20 degrees and moves with it
 (roll), or slides by 1 to 4 mm with the training's friction (slide), force down, rest. Presses and slides go on from the
 contact before; a roll's frames are presses of their own. Sequences that a sensor does not bear are drawn again. A
-few minutes on one core. The full tier would take 3 s a frame and sensor, 4 hours in all. The fast tier, which the
+few minutes on one core. The full tier would take 3 s per frame and sensor, 4 hours in all. The fast tier, which the
 training pairs are of too, is 7 to 8 um off it in the median of the test contacts and 30 um in deep ones
 (docs/accuracy.md), so rows of this set do not show what it misses.
 """

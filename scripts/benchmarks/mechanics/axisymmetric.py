@@ -1,6 +1,6 @@
 """The reference tier's solid with axial symmetry: the same material and contact on a mesh of the half plane.
 
-Quadratic quadrilaterals with a linear discontinuous pressure a cell. Coordinates (x, y, z) = (radius, axis, hoop).
+Quadratic quadrilaterals with a linear discontinuous pressure per cell. Coordinates (x, y, z) = (radius, axis, hoop).
 A node keeps three degrees of freedom, of which the hoop's is fixed, so that ``newton.FiniteStrainContact`` takes this
 solid as it takes the one in space. Forces and energies are those of the whole turn.
 

@@ -154,7 +154,7 @@ def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the ``differences`` from scikit-fem, a row a quantity; none where it is not installed."""
+    """Yield the ``differences`` from scikit-fem, a row per quantity; none where it is not installed."""
     try:
         found = differences()
     except ImportError:

@@ -48,7 +48,7 @@ def short(value: float | None) -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """Draw a PNG, a panel a stage: error over time, logarithmic; the Pareto front, and doing nothing, as lines."""
+    """Draw a PNG, a panel per stage: error over time, logarithmic; the Pareto front, and doing nothing, as lines."""
     from matplotlib.figure import Figure
 
     panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]
@@ -62,7 +62,7 @@ def plot(methods: Sequence[Method]) -> bytes:
 
 
 def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
-    """The methods of a stage that have time and error, a panel each; mechanics has one a sensor."""
+    """The methods of a stage that have time and error, a panel each; mechanics has one per sensor."""
     found = [each for each in methods if each.stage == stage and each.ms and each.error]
     if stage != "mechanics":
         return [found]

@@ -18,7 +18,7 @@ NAMES = tuple(f"{sensor}_{tier}" for sensor in ("digit", "biotac") for tier in (
 TRUTH = TRAINING / "reference_contacts.npz"
 QUICK = 2  # contacts that the full tier solves in a quick run
 EVERY = 7  # one test press in so many, in a quick run
-IN_LOOP, IN_LOOP_QUICK = 500, 18  # contacts a sensor, alone and on paths
+IN_LOOP, IN_LOOP_QUICK = 500, 18  # contacts per sensor, alone and on paths
 REPEATS = {"fast": 3, "full": 1}
 
 

@@ -19,7 +19,7 @@ TEST_SET = TRAINING / "test_contacts.h5"
 class Method:
     """Method of a stage.
 
-    ms : CPU a frame on one core; mb : peak memory of a process that does this alone, without what measures the error
+    ms : CPU per frame on one core; mb : peak memory of a process that does this alone, without what measures the error
     error, baseline : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
     more : further rows
     """

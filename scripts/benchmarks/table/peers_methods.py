@@ -21,7 +21,7 @@ from .method import Method, best_ms, peak_mb
 
 NAMES = "ours", "taxim", "taxim_shadows"
 SIZE = 480, 640  # of Taxim's GelSight Mini, px
-RADIUS, DEPTH, PITCH = 4.0, 0.5, 0.0295  # mm, mm, mm a pixel
+RADIUS, DEPTH, PITCH = 4.0, 0.5, 0.0295  # mm, mm, mm per pixel
 
 
 def measure(name: str, quick: bool) -> Method:

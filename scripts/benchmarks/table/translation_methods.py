@@ -18,7 +18,7 @@ from tactile_core.translation.translate import load_translator
 
 from .method import TEST_SET, Method, best_ms, peak_mb
 
-BATCHES = 1, 500  # frames a call
+BATCHES = 1, 500  # frames per call
 NAMES = (*(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence") for batch in BATCHES), "numpy_solved_100")
 EVERY = 3  # one test press in so many, in a quick run; prime to how box, ring and others take turns
 Change = np.ndarray  # (B, 19) counts

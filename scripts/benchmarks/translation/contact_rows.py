@@ -33,7 +33,7 @@ SETS = {
 RECTIFIED_PEAK, RECTIFIED_PLACE, RECTIFIED_SILENT = 120 / 254, 0.8, 0.05
 REGIONS = {0.5: (0.45, 0.55), 0.9: (0.86, 0.94)}  # share of the posterior -> between which shares of truths lie in it
 FELT = 0.1  # of a field's peak: nodes whose error counts in `left_of_nothing`
-DRAWS = 200  # of each posterior: a share is known to .035 a contact, to .002 over 368 of them
+DRAWS = 200  # of each posterior: a share is known to .035 per contact, to .002 over 368 of them
 
 
 def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:

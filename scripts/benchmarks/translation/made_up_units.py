@@ -188,7 +188,7 @@ def unit_of(number: int) -> Unit:
 
 
 def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSES) -> list[Row]:
-    """Return rows of the share of contacts whose largest node error is below its bound, one a bin of confidence: the
+    """Return rows of the share of contacts whose largest node error is below its bound, one per bin of confidence: the
     share should equal the confidence."""
     made = [played(OTHERS + each, unit_of(OTHERS + each), presses) for each in range(units)]
     gel, rows = np.concatenate([each.gel for each in made]), []
@@ -220,7 +220,7 @@ def translated_contacts(network: Translator, made: Sequence[Played], taken: str)
 
 
 def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
-    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms a contact.
+    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms per contact.
     made, taken : as in ``translated_contacts``"""
     began = time.process_time()
     found = translated_contacts(network, made, taken)

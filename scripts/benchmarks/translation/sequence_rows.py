@@ -31,7 +31,7 @@ SEED = 11  # of gains, noise and rest
 REST_OFF = 3.0  # counts: what an electrode drifts by in two minutes since the tare, at most (`readout.Wiring.drift`)
 
 Truth = dict[str, np.ndarray]
-Errors = dict[str, np.ndarray]  # by UNITS, a number a judged frame
+Errors = dict[str, np.ndarray]  # by UNITS, a number per judged frame
 
 
 def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:

@@ -34,7 +34,7 @@ UNSEEN = {"cube_14mm": 32.0, "ring_7mm": 55.0}  # um, of M2MPN on an indenter th
 EACH_INDENTER = ("S2MPN_rms_um", "M2MPN_rms_um", "M2MPN_core_height_um", "chain_rms_um")
 BASELINE_METRICS = ("baseline_biotac_rms_um", "baseline_digit_rms_um", "baseline_digit_core_height_um")
 SEED = 7  # of the readings' noise
-GAIN = 0.1  # standard deviation a channel (assumed: docs/sources.md, BioTac read-out)
+GAIN = 0.1  # standard deviation per channel (assumed: docs/sources.md, BioTac read-out)
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
