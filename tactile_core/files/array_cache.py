@@ -59,8 +59,7 @@ def claim(folder: Path, room: str) -> None:
     """Make an entry's folder and try to write in it before its arrays are computed; room and errors as `store`."""
     with atomic.writing(folder, f"a folder for {room}", "Name one in TACTILE_CACHE"):
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "probe").touch()
-        (folder / "probe").unlink(missing_ok=True)  # another process may have been quicker
+        atomic.probe(folder)
 
 
 def _stored(file: Path, values: np.ndarray) -> str:

@@ -21,6 +21,11 @@ def sha256(path: str | os.PathLike) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def entry(path: str | os.PathLike) -> dict[str, str]:
+    """Return a file's name, without its folders, and `sha256`, as notes have them."""
+    return {"file": os.path.basename(path), "sha256": sha256(path)}
+
+
 def versions(*more: str) -> dict[str, str]:
     """Return versions that can change a result's bytes, besides its input and the weights; more : further libraries."""
     import importlib

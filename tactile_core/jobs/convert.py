@@ -192,9 +192,8 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
     return {
         "format": results.FORMAT,
         "recording": {
-            "file": os.path.basename(recording.path), "sha256": provenance.sha256(recording.path),
-            "layout": recording.layout, "frames": rows.count, "simulated": recording.simulated,
-            "labels": labels.summary(recording.labels),
+            **provenance.entry(recording.path), "layout": recording.layout, "frames": rows.count,
+            "simulated": recording.simulated, "labels": labels.summary(recording.labels),
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
         "options": {"frames": frames_text(options.frames), "keep": list(options.keep),
@@ -208,16 +207,9 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         "flagged_frames": report.flagged,
         "explained": report.explained,
         "weights": weights_entry(tools.translator),
-        **_unit_entry(tools.calibration),
+        **({} if tools.calibration is None else {"calibration": provenance.entry(tools.calibration)}),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
-
-
-def _unit_entry(calibration: str | os.PathLike | None) -> dict[str, dict[str, str]]:
-    """Return the given calibration's entry of a note; empty where none was given."""
-    if calibration is None:
-        return {}
-    return {"calibration": {"file": os.path.basename(calibration), "sha256": provenance.sha256(calibration)}}
 
 
 def weights_entry(translator: Translator) -> dict:

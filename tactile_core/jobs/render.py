@@ -221,9 +221,9 @@ def note_of(
     return {
         "format": results.FORMAT,
         "made_by": MAKER,
-        "input": {"file": file.name, "sha256": provenance.sha256(file), "kind": kind},
+        "input": provenance.entry(file) | {"kind": kind},
         "frames": {"selected": frames_text(options.frames), "rendered": count},
-        "calibration": {"file": calibration.name, "sha256": provenance.sha256(calibration), "unit": unit},
+        "calibration": provenance.entry(calibration) | {"unit": unit},
         "background": background_of(renderer),
         "object_reflectance": renderer.calibration.object_reflectance,
         "noise": options.noise,
