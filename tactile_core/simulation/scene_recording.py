@@ -62,8 +62,9 @@ def simulate_recording(
     keep: Collection[str] = DEFAULT,
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
-) -> None:
-    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes.
+) -> int:
+    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes; return the number
+    of frames that press.
 
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
     scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
@@ -112,6 +113,7 @@ def simulate_recording(
         made_by=f"tactile {__version__}, {made_by}",
         note=f"Simulated, not measured: {scene.description}{fluid}",
     )  # fmt: skip
+    return int((force > 0).sum())
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:

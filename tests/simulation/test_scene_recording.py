@@ -7,6 +7,7 @@ import pytest
 from ball_scene import ball_scene
 
 from tactile_core import recordings, sensors
+from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.recordings import info
@@ -79,6 +80,13 @@ def test_a_press_that_comes_again_is_solved_once(tmp_path, monkeypatch):
     assert asked == pytest.approx([0.1, 0.2, 0.3])
     moved = read_truth(tmp_path / "gel.h5")[1].displacement_digit
     np.testing.assert_array_equal(moved[1], moved[5])
+
+
+def test_a_scene_that_never_presses_is_said(tmp_path, capsys):
+    tap = ball_scene((0.0, -8.0, 0.0, 0.0), (0.005, -8.0, 0.0, 0.3), (0.01, -8.0, 0.0, 0.0))  # between two frames
+    (tmp_path / "scene.toml").write_text(tap, encoding="utf-8")
+    assert main(["simulate", str(tmp_path), "--keep", "displacement_digit", "--out", str(tmp_path / "x.h5")]) == 0
+    assert "no frame presses: raise force_n, or hold it" in capsys.readouterr().err
 
 
 def test_same_seed_same_bytes_and_another_changes_the_counts_alone(scene, seed_4, tmp_path):

@@ -84,7 +84,9 @@ def run(options: argparse.Namespace) -> int:
         from ...simulation.scene_recording import simulate_recording
 
         tiers = {} if options.error is None else _tiers(options, keep)
-        simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
+        pressing = simulate_recording(options.scene, options.out, options.seed, shown, keep=keep, tiers=tiers)
+    if not pressing:
+        say(f"{options.scene}: no frame presses: raise force_n, or hold it for 0.01 s and more")
     tell(options.out)
     if "electrodes" in keep:
         next_step(f"tactile convert {quote(options.out)} --out results")
