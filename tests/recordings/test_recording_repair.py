@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from tactile_core import recordings
-from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions, prepare, read, repair
 from tactile_core.recordings.assemble import assemble
 from tactile_core.recordings.flags import Flag
@@ -190,9 +189,3 @@ def test_rectified_recordings_are_smoothed_others_when_told(slide_csv):
     np.testing.assert_array_equal(said.electrodes, plain.electrodes)
     folded = prepare(recording, PrepareOptions(kind="rectified", tare="none"))
     assert folded.report["smoothed_frames"] == 3
-
-
-@pytest.mark.parametrize("frames", [0, 2, -3, 103])
-def test_impossible_windows_are_refused(slide_csv, frames):
-    with pytest.raises(TactileError, match=r"option smooth.*an odd number from 1 to 101"):
-        prepare(read(slide_csv()), PrepareOptions(smooth=frames))

@@ -139,11 +139,17 @@ def test_no_tare(press):
 
 
 @pytest.mark.parametrize(
-    "option", [PrepareOptions(kind="Raw"), PrepareOptions(counts_per_unit=0), PrepareOptions(counts_per_unit=-1)]
-)
-def test_options_that_make_no_sense_are_an_error(option, press):
-    with pytest.raises(TactileError, match="option"):
-        recordings.prepare(make_recording(press), option)
+    ("field", "values", "said"),
+    [
+        ("kind", ["Raw"], "raw, tared, scaled, rectified"), ("counts_per_unit", [0, -1], "counts a unit, above 0"),
+        ("smooth", [0, 2, -3, 103], "an odd number from 1 to 101"), ("polarity", ["up"], "auto, falls, rises"),
+        ("film", [0.05, 30.0, np.nan], "0.2 to 3 of a typical unit's"),
+    ],
+)  # fmt: skip
+def test_options_that_make_no_sense_are_an_error(field, values, said, press):
+    for value in values:
+        with pytest.raises(TactileError, match=f"option {field}: .*; expected {said}"):
+            recordings.prepare(make_recording(press), PrepareOptions(**{field: value}))
 
 
 @pytest.mark.parametrize("frames", [1, 2, 5, 29])

@@ -96,13 +96,6 @@ def test_a_pressure_of_another_unit_shows_no_other_film(factor, shipped):
     assert prepare(other).report["film"]["thickness"] == 1.0
 
 
-@pytest.mark.parametrize("thickness", [0.05, 30.0, np.nan])
-def test_impossible_films_are_refused(thickness, press):
-    recording = assemble("press.npz", "NPZ", electrodes=press.electrodes, stamps=press.time)
-    with pytest.raises(TactileError, match=r"option film.*0.2 to 3 of a typical unit's"):
-        prepare(recording, PrepareOptions(film=thickness))
-
-
 def test_a_unit_s_file_holds_its_film(tmp_path, press):
     unit = electrode_gains.ElectrodeGains("", [1.0] * 19, [0.0] * 19, film=0.5)
     electrode_gains.write(tmp_path / "unit.toml", electrode_gains.units_file({"unit": unit}))
