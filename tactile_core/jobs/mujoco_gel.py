@@ -120,8 +120,8 @@ class MujocoGel:
         endless = self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
         if endless and geom not in self._ignored:
             self._ignored.add(geom)
-            name = mujoco.mj_id2name(self.model, mujoco.mjtObj.mjOBJ_GEOM, geom)
-            _log.warning("geom %s touches the gel and is ignored: a plane or height field has no bounds", name or geom)
+            name = self.model.geom(geom).name or geom
+            _log.warning("geom %s touches the gel and is ignored: a plane or height field has no bounds", name)
         return not endless
 
     def _pose(self, data: mujoco.MjData, geom: int) -> np.ndarray:
@@ -179,12 +179,9 @@ def _trimesh(model: mujoco.MjModel, geom: int, kind: Any, size: np.ndarray) -> A
 
 def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
     """Return the number of a named "geom" or "site", the kind."""
-    import mujoco
-
-    wanted = mujoco.mjtObj.mjOBJ_GEOM if kind == "geom" else mujoco.mjtObj.mjOBJ_SITE
-    number = mujoco.mj_name2id(model, wanted, name)
-    if number < 0:
-        count = model.ngeom if kind == "geom" else model.nsite
-        names = [mujoco.mj_id2name(model, wanted, each) for each in range(count)]
-        raise TactileError("MuJoCo model", f"no {kind} {name!r}", f"one of {', '.join(map(str, names)) or 'none'}")
-    return number
+    try:
+        return getattr(model, kind)(name).id
+    except KeyError as error:
+        names = [getattr(model, kind)(each).name for each in range(getattr(model, f"n{kind}"))]
+        expected = f"one of {', '.join(names) or 'none'}"
+        raise TactileError("MuJoCo model", f"no {kind} {name!r}", expected) from error
