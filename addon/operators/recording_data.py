@@ -36,7 +36,7 @@ _MOVED = "displacement_biotac", "displacement_digit"  # of skin and gel
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
-    """A recording, the numbers (T,) of its ``chosen`` frames, their signals and translation, and the translator.
+    """A recording, the indices (T,) of its ``chosen`` frames, their signals and translation, and the translator.
 
     skin, gel : their movements; if files hold these, the translation's displacements are empty, (T, 0, 3)"""
 

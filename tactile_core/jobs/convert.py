@@ -187,7 +187,7 @@ def check_order(recording: Recording, answer: Answer) -> None:
 
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
     """Return a result's origin for JSON: only what the same input reproduces, so no paths and no time of day.
-    frames : (T,) numbers of the converted frames in the recording"""
+    frames : (T,) int, indices of the converted frames in the recording"""
     recording = rows.recording
     return {
         "format": results.FORMAT,

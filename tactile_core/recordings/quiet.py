@@ -209,9 +209,9 @@ def _tracked(
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
-    """Choose the calm window (its number) that is taken for rest: among those of lowest PDC, the first near the
+    """Choose the calm window (its index) that is taken for rest: among those of lowest PDC, the first near the
     recording's start or the last near its end; of a recording that is not raw, the one nearest to zero.
-    calm : (n,) int, numbers of the windows to choose from; duration : s, of the recording"""
+    calm : (n,) int, indices of the windows to choose from; duration : s, of the recording"""
     if windows.pdc is not None:
         low = windows.pdc[calm]
         calm = calm[low <= low.min() + 0.5 * QUIET_PDC]

@@ -55,7 +55,7 @@ def press_rows(
 
 
 def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tuple[int, Indenter]:
-    """Draw a press's body and its number: one of the scene's, or (the last number) a random one."""
+    """Draw a press's body and its index: one of the scene's, or (the index after them) a random one."""
     which = int(random.integers(len(scene.indenters)))
     if spec.random_bodies and random.uniform() < spec.random_bodies:
         return len(scene.indenters), random_body(random)

@@ -85,18 +85,18 @@ class Pairs:
     pair: tuple[str, str] = PAIR
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
-        """Select the contacts of rows (n,) alone."""
+        """Select the contacts with indices rows (n,) alone."""
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
 
     @property
     def indenter_names(self) -> list[str]:
-        """Names of the indenters by number, as in ``indenter``."""
+        """Names of the indenters; ``indenter`` holds indices into them."""
         return json.loads(self.attributes["indenters"])
 
 
 @dataclass(frozen=True)
 class Split:
-    """Row numbers (int) of the contacts to train, for validation and to test; no press is in two of them."""
+    """Indices (int) of the contacts to train, for validation and to test; no press is in two of them."""
 
     train: np.ndarray
     validation: np.ndarray

@@ -22,10 +22,10 @@ from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, to
 class Batch:
     """A batch of B contacts of e electrodes.
 
-    rows : (B,) contact numbers as of ``Contacts``               signal : (B, e + 1) SVB's input, see `measured`
+    rows : (B,) contact indices; SILENT none, C + i mirrored i   signal : (B, e + 1) SVB's input, see `measured`
     biotac, digit : (B, K) inputs of the mesh encoders           force : (B, 3) N
     pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
-    signed : (B,) rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
+    signed : (B,) as rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
 
     rows: np.ndarray
     signed: np.ndarray
@@ -60,7 +60,7 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """Append silent samples to rows (B,), the share ``options.silence`` of them, at least one."""
+        """Append silent samples to contacts' indices rows (B,), the share ``options.silence`` of them, at least one."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
@@ -70,14 +70,14 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate signals (B, 20) of contacts rows (B,) as a sensor reads them; rectified, unit : see `measured`"""
+        """Simulate signals (B, 20) of contacts rows (B,) as a sensor reads them; rectified, unit : shares of lost signs, of real units"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts rows (B,), SILENT for none and C + i for the mirror image of contact i, as a `Batch`.
+        """Return the contacts by indices rows (B,), SILENT for none and C + i for the mirror image of i, as a `Batch`.
         signal : (B, 20), changes in counts and, last, 1 where they are rectified; of `read`"""
         at, turned = self._which(rows)
         force = self.pairs.force[at]

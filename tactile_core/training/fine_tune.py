@@ -124,8 +124,8 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
 
 
 def _presses(used: np.ndarray) -> np.ndarray:
-    """Return the press number (F,) of each frame: runs of contact, or equal parts where runs are too few.
-    used : (F,) int, rising numbers in the recording of the frames that are kept"""
+    """Return the press (F,) int, counted from 0, of each frame: runs of contact, or equal parts where runs are too few.
+    used : (F,) int, rising indices into the recording of the frames that are kept"""
     runs = np.cumsum(np.diff(used, prepend=used[0]) > 1)
     return runs if runs[-1] + 1 >= BLOCKS else np.arange(len(used)) * BLOCKS // len(used)
 

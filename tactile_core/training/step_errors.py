@@ -35,14 +35,14 @@ def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """Return the displacement (B, n, 3) float32 m of a sensor's nodes in the pairs' contacts with numbers rows (B,)."""
+    """Return the displacement (B, n, 3) float32 m of a sensor's nodes in contacts by indices rows (B,) into pairs."""
     return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
         getattr(pairs, f"scale_{sensor}")
     )
 
 
 def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return the errors of every step for the pairs' contacts rows (C,), read as ``change`` (C, 19) counts.
+    """Return the errors of every step for contacts by indices rows (C,) into pairs, read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
@@ -109,7 +109,7 @@ def error_columns(
     rectified: bool = False,
 ) -> Columns:
     """Return columns (B,): largest node errors, m, of BioTac and DIGIT meshes from signals, and the head's estimates.
-    rows : (B,) numbers of the pairs' contacts; change : (B, 19) counts, as they are read
+    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as they are read
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
@@ -165,7 +165,7 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
     """Return the mean over bins of depth of the mean over indenters of the mean (or median) of values; None for none.
-    values : (C,), NaN left out; depth : (C,) m; indenter : (C,) int, number of each contact's indenter"""
+    values : (C,), NaN left out; depth : (C,) m; indenter : (C,) int, index of each contact's indenter"""
     middle = np.median if median else np.mean
     bins = []
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

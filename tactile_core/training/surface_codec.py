@@ -34,7 +34,7 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 @functools.cache
 def image_of_electrodes(sensor: str = SOURCE) -> np.ndarray:
-    """Return the number (19,) of the electrode nearest to each one's mirror image."""
+    """Return the index (19,) of the electrode nearest to each one's mirror image."""
     at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 
@@ -48,13 +48,13 @@ def across(vectors: np.ndarray) -> np.ndarray:
 ROWS = 512  # contacts at a time: bounds the float32 copy of the int16 data to tens of megabytes
 EXTRA = 16  # columns of oversampling and
 ROUNDS = 4  # power iterations: Halko, Martinsson and Tropp 2011, ample for a spectrum that decays as fast as this one
-SILENT = -1  # row number of a sample without contact
+SILENT = -1  # index that stands for a sample without contact
 FEWEST = 100  # least nodes that a squared error is divided by: light touches move few (assumed)
 ROOT_FLOOR = 1e-6  # m, rounds the root of the loss at zero error
 LEAST_AWAY = 0.01  # cells, rounds the distance of places at zero
 BASIS_ROWS = 12_000  # contacts that the bases are drawn from, fifty times as many as fields are taken (assumed)
 SMALLEST_SCALE = 0.03  # least scale of a coefficient, its spread, over the largest one (assumed)
-Fields = Callable[[np.ndarray], Tensor]  # row numbers (B,) -> (B, size) in millimetres: float32's middle range
+Fields = Callable[[np.ndarray], Tensor]  # contact indices (B,) -> (B, size) in millimetres: float32's middle range
 
 
 class SurfaceCodec:
@@ -66,7 +66,7 @@ class SurfaceCodec:
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
     baseline : m, loss of no displacement, mean over training contacts
-    In the methods, rows (B,) are contact numbers 0 to C - 1, or SILENT for a sample without contact"""
+    In the methods, rows (B,) are contact indices, D + i for the mirror image of i, SILENT for no contact"""
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,

@@ -30,7 +30,7 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 
 
 class Decoded(NamedTuple):
-    """Translated frames (T,), by number, of a recording, with their time (T,) s, signals and evidence.
+    """Translated frames (T,), by index, of a recording, with their time (T,) s, signals and evidence.
     state : (T, STATE) of the tracked contact; None where each frame is estimated alone"""
 
     frames: np.ndarray
@@ -54,7 +54,7 @@ class RecordingPass:
         return time, self._translator.encode(signals)
 
     def __call__(self, frames: np.ndarray) -> Decoded:
-        """Translate frames (T,) int, rising numbers of frames in the recording."""
+        """Translate frames (T,) int, rising indices into the recording's."""
         time, signals = self._read(frames)
         if self._tracker is None:
             evidence, state = self._translator.encode(signals), None

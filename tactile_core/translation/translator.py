@@ -121,7 +121,7 @@ class Translator:
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, by the names of ``SAMPLES``; ``answer.samples``
         of them.
-        frames : (T,) numbers in the recording, which are the seeds; stiffness : of `Signals`
+        frames : (T,) int, indices into the recording, which are the seeds; stiffness : of `Signals`
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
         states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)

@@ -39,7 +39,7 @@ class Known(NamedTuple):
     rubbing: np.ndarray
 
     def select_rows(self, which: np.ndarray) -> Known:
-        """Return some of the samples; which : (n,) bool, or their numbers"""
+        """Return some of the samples; which : (n,) bool, or their indices"""
         return Known(*(values[which] for values in self))
 
 
@@ -106,7 +106,7 @@ def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
 
 def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
     """Return errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest.
-    kind : true for those with friction; parts : the features that are used, their slice or numbers"""
+    kind : true for those with friction; parts : the features that are used, a slice or their indices"""
     error, rubbing = np.zeros_like(goals), rubs(known.x)
     for f in np.unique(known.fold):
         rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)

@@ -41,7 +41,7 @@ def hollow() -> tuple[HexMesh, FluidCavity]:
 
 
 def _outward(side: np.ndarray, nodes: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Return a face's node numbers ``side`` (3, 3), its two directions and outward right-handed. nodes : (n, 3) m;
+    """Return a face's node indices ``side`` (3, 3), its two directions and outward right-handed. nodes : (n, 3) m;
     middle : (3,) m, of the body"""
     across = np.cross(nodes[side[2, 1]] - nodes[side[0, 1]], nodes[side[1, 2]] - nodes[side[1, 0]])
     return side if across @ (nodes[side[1, 1]] - middle) > 0 else side.T

@@ -126,7 +126,7 @@ def _judged(
     recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
 ) -> tuple[float, float, float]:
     """Return whether the median place lies in the box; shares of frames with a place, and of those out of range.
-    order : in which the electrodes are read, 19 numbers or a slice"""
+    order : in which the electrodes are read, 19 indices or a slice"""
     signals = Preparer(None, unit)(recording)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
     found = pass_over(network, signals, recording.time)(np.arange(0, len(recording), EVERY)).translation

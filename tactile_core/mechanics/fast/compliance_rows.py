@@ -17,16 +17,16 @@ _INNER = 2**40  # more than a surface has degrees of freedom
 
 
 class Rows(Protocol):
-    """Compliance among points near an indenter, numbered in ``near`` (n,): nodes, or nodes and points between them."""
+    """Compliance among points near an indenter, listed in ``near`` (n,): nodes, or nodes and points between them."""
 
-    near: np.ndarray  # sorted numbers (n,) of the points
+    near: np.ndarray  # sorted indices (n,): a touchable node's, or their count plus that of a point between
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among the points of sorted numbers (k,), all in ``near``."""
+        """Return the compliance (3 k, 3 k) float32 m/N among points by sorted indices (k,), all in ``near``."""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of numbers
-        (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
+        points by indices (k,), all in ``near``."""
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
         """Return the points' displacements (n, 3) m by force (k, 3) N at sorted nodes (k,) and inner_force (c,) N at
@@ -175,7 +175,7 @@ def sensing_gaps(
 
 
 def _runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Find stretches of consecutive numbers in sorted ``indices``: (start, stop) there, and the numbers' own."""
+    """Find stretches of consecutive values in sorted ``indices``: (start, stop) there, and first value, last plus 1."""
     cuts = np.flatnonzero(np.diff(indices) != 1) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
     return list(

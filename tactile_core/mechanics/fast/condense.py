@@ -182,7 +182,7 @@ def _add(front: np.ndarray, place: np.ndarray, own: np.ndarray, stiffness: np.nd
 
 
 def axes_of(nodes: np.ndarray) -> np.ndarray:
-    """Return the numbers (3 k,) of the degrees of freedom of nodes (k,)."""
+    """Return the indices (3 k,) of the degrees of freedom of nodes (k,): 3 i, 3 i + 1, 3 i + 2."""
     return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 

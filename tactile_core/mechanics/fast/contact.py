@@ -279,7 +279,7 @@ class ContactProblem:
 
     def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Return the displacement (n, 3) m of all that may touch. moved : (n, 3) m, that of the surface there
-        touching, force : numbers (k,) that touch and forces (k, 3) N on them, for ``EdgeContactProblem``"""
+        touching, force : indices (k,), as in ``near``, and forces (k, 3) N on them; used by ``EdgeContactProblem``"""
         return moved
 
 

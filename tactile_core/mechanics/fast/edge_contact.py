@@ -157,7 +157,7 @@ def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> Interpolated
 class SpringRows:
     """Compliance among nodes near an indenter and points between them: see ``ComplianceRows``.
 
-    near : (n,) sorted numbers: of touchable nodes, and from their count on of points, whose nodes are all among them
+    near : (n,) sorted indices: of touchable nodes, then their count plus that of points, whose nodes are all among them
     softness : m/N, of the springs, all alike
     """
 
@@ -165,12 +165,12 @@ class SpringRows:
         self.near, self.softness, self._count = near, softness, len(compliance.touchable)
         nodes, number = near[near < self._count], near[near >= self._count] - self._count
         self._rows = ComplianceRows(compliance, nodes)
-        # What each number is a weighted sum of, as places in ``nodes``.
+        # What each of ``near`` is a weighted sum of, as indices into ``nodes``.
         self._nodes = np.concatenate([_alone(np.arange(len(nodes))), np.searchsorted(nodes, points.nodes[number])])
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among sorted, near numbers (k,), with their springs."""
+        """Return the compliance (3 k, 3 k) float32 m/N among sorted indices (k,) in ``near``, with springs."""
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -183,19 +183,19 @@ class SpringRows:
         return block
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of numbers
-        (k,)."""
+        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
+        sorted indices (k,) in ``near``."""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the displacement (n, 3) m at the near numbers; see ``Rows.moved``."""
+        """Return the displacement (n, 3) m of ``near``, nodes and points; see ``Rows.moved``."""
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sorted nodes (j,) and their forces (j, 3) N, from force (k, 3) N at sorted, single numbers (k,)."""
+        """Return sorted nodes (j,) and their forces (j, 3) N, from force (k, 3) N at sorted, distinct indices (k,)."""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])
@@ -203,7 +203,7 @@ class SpringRows:
         return self._rows.near[carries], loads[carries]
 
     def _sums(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sorted nodes (u,) that numbers (k,) depend on, and with which weights (k, u) float32."""
+        """Sorted nodes (u,) that indices (k,) in ``near`` depend on, and with which weights (k, u) float32."""
         at = np.searchsorted(self.near, numbers)
         sums = np.zeros((len(at), len(self._rows.near)), np.float32)
         np.add.at(sums, (np.arange(len(at))[:, None], self._nodes[at]), self._weights[at])

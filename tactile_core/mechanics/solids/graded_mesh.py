@@ -1,6 +1,6 @@
 """Solids refined where an indenter touches: the sensors' own lattices, with fewer lines away from the contact.
 
-The mesh's lines lie at real-valued row and column numbers of the sensor's lattice, so that its surface is the sensor's
+The mesh's lines lie at real-valued rows and columns of the sensor's lattice, so that its surface is the sensor's
 own. Results are interpolated to the lattice by cubic splines along the lines.
 """
 
@@ -24,7 +24,7 @@ _KEPT = 6  # patterns kept, each with the analysis and the last factor of its ma
 
 @dataclasses.dataclass(frozen=True)
 class Footprint:
-    """Area where a lattice is refined, in row and column numbers of the lattice.
+    """Area where a lattice is refined, in real-valued rows and columns of the lattice.
 
     low, high : (row, column) of the fine part's corners
     spacing : of the nodes there, in lattice lines

@@ -33,9 +33,9 @@ class HexMesh:
 
 
 def hex_cells(ids: np.ndarray) -> np.ndarray:
-    """Return the cells (n, 27) of 27-node hexahedra on a grid of node numbers ``ids`` (odd, odd, odd).
+    """Return the cells (n, 27) of 27-node hexahedra on a grid of node indices ``ids`` (odd, odd, odd).
 
-    Repeated numbers collapse an edge or a face, as at the skin's poles. Raises ValueError for an even size."""
+    Repeated indices collapse an edge or a face, as at the skin's poles. Raises ValueError for an even size."""
     if any(size % 2 == 0 for size in ids.shape):
         raise ValueError(f"a grid of quadratic cells has odd sizes, got {ids.shape}")
     a, b, c = (slice(0, size - 2, 2) for size in ids.shape)

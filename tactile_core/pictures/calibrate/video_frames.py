@@ -36,7 +36,7 @@ def frames_of(path: Path) -> dict[str, np.ndarray]:
 
 
 def _wanted(changed: np.ndarray) -> set[int]:
-    """Return the numbers of the frames to take, from the number of small pixels (n,) that changed in each."""
+    """Return the indices of the frames to take, from the count of small pixels (n,) that changed in each."""
     touched = np.r_[False, changed >= LEAST, False]
     edges = np.flatnonzero(touched[1:] != touched[:-1]).reshape(-1, 2)
     deepest = np.array([first + changed[first:end].argmax() for first, end in edges], int)
@@ -45,7 +45,7 @@ def _wanted(changed: np.ndarray) -> set[int]:
 
 
 def _spread(numbers: np.ndarray, most: int) -> list[int]:
-    """Return at most ``most`` of the numbers, evenly spread."""
+    """Return at most ``most`` of the indices, evenly spread."""
     places = np.linspace(0, len(numbers) - 1, min(most, len(numbers))).round().astype(int)
     return numbers[places].tolist()
 

@@ -65,7 +65,7 @@ class Words:
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object of numbers (T,) float, their indices; empty where NaN (no such cell)."""
+        """Return the texts (T,) object of their indices (T,) float; empty where NaN (no such cell)."""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
