@@ -62,7 +62,7 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
     """Return the error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact.
-    predicted, true, depth : as in `core_height_error`"""
+    predicted, true : (C, n, 3) m; depth : `height` on the DIGIT, `lengths` on the BioTac"""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.where(truth > MOVING, np.abs(peak - truth) / truth, np.nan)
@@ -93,7 +93,7 @@ def mean(values: np.ndarray) -> float | None:
 
 def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
     """Compute four metrics (C,) of displacement predicted against true (C, n, 3) m, by name: rms_um, max_um,
-    core_height_um, and peak_depth_percent. depth : as in `core_height_error`"""
+    core_height_um, and peak_depth_percent. depth : `height` on the DIGIT, `lengths` on the BioTac"""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),
         "max_um": 1e6 * max_error(predicted, true),

@@ -64,7 +64,7 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
     """Return the spec of an indenter object, and the bytes of its mesh file, None for a shape without one.
 
-    relative : (3, 3), see ``check_pose``. Raises TactileError.
+    relative : (3, 3), the object's axes in the sensor's. Raises TactileError.
     """
     import msgspec
 
@@ -95,7 +95,7 @@ def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.t
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
-    """Return the object's surface as a binary STL in mm, z out of the sensor; relative : as of ``check_pose``"""
+    """Return the object's surface as a binary STL in mm, z out of the sensor; relative : (3, 3), in its axes"""
     corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
     record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
     record["corners"] = corners

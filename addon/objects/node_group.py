@@ -26,15 +26,15 @@ class Nodes:
         return node
 
     def output(self, kind: str, *links: object, **settings: object) -> bpy.types.NodeSocket:
-        """Add a node and return its first enabled output; arguments as of `add`"""
+        """Add a node of a kind and return its first enabled output; links, settings : of `add`"""
         return next(s for s in self.add(kind, *links, **settings).outputs if s.enabled)
 
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a math node and return its output; links : as of `add`"""
+        """Add a math node and return its output; links : sockets or values"""
         return self.output("ShaderNodeMath", *links, operation=operation)
 
     def vector(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a node of vector math and return its output; links : as of `add`"""
+        """Add a node of vector math and return its output; links : sockets or values"""
         return self.output("ShaderNodeVectorMath", *links, operation=operation)
 
 

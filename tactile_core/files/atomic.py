@@ -50,14 +50,14 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
 
 
 def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False) -> None:
-    """Write a whole file or nothing; shared : see `new_file`."""
+    """Write a whole file or nothing; shared : several processes may write it at once."""
     with new_file(path, shared=shared) as partial:
         partial.write_bytes(content)
 
 
 def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
     """Write content as readable JSON, keys sorted, lists of numbers or names in one line. Raises ValueError for NaN.
-    shared : see `write_bytes`"""
+    shared : several processes may write it at once"""
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     text = _PLAIN_LIST.sub(lambda found: "[" + ", ".join(_PLAIN.findall(found[0])) + "]", text)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.

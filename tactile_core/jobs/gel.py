@@ -197,7 +197,7 @@ class Gel:
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
         """Return ``_moved_to``'s contact or None; if it fails, that of an indenter that comes straight in.
-        force : N or None, as of ``press``; flags : words are added; began : as of ``_moved_to``"""
+        force : N, None for the pose as it is; flags : words are added; began : true if there was no pose before"""
         path = self._press
         try:
             return self._moved_to(pose, force, flags, began=began)

@@ -151,7 +151,7 @@ class SheetFigure:
         self.top += GAP
 
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
-        """Draw maps of displacement (k, M, 3) m on the gel, with its picture's border; centers : as in `skin_row`"""
+        """Draw maps of displacement (k, M, 3) m on the gel, with its picture's border; centers : (k, c, 2) m"""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(
             label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
@@ -186,7 +186,7 @@ class SheetFigure:
     ) -> Axes:
         """Draw a row of maps of |displacement| (k, n, 3), m, over the plan (n, 2) = (x, z) m; one set of axes is
         faster.
-        faces : (f, 3) nodes of triangles; x, z : m, ranges shown; largest, centers : as in `skin_row`"""
+        faces : (f, 3) nodes; x, z : m, ranges shown; largest : m, where colours end; centers : (k, c, 2) m, or None"""
         from matplotlib.tri import Triangulation
 
         axes, height = self._row(self._row_height(x, z)), self._row_height(x, z)

@@ -34,7 +34,7 @@ class Part:
 
 def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE) -> Iterator[Part]:
     """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
-    columns, sensor : as of `read`
+    columns : map for a file of no known layout, else None; sensor : the one expected, such as "biotac"
     Raises TactileError like `readers.read`."""
     path = os.fspath(path)
     shift, time = 0.0, None

@@ -70,7 +70,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate signals (B, 20) of contacts rows (B,) as a sensor reads them; rectified, unit : shares of lost signs, of real units"""
+        """Simulate readings (B, 20) of contacts rows (B,); rectified, unit : shares of lost signs, of real fingers"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]

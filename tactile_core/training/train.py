@@ -231,7 +231,7 @@ def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
     """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss.
-    losses : of `epoch_losses`; rate : see ``take_step``"""
+    losses : of `epoch_losses`; rate : of learning, at its highest"""
     total = 0.0
     for step, loss in enumerate(losses):
         total += take_step(optimiser, loss, (epoch * len(losses) + step + 1) / (epochs * len(losses)), rate)

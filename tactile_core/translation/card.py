@@ -167,7 +167,7 @@ def region(x: np.ndarray) -> np.ndarray:
 def fit_bounds(error: np.ndarray, expected: np.ndarray, x: np.ndarray) -> list[float]:
     """Fit the bounds of all REGIONS, four digits each: a length in m (without contact), then factors on the expected
     error. Each covers LEVEL of the contacts in its region.
-    error, expected : (C,) m, the largest node error and its estimate; x : (C,) m, as in `region`"""
+    error, expected : (C,) m, the largest node error and its estimate; x : (C,) m, place along the finger"""
     ratio, where = error / expected, region(x)
     scores = [error, *[ratio] * (REGIONS - 1)]
     parts = [score[where == each] for each, score in enumerate(scores)]
@@ -180,7 +180,7 @@ def _quantile(score: np.ndarray) -> float:
 
 def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
     """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the region's
-    number (without contact the number itself, m). expected : (T,) m; x : as in `region`; numbers : of `fit_bounds`"""
+    number (without contact the number itself, m). expected : (T,) m; x : (T,) m or NaN; numbers : of `fit_bounds`"""
     where = region(x)
     return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 

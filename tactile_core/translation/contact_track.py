@@ -172,7 +172,7 @@ class ForwardTracker:
 
 def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.ndarray:
     """Return states (T, STATE) of contacts at place (T, PLACE), with each frame's own force and depth at that place.
-    touched : (T,) bool, in contact; see `Posterior.near`"""
+    touched : (T,) bool, in contact"""
     return np.concatenate([place, evidence.near(place, touched)[:, PLACE:]], axis=-1)
 
 

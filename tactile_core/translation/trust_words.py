@@ -69,7 +69,7 @@ def in_words(
     confidence: float, flags: int, expected_error: float, dent: float, force: Sequence[float] | np.ndarray
 ) -> str:
     """Return a frame's line: "guess: rectified recording, expected error 0.40 mm of 1.20", or "no contact".
-    confidence, flags, expected_error, dent : see `is_guess`
+    confidence : 0..1; flags : bits; expected_error, dent : m, NaN or below 0 where unknown
     force : (3,) N of the translation, zero without contact, where no error is stated"""
     reasons = remarks(flags)
     touching = bool(np.any(force))

@@ -67,7 +67,7 @@ def _radius(x: np.ndarray, theta: np.ndarray, front: np.ndarray, back: np.ndarra
 def _shifted(x: np.ndarray, theta: np.ndarray, axes: np.ndarray, centre: float) -> np.ndarray:
     """Return the distance (stations, angles) mm along rays from the skin's centre to an ellipsoid ``-centre`` mm
     higher.
-    x, theta : as in ``_radius``; axes : (3,) mm, its semi-axes"""
+    x : (stations,) mm; theta : (angles,) rad from the pad; axes : (3,) mm, its semi-axes"""
     inside = 1 - (x / axes[0]) ** 2
     a = (np.sin(theta) / axes[1]) ** 2 + (np.cos(theta) / axes[2]) ** 2
     b = -centre * np.cos(theta) / axes[2] ** 2  # the ray goes down by cos(theta) from the height ``centre``

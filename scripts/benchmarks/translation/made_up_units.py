@@ -221,7 +221,7 @@ def translated_contacts(network: Translator, made: Sequence[Played], taken: str)
 
 def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
     """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms per contact.
-    made, taken : as in ``translated_contacts``"""
+    made : recordings; taken : how their units are treated, a key of TAKEN"""
     began = time.process_time()
     found = translated_contacts(network, made, taken)
     spent = time.process_time() - began

@@ -47,8 +47,8 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder, made if needed, and clear what killed runs left; part : see `run`. TactileError if it is
-    locked."""
+    """Lock the job's folder, made if needed, and clear what killed runs left; part : (i, n) or None for all.
+    TactileError if it is locked."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -200,7 +200,7 @@ def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
     """Do a whole job, yield its folder to be merged into `out`, and remove it after that.
-    place : function from the job's folder to the executor of tasks; progress : see `run`
+    place : function from the job's folder to the executor of tasks; progress : called with (tasks done, tasks known)
     Raises TactileError for the first task that failed, and as `begun` and `run` do."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)

@@ -92,7 +92,7 @@ def mirror_upper(matrix: np.ndarray) -> None:
 
 
 class _Elimination:
-    """Elimination of one half of the solid down to the nodes ``keep``, (k,); loads, parity : as of ``condense``"""
+    """Elimination of one half of a solid down to nodes ``keep`` (k,); loads : (3 n, w); parity : 1 even, -1 odd"""
 
     def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: csc_array, parity: int) -> None:
         from scipy import sparse

@@ -123,7 +123,7 @@ _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well be
 class Candidates:
     """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
 
-    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, see ``split``
+    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, 0 or beside a crease
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
     looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known
     """
@@ -145,7 +145,7 @@ class Candidates:
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let more nodes (j,) enter, displaced by (j, 3) m, all of them touching at first; probe : see ``split``"""
+        """Let more nodes (j,) enter, displaced by (j, 3) m, all of them touching at first; probe : (j, 3) m"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")

@@ -47,7 +47,7 @@ class PatchFrame:
 class Learned:
     """A sensor's correction, with friction or without. f features, n supports, k fields on a grid of g = LINES x LINES.
 
-    shift, scale : (f,) of the features; supports : (n, f) scaled features; support_rubs : (n,), see ``rubs``
+    shift, scale : (f,) of the features; supports : (n, f) scaled features; support_rubs : (n,), 0 without friction to 1
     widths : (3,), of the kernels of force on all features, on the ``ESSENTIAL`` ones, and of fields
     force_weights : (2, n), of two estimates of the log of the force factor, then averaged; field_weights : (n, k)
     fields : (k, g, 3), per metre of depth, in the surface's own frames
@@ -140,7 +140,7 @@ def rubs(features: np.ndarray) -> np.ndarray:
 
 
 def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a kernel's factor for amounts of friction a and b, see ``rubs``: larger where both have some, or none."""
+    """Return a kernel's factor for amounts of friction a and b, 0 to 1: larger where both have some, or none."""
     return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
 
 

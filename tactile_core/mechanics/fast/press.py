@@ -74,8 +74,8 @@ class CorrectedPress:
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
-        """Solve the contact whose corrected force along the motion is force N; None beyond the limit or if lost. pose,
-        touches : as in ``at_depth``"""
+        """Solve the contact whose corrected force along the motion is force N; None beyond the limit or if lost.
+        pose : None for the press's own; touches : whether it is known to be at first touch"""
         there = pose or self.pose
         fall, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:

@@ -72,7 +72,7 @@ class BallPictures(abc.ABC):
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (H, W, 3) of the picture by a press, grey levels. ball : as ``lights`` has it"""
+        """Return the change (H, W, 3) of the picture by a press, grey levels. ball : right, down, depth, radius, m"""
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:

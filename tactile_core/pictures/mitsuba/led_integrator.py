@@ -60,8 +60,8 @@ def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
     """Return the radiance (n, 3) of n surface interactions by light that other places have reflected onto them, once.
-    meet : function that intersects rays; scene, emitters : as in ``direct``; hit : interactions, each DIRECTIONS times
-    phase : 0..1 of each, rotates its directions; lobe : as in ``direct``, at those other places"""
+    meet : function that intersects rays; scene : the occluders; hit : interactions, each DIRECTIONS times
+    phase : 0..1 of each, rotates its directions; lobe : cosine at a lobe's end, in which no light counts; None"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS
@@ -106,7 +106,7 @@ def mirrored(
     shape: tuple[int, int],
 ) -> np.ndarray:
     """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
-    meet, scene, emitters : as in ``bounced``; shape : (h, w)
+    meet : function that intersects rays; scene : the occluders; shape : (h, w)
     hit : the mirroring places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
     phase : 0..1 of each, rotates its directions; lobe : alpha, and the cosine at its end
     camera_height : mm; to_cell : (column, row) at which the camera sees a point"""

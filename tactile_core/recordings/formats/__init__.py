@@ -83,13 +83,13 @@ def share_of_fingers(keys: Collection[str], style: str) -> float:
 
 
 def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
-    """Return the numbers of the fingers of which keys, a file's, hold columns; style : see ``share_of_fingers``"""
+    """Return the numbers of the fingers of which keys, a file's, hold columns; style : of a column, by finger"""
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
     """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``.
-    style : see ``share_of_fingers``; snapshots : see ``assemble``"""
+    style : of a column, by finger and number; snapshots : true where frames do not follow each other in time"""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

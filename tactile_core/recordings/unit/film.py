@@ -188,7 +188,7 @@ def find(
 
 def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
     """Return the norm (T,) over electrodes, counts, of what the largest drift leaves of a film; 0 without drift.
-    conductivity : (P,) log, thickness : as of `Film`; rest : (T, e) counts"""
+    conductivity : (P,) log of the fluid's over that at rest; thickness : over a typical unit's; rest : (T, e) counts"""
     most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
     drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
     return DRIFT_LEFT * np.linalg.norm(drift, axis=1)

@@ -75,7 +75,7 @@ def _log_gain(
 
 def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: float) -> np.ndarray:
     """Return offsets (19,) counts, from readings that should be small: the gain matters little there.
-    change, typical, near, prior : as of `_log_gain`"""
+    change : (n, 19) counts; typical : (P, 19) counts; near : (n,) index into it; prior : contacts that 0 counts as"""
     wanted = typical[near]
     weight = SURE**2 / (np.square(wanted) + SURE**2)
     return _over_contacts(change - wanted, weight, near, prior)[0]
