@@ -71,7 +71,7 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
 
 
 def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
-    """Name each example's group (count,), held out whole: its text of label `apart`, else its recording or a tenth of it."""
+    """Name each example's group (count,), held out whole: its label `apart`, else its recording or a tenth of it."""
     if apart in one.told:
         return one.told[apart]
     name = one.recording.name

@@ -60,8 +60,8 @@ def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
     """Return the radiance (n, 3) of n surface interactions by light that other places have reflected onto them, once.
-    meet : function that intersects rays; scene : the occluders; hit : interactions, each DIRECTIONS times
-    phase : 0..1 of each, rotates its directions; lobe : cosine at a lobe's end, in which no light counts; None"""
+    meet : function that intersects rays; scene : occluders; emitters : lights; hit : each DIRECTIONS times
+    phase : 0..1 of each, rotates its directions; lobe : cosine beyond which light is left out there, or None"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS
