@@ -44,7 +44,7 @@ class Miss:
 
 
 def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
-    """Compute the error of displacements ``found`` (n, 3) m and force, N; share : depth over thickness"""
+    """Return the error of found (n, 3) m and force N against true (n, 3) m, true_force N; share : depth / thickness"""
     error, baseline = (
         float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true))
     )

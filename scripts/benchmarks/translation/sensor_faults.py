@@ -74,7 +74,7 @@ def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one of the electrodes (T, 19) read the same throughout, one of its counts at random. rest : unused here"""
+    """Let one of the electrodes (T, 19) read the same throughout, one of its counts at random. rest : unused"""
     (one,) = _drawn(electrodes, random, 1)
     electrodes[:, one] = random.choice(electrodes[:, one])
     return electrodes
@@ -111,13 +111,13 @@ def noisy(count: int, counts: float) -> Fault:
 
 
 def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Clip electrodes (T, 19) to the upper two thirds of each one's range, as too small an amplifier does."""
+    """Clip electrodes (T, 19) to the upper two thirds of their ranges, as a small amplifier does. rest : unused"""
     low, high = electrodes.min(axis=0), electrodes.max(axis=0)
     return np.maximum(electrodes, low + (high - low) / 3)
 
 
 def swapped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Swap two of the electrodes (T, 19) counts. rest : (19,) counts, unused here"""
+    """Swap two of the electrodes (T, 19) counts. rest : unused"""
     two = _drawn(electrodes, random, 2)
     electrodes[:, two] = electrodes[:, two[::-1]]
     return electrodes
@@ -131,7 +131,7 @@ def louder(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let a tenth of all changes of electrodes (T, 19) lag, with a time constant of 1 s (a skin that creeps)."""
+    """Let a tenth of all changes of electrodes (T, 19) lag by 1 s (time constant; a skin that creeps). rest : unused"""
     slow, late = electrodes[0].copy(), np.empty_like(electrodes)
     for frame, reading in enumerate(electrodes):
         slow += (reading - slow) / 100
@@ -140,7 +140,7 @@ def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarra
 
 
 def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat, to electrodes (T, 19) counts."""
+    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat, to electrodes (T, 19). rest : unused"""
     return electrodes + 5 * np.sin(2 * np.pi * 50 * np.arange(len(electrodes)) / 100.3)[:, None]
 
 
@@ -170,7 +170,7 @@ def frozen(frames: int) -> Fault:
 
 
 def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Put the row before in place of each second row of electrodes (T, 19) counts."""
+    """Put the row before in place of each second row of electrodes (T, 19). rest : unused"""
     return electrodes[np.arange(len(electrodes)) // 2 * 2]
 
 

@@ -22,11 +22,11 @@ class Rows(Protocol):
     near: np.ndarray  # sorted indices (n,): a touchable node's, or their count plus that of a point between
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among points by sorted indices (k,), all in ``near``."""
+        """Return the compliance (3 k, 3 k) float32 m/N among points; numbers : (k,) sorted indices, in ``near``"""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        points by indices (k,), all in ``near``."""
+        points; numbers : (k,) their indices, in ``near``"""
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
         """Return the points' displacements (n, 3) m by force (k, 3) N at sorted nodes (k,) and inner_force (c,) N at

@@ -145,7 +145,7 @@ class Candidates:
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let more nodes (j,) enter, displaced by (j, 3) m, all of them touching at first; probe : (j, 3) m"""
+        """Let more nodes (j,) enter, all touching at first; displacement : (j, 3) m; probe : (j, 3) m, 0 off creases"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")

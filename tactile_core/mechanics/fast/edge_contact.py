@@ -170,7 +170,7 @@ class SpringRows:
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among sorted indices (k,) in ``near``, with springs."""
+        """Return the compliance (3 k, 3 k) float32 m/N with springs; numbers : (k,) sorted indices in ``near``"""
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -184,7 +184,7 @@ class SpringRows:
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        sorted indices (k,) in ``near``."""
+        points; numbers : (k,) their sorted indices, in ``near``"""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
@@ -195,7 +195,7 @@ class SpringRows:
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sorted nodes (j,) and their forces (j, 3) N, from force (k, 3) N at sorted, distinct indices (k,)."""
+        """Return nodes (j,) and forces (j, 3) N of force (k, 3) N; numbers : (k,) sorted indices in ``near``"""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])
@@ -203,7 +203,7 @@ class SpringRows:
         return self._rows.near[carries], loads[carries]
 
     def _sums(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Sorted nodes (u,) that indices (k,) in ``near`` depend on, and with which weights (k, u) float32."""
+        """Nodes (u,), sorted, that points depend on, with weights (k, u) float32; numbers : (k,) indices in ``near``"""
         at = np.searchsorted(self.near, numbers)
         sums = np.zeros((len(at), len(self._rows.near)), np.float32)
         np.add.at(sums, (np.arange(len(at))[:, None], self._nodes[at]), self._weights[at])

@@ -45,7 +45,7 @@ def _wanted(changed: np.ndarray) -> set[int]:
 
 
 def _spread(numbers: np.ndarray, most: int) -> list[int]:
-    """Return at most ``most`` of the indices, evenly spread."""
+    """Return at most ``most`` of ``numbers`` (n,), indices of frames, evenly spread."""
     places = np.linspace(0, len(numbers) - 1, min(most, len(numbers))).round().astype(int)
     return numbers[places].tolist()
 

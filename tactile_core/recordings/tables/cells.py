@@ -65,7 +65,7 @@ class Words:
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object of their indices (T,) float; empty where NaN (no such cell)."""
+        """Return the texts (T,) object; numbers : (T,) float, their indices, NaN where there is no such cell: empty"""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 

@@ -63,7 +63,7 @@ def _log_gain(
     change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return log gains (19,) and contacts behind each: a mean of logarithms is unbiased by noise on both sides.
-    near : (n,) index of each frame's row in ``typical``; before : (19,) log gains so far; the others as in `match`"""
+    near : (n,) each frame's row in ``typical``; before : (19,) log gains so far; change, prior : see `match`"""
     wanted = typical[near]
     size = np.square(wanted * np.exp(before))
     weight = size / (size + SURE**2)
