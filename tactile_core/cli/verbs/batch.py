@@ -46,12 +46,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("inputs", nargs="*", metavar="INPUTS", help="recordings; without any, the job in DIR goes on")
     verb.add_argument("--out", required=True, metavar="DIR", help="folder of the job")
-    verb.add_argument(
-        "--keep",
-        metavar="WORDS",
-        help="outputs, out of latent,displacement,height,image,traction,marker_motion (default: latent,displacement)",
-    )
-    add(verb, *UNIT)
+    add(verb, "--keep", *UNIT)
+    verb.set_defaults(keep="latent,displacement")
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames in a shard (default: 1000)")
     add(verb, *ANSWER)
     verb.add_argument(
@@ -172,7 +168,7 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     from ...translation.answer import parse_answer
 
     wanted = Translate(
-        keep=list(results.parse_keep("latent,displacement" if options.keep is None else options.keep)), weights="",
+        keep=list(results.parse_keep(options.keep)), weights="",
         sensor=None if options.sensor is None else electrode_gains.read(options.sensor),
         prepare=Prepare(**prepare_words(options)),
         target=options.target, preset=options.preset or "",

@@ -23,6 +23,8 @@ MAX_SEED = 2**32 - 1  # what numpy's and torch's generators both take
 # What several verbs offer: the words of argparse; {words} in a help are the verb's own.
 OPTIONS: dict[str, dict[str, Any]] = {
     "--progress": {"action": "store_true", "help": "show the bar of progress even where stderr is no terminal"},
+    "--keep": {"metavar": "WORDS", "help":
+        "additional outputs, out of latent,displacement,height,image,traction,marker_motion (default: %(default)s)"},
     "--tare": {"default": "auto", "metavar": "auto|none|A:B", "help":
         "frames without contact{among} that give the resting reading (default: found automatically)"},
     "--kind": {"choices": ("raw", "tared", "scaled", "rectified"), "help":

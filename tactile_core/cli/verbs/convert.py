@@ -65,13 +65,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         help="frames to convert, as a Python slice (the last 50: --frames=-50:); pictures keep their number in the"
         " recording, and the resting reading is still taken from all of it",
     )
-    verb.add_argument(
-        "--keep",
-        default="latent,displacement,image",
-        metavar="WORDS",
-        help="additional outputs, out of latent,displacement,height,image,traction,marker_motion"
-        " (default: %(default)s)",
-    )
+    add(verb, "--keep")
+    verb.set_defaults(keep="latent,displacement,image")
     verb.add_argument(
         "--reverse",
         dest="run",

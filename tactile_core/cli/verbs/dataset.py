@@ -42,8 +42,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     verb.add_argument("--target", default="digit", metavar="SENSOR", help="gel to translate to (default: digit)")
     verb.add_argument("--pictures", choices=PRESETS, help="preset of the pictures (default: fast)")
-    verb.add_argument("--calibration", metavar="FILE", help="camera and lights, by `tactile calibrate`")
-    add(verb, "--weights")
+    add(verb, "--weights", "--calibration")
     engine.place_arguments(verb)
     add(verb, "--progress")
 

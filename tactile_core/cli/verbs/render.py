@@ -61,10 +61,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--out", required=True, metavar="DIR", help="new folder of the pictures")
     verb.add_argument("--preset", choices=PRESETS, help="method, see above (default: standard)")
     add(verb, "--error", bound="levels of the picture, such as 0.6levels; picks the preset")
-    verb.add_argument(
-        "--calibration", metavar="UNIT.toml", help="unit, by `tactile calibrate` (default: the one that ships)"
-    )
-    add(verb, "--object-reflectance", whose="what touches the gel (default: the calibration's)")
+    add(verb, "--calibration", "--object-reflectance", whose="what touches the gel (default: the calibration's)")
     verb.add_argument("--gel", metavar="SENSOR", help="sensor of the gel (default: the calibration's, else digit)")
     verb.add_argument("--frames", default=":", metavar="A:B:STEP", help="frames to draw, as a Python slice")
     verb.add_argument("--size", metavar="WxH", help="size in pixels, such as 480x640 (default: the calibration's)")
