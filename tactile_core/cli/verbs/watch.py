@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import numpy as np
 
     from ...jobs.live.playback import Output
-    from ...recordings.electrode_gains import ElectrodeGains
 
 BRIEF = "show a recording live while it is being written"
 TEXT = """\
@@ -72,9 +71,10 @@ def run(options: argparse.Namespace) -> int:
     """Show the newest frames until the recording ends, the window is closed, or Ctrl-C."""
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
-    from ...recordings import PrepareOptions
+    from ...recordings import PrepareOptions, electrode_gains
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
+    from ...recordings.recording import split
     from ...recordings.tables.column_map import refuse_bag
 
     _check(options)
@@ -98,7 +98,10 @@ def run(options: argparse.Namespace) -> int:
     else:
         source = live.followed(path, options.idle, say, columns, sensor)
     prepare = PrepareOptions(tare=None if options.tare == "auto" else options.tare, polarity=options.polarity)
-    view = live.View(tools, options.rate, prepare, _unit(options.sensor, path, sensor))
+    unit = None
+    if options.sensor is not None:
+        unit = electrode_gains.read(options.sensor).gains_for(path, split(path).section, options.sensor, sensor)
+    view = live.View(tools, options.rate, prepare, unit)
     for sentence in tools.drawer.describe_gel():
         say(sentence)
     with contextlib.ExitStack() as opened:
@@ -145,16 +148,6 @@ def _check_out(path: str) -> None:
                 if file.read(len(SIGNATURE)) not in (SIGNATURE, b""):
                     raise TactileError(path, "a file that is no PNG picture", expected, advice)
         atomic.probe(os.path.dirname(path) or ".")
-
-
-def _unit(sensor: str | None, path: str, of: str) -> ElectrodeGains | None:
-    """Return the unit of the sensor file that made this recording; None without a file."""
-    if sensor is None:
-        return None
-    from ...recordings import electrode_gains
-    from ...recordings.recording import split
-
-    return electrode_gains.read(sensor).gains_for(path, split(path).section, sensor, of)
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:
