@@ -22,7 +22,7 @@ def add_gel(
     beside: bpy.types.Object | None = None,
     sensor: str = sensors.TARGET,
 ) -> bpy.types.Object:
-    """Add the resting gel of a sensor to a collection, ``per_metre`` units per metre, and return it: beside a skin if
+    """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin if
     given, and toward -x of the collection's gels."""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} gel"

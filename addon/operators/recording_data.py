@@ -137,7 +137,7 @@ def load(
 
     progress : called with the share done, 0 to 1
     motion : one of ``properties.MOTIONS``; "" stores displacements in mesh caches (files) above ``LONG`` frames
-    per_metre : units per metre of such files. Raises TactileError for unreadable files and missing frames."""
+    per_metre : Blender units per metre of such files. Raises TactileError for unreadable files and missing frames."""
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)

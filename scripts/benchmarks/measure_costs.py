@@ -38,7 +38,7 @@ SETS = {  # what is added -> the outputs asked for, each beside those before it
 
 
 class Part(NamedTuple):
-    """Measured cost. start : s before the first frame; ms : a frame; mb : peak resident; kb : on disk, a frame"""
+    """Measured cost. start : s before the first frame; ms : per frame; mb : peak resident; kb : on disk, per frame"""
 
     start: float
     ms: float

@@ -21,7 +21,7 @@ from .time_stamps import clock_of
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
-MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit seen, comes near (assumed)
+MAX_READING = 1e5  # counts; nothing a 12-bit sensor gives, in any unit of measurement seen, comes near (assumed)
 MAX_PROBLEMS = 10_000  # kept as objects, so that a file full of them costs no memory
 LOOKED_AT = 10_000  # rows, by which fingers that take turns are found
 MOST_FINGERS = 5

@@ -37,7 +37,7 @@ def without_absent(
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
     """Fill electrodes that a file lacks with a typical unit's rest, as if they never changed.
 
-    electrodes : (T, e) float, in the file's unit, with NaN; names : of their columns, empty where there is none
+    electrodes : (T, e) float, in any unit of measurement, with NaN; names : of their columns, empty for none
     Returns the electrodes, a mask (e,) of the filled ones, and a sentence on them. Raises TactileError where half of
     them are missing."""
     unread = ~np.isfinite(electrodes)
@@ -58,8 +58,8 @@ def without_absent(
 def silent(electrodes: np.ndarray) -> np.ndarray:
     """Mark the frames (T,) bool without a response of the finger; up to a few are a glitch, which is interpolated.
 
-    electrodes : (T, e) float, in the file's unit. A frame has no response if most electrodes read the same end of the
-        range, or if nothing changes in a whole recording. (Raw electrodes rest hundreds of counts apart; changes
+    electrodes : (T, e) float, in any unit of measurement. A frame has no response if most electrodes read the same end of
+        the range, or if nothing changes in a whole recording. (Raw electrodes rest hundreds of counts apart; changes
         against rest may all be 0, so equal readings count only beside raw ones.) Where the noise of a raw recording
         stops in all electrodes for `FROZEN` frames, it repeats an old response."""
     same = _lasting(alike(electrodes))

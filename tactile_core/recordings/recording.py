@@ -76,13 +76,13 @@ class Recording(Summary):
     time : (T,) float, s from the first frame; may go back where the file's stamps do; NaN of snapshots, which do not
         follow each other
     start_time : unix time of the first frame, s; 0.0 if unknown
-    electrodes : (T, 19) float, counts (or the file's own unit), E1..E19, (T, 24) of a BioTac SP; NaN where the file is
+    electrodes : (T, 19) float, counts or as in the file, E1..E19, (T, 24) of a BioTac SP; NaN where the file is
         unreadable
     rows : (T,) int, line of each frame in a text file (the header is line 1); index of the frame in others
     flags : (T,) uint16, bits of :class:`tactile_core.recordings.flags.Flag`
     pdc, tac, tdc : (T,) float or None, counts
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
-    position, force : (T, 3) float or None, in the file's own frame and unit
+    position, force : (T, 3) float or None, in the file's own frame and unit of measurement
     labels : name -> (T,) object array of str, such as object, material or trial, which no translation reads
     warnings : sentences for the user
     not_taken : what the file holds beside it and no recording is made of, in words: topics, arrays, columns, fields

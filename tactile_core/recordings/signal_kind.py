@@ -13,7 +13,7 @@ SCALED_LIMIT = 20.0
 NEGATIVE_SHARE = 0.005  # of all samples: more than the odd glitch
 WHOLE = np.arange(-(2**15), 2**15)  # the histogram's numbers
 WHOLE_SHARE = 0.99  # of all samples: a file with more whole numbers holds counts (assumed)
-# Top of the range of raw readings in other units than 12-bit counts (assumed: the usual exports).
+# Top of the range of raw readings in other units of measurement than 12-bit counts (assumed: the usual exports).
 FULL_SCALES = {
     1.0: "shares of the range", 3.3: "volts of 3.3 V", 5.0: "volts of 5 V", 100.0: "percent of the range",
     255.0: "counts of 8 bit", 1023.0: "counts of 10 bit", 65535.0: "counts of 16 bit",

@@ -49,7 +49,7 @@ class PrepareOptions:
     tare : frames to take rest from, a slice or "A:B"; "none" takes the file's own zero; None finds quiet parts
     drift : remove drift between quiet parts
     repair : remove glitches (unreadable samples are always interpolated)
-    counts_per_unit : factor from a scaled recording's unit to counts
+    counts_per_unit : factor from a scaled recording's unit of measurement to counts
     smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
     polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
     rest : the unit's own, for raw recordings that hold no calm part near it

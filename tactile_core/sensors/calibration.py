@@ -101,7 +101,7 @@ AMBIENT_TERMS, PHOTOGRAPHED_TERMS = (
     (degree + 1) * (degree + 2) // 2 for degree in (AMBIENT_DEGREE, PHOTOGRAPHED_DEGREE)
 )
 AMBIENT_UNIT = 10e-3  # m; image coordinates are divided by it in the ambient light's polynomial
-# m: the unit of ambient light is an LED's light on a coating that faces it at this distance, so that it depends on the
+# m: ambient light is measured in an LED's light on a coating that faces it at this distance, so that it depends on the
 # LED's power, not on its place.
 AMBIENT_DISTANCE = 20e-3
 MOST_RISE = 2.0  # per mm, of the ambient light's unit
@@ -147,7 +147,7 @@ class Fit:
     photographs : names of the files; the folder is the user's
     ball_diameter : m
     errors : on those photographs, by the names of ``tactile calibrate --test``
-    standard_errors : by parameter, in its unit in the file
+    standard_errors : by parameter, in its unit of measurement in the file
     not_identified : parameters that the photographs do not determine; held near the start values by a prior of how
         units differ
     """
@@ -171,14 +171,14 @@ class Calibration:
         coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i +
         j, then by j
     object_reflectance : 0 black to 1 white, of what touches the gel
-    ambient_rise : of each LED, relative growth of the ambient light's unit for each metre of the gel's height
+    ambient_rise : of each LED, relative growth of the ambient light's unit of measurement per metre of the gel's height
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, assumed equal
     dome_scale : height of the resting gel over its lowest point, times that of the public mesh
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
     markers : dots printed on the gel; None for none
     photographed : LEDs and albedo of the photograph, if they have changed since; None for the calibration's own
-    noise : standard deviation of the camera's noise, grey levels, a channel; pictures have none unless asked for"""
+    noise : standard deviation of the camera's noise, grey levels, per channel; pictures have none unless asked for"""
 
     unit: str
     camera: Camera

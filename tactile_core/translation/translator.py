@@ -224,7 +224,7 @@ class Translator:
         return (1 - left / np.maximum(whole, LEAST_SQUARE)).astype(np.float32)
 
     def silent(self, quantity: str) -> float:
-        """Return the card's `silent_level` of a quantity, in the quantity's unit: what noise alone stays below."""
+        """Return the card's `silent_level` of a quantity, m or N: what noise alone stays below."""
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:

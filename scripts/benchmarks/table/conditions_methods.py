@@ -35,7 +35,7 @@ UNITS = {
     "thin_film_given": ("given", lambda _: made_up_units.Unit(film=THIN)),
     "thin_film_found": ("found", lambda _: made_up_units.Unit(film=THIN)),
     "weak_fluid_found": ("found", lambda _: made_up_units.Unit(conductivity=THIN)),  # rests as the thin film does
-}  # how the unit is taken, and the unit of a number
+}  # how the finger is taken, and a number's unit of measurement
 TWO_BALLS = {"two_balls_read_as_one": 1, "two_balls": 2}  # contacts that are looked for
 NAMES = (*UNITS, "flat_bodies", *TWO_BALLS)
 

@@ -31,7 +31,7 @@ CHOOSING = 7  # the sample of each material that may be looked at to choose sett
 BIO, WRENCH, POSE = "_bio.csv", "_cw.csv", "_cp.csv"
 CONTACT, SILENT = 15.0, 2.0  # PDC counts: surely in contact; contact lost (notes of the set)
 CENTRE_FRAMES, SILENT_FRAMES = 100, 30  # fewer frames of a recording give no metric (protocol)
-# Name of a row, its metric, unit, target (docs/sources.md, Targets), and the percentile over recordings.
+# Name of a row, its metric, unit of measurement, target (docs/sources.md, Targets), and the percentile over recordings.
 ROWS = (
     ("force_rank_median", "rank", "1", 0.92, 50), ("force_rank_quartile", "rank", "1", 0.87, 25),
     ("force_silence", "silence", "1", 0.05, 50), ("contact_missed", "missed", "1", None, 50),

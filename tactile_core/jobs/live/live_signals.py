@@ -62,8 +62,8 @@ class LiveSignals:
         self._seen: Recording | None = None
         self._next_look = self._least
         self._known: Signals | None = None  # the first frames', once they show rest
-        self._rest_pdc, self._pdc_factor = np.nan, 1.0  # counts at rest; counts per unit of the file's PDC
-        self._factor = 1.0  # counts per unit of the file
+        self._rest_pdc, self._pdc_factor = np.nan, 1.0  # counts at rest; counts that 1 in the file's PDC means
+        self._factor = 1.0  # counts that an electrode's 1 in the file means
         self.polarity = options.polarity if options.polarity in POLARITIES else FALLS
         self.sure, self.silent = options.polarity in POLARITIES, False
         self._noisy, self._last = False, np.zeros((0, 0))  # whether noise keeps rows apart; the last rows

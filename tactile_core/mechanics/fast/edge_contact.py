@@ -195,7 +195,7 @@ class SpringRows:
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return nodes (j,) and forces (j, 3) N of force (k, 3) N; numbers : (k,) sorted indices in ``near``"""
+        """Return sorted nodes (j,), forces (j, 3) N of force (k, 3) N; numbers : (k,) distinct, sorted, in ``near``"""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])
