@@ -22,8 +22,8 @@ def add_gel(
     beside: bpy.types.Object | None = None,
     sensor: str = sensors.TARGET,
 ) -> bpy.types.Object:
-    """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin if
-    given, and toward -x of the collection's gels."""
+    """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin
+    if given, and toward -x of the collection's gels."""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} gel"
     gel = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)

@@ -58,7 +58,7 @@ def without_absent(
 def silent(electrodes: np.ndarray) -> np.ndarray:
     """Mark the frames (T,) bool without a response of the finger; up to a few are a glitch, which is interpolated.
 
-    electrodes : (T, e) float, in any unit of measurement. A frame has no response if most electrodes read the same end of
+    electrodes : (T, e) float, in any unit of measurement. A frame has no response if most electrodes read one end of
         the range, or if nothing changes in a whole recording. (Raw electrodes rest hundreds of counts apart; changes
         against rest may all be 0, so equal readings count only beside raw ones.) Where the noise of a raw recording
         stops in all electrodes for `FROZEN` frames, it repeats an old response."""

@@ -39,7 +39,7 @@ from .train import deterministic, prepared_folder
 
 # A place in millimetres reads as tens, in metres as hundredths: no fingertip is longer than half a metre.
 METRES_BELOW = 0.5
-OFF_SKIN = 4e-3  # m; a contact farther from the skin is in another frame, or no metres (assumed; dents are below 2 mm)
+OFF_SKIN = 4e-3  # m; a contact farther from the skin is in another frame or unit (assumed; dents are below 2 mm)
 OFF_SHARE = 0.1  # of the contacts that may lie off the skin, as places of real robots do
 TOUCH = 0.05  # N: below, a frame is no contact (assumed; force sensors of robots are no better)
 FEWEST = 200  # frames in contact (assumed)
