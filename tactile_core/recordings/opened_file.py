@@ -24,7 +24,9 @@ from .tables.table import MAX_BYTES
 FOLDER_ENDINGS = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # of what is taken from a folder
 ENDINGS = (*FOLDER_ENDINGS, ".npy", ".json", ".jsonl", ".txt", ".tsv", ".gz")  # of all that is read, some by a map
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
-PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd"}
+UNZIP = "unzip; of a spreadsheet save the sheet as CSV"
+PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd", ZIP_STARTS[0]: UNZIP}
+NPY_NAME, HEAD = b".npy", 1024  # how arrays in an NPZ file, a zip, are called; bytes in which the first one's name is
 
 
 class Opened(NamedTuple):
@@ -59,9 +61,10 @@ def opened(path: str) -> Iterator[Opened]:
             return
         _check_file(file)
         with outside.open_file(file, "a recording") as stream, unpacked(file, stream) as plain:
-            start = plain.read(START_BYTES)
+            head = plain.read(HEAD)
+            start = head[:START_BYTES]
             for packed, program in PACKED.items():
-                if start.startswith(packed):
+                if start.startswith(packed) and NPY_NAME not in head:
                     raise TactileError(file, "a packed file", "a recording, or a gzipped text", f"Unpack it: {program}")
             container = _container(start)
             if plain is not stream and container not in ("csv", "json"):

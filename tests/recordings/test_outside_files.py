@@ -7,6 +7,7 @@ import gzip
 import json
 import os
 import re
+import zipfile
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -284,6 +285,10 @@ def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tm
     (tmp_path / "a.csv.bz2").write_bytes(bz2.compress(table(press).encode()))
     with pytest.raises(TactileError, match=r"a packed file; .*Unpack it: bunzip2"):
         recordings.read(tmp_path / "a.csv.bz2")
+    with zipfile.ZipFile(tmp_path / "a.xlsx", "w") as packed:
+        packed.writestr("xl/workbook.xml", "")
+    with pytest.raises(TactileError, match=r"a packed file; .*Unpack it: unzip; of a spreadsheet save"):
+        recordings.read(tmp_path / "a.xlsx")
 
 
 def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines):

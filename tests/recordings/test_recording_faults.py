@@ -159,7 +159,7 @@ def test_stamps_that_go_back_or_leave_a_gap_are_flagged_and_kept(press, make, in
         (b"1,2,3\n4,5,6\n", "line 1: numbers where the column names"),
         (b"a,a\n1,2\n", "column 'a' is there twice"),
         (b"\x89HDF\r\n\x1a\n" + b"x" * 99, "damaged HDF5"),
-        (b"PK\x03\x04" + b"x" * 99, "damaged NPZ"),
+        (b"PK\x03\x04" + b"x" * 99 + b".npy", "damaged NPZ"),
     ],
 )
 def test_what_is_no_recording_is_refused_in_one_sentence(content, message, tmp_path):
