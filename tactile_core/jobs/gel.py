@@ -118,9 +118,10 @@ class Gel:
             found = self._solved_at(here, force, flags, began=before is None)
             if jumps and found is not None:
                 flags.insert(0, "jumped")
-        except UnsolvedError:
+        except UnsolvedError as error:
             found = None
-            flags += ["unsolved", "too large"] if self._work.left <= 0 else ["unsolved"]
+            why = {"too large": self._work.left <= 0, "too sharp": isinstance(error.__cause__, PenetrationError)}
+            flags += ["unsolved", *(word for word, holds in why.items() if holds)]
         self._contact = self._described(found, here, flags)
         return self._contact
 

@@ -25,6 +25,8 @@ FLAGS = {
     "began inside": "the first pose lies in the gel; the indenter was taken to come straight in along +y",
     "too large": "so many nodes touch that the step's work was used up; the values are those of the nearest contact "
     "that was found, and the next step goes on from there",
+    "too sharp": "a tip, edge or wire is so thin that it sinks in between the surface's nodes: .35 mm apart on the "
+    "DIGIT, .5 to .9 on the BioTac",
     "friction forgotten": "no equilibrium was found on the path; the indenter was taken to come straight in along +y",
     "jumped": "the step is too long to follow; friction was forgotten, and the indenter taken to come in along +y",
 }

@@ -302,6 +302,13 @@ def test_where_the_path_leads_to_no_contact_one_that_comes_straight_in_is_found(
     np.testing.assert_array_equal(gel.contact.force, here.force)
 
 
+def test_a_tip_that_sinks_in_between_nodes_is_told_from_a_solver_that_fails():
+    gel = Gel("digit", Sphere(0.3e-3))
+    steps = [gel.press(gel.touching(-8e-3, 0.1e-3, depth)) for depth in (0.05e-3, 0.5e-3)]
+    assert steps[1].flags == ("unsolved", "too sharp") and steps[1].force is steps[0].force
+    assert "too sharp" in FLAGS
+
+
 def test_meshes_and_sensors_that_cannot_be_are_refused():
     cut = trimesh.creation.icosphere(2, 3e-3)
     cut.update_faces(np.arange(len(cut.faces)) > 0)
