@@ -77,7 +77,7 @@ def _in_blender_axes(force: np.ndarray) -> np.ndarray:
 
 
 def in_files(motion: str, frames: int) -> bool:
-    """Return true if a movement of this number of frames is held in files; motion : see ``load``."""
+    """Return true if a movement of this number of frames is held in files; motion : "" for files above LONG."""
     return motion == MESH_CACHE or (not motion and frames > LONG)
 
 

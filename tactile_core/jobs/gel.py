@@ -126,7 +126,7 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """Solve the contact at each of many poses and yield each; forces : N, as in ``press``, one per pose.
+        """Solve the contact at each of many poses and yield each; forces : N along +y or None, one per pose.
 
         For an invalid pose or force the contact before comes again, flagged ``refused``, and the reason is logged.
         Raises TactileError where poses and forces differ in number."""

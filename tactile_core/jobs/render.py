@@ -185,7 +185,7 @@ class Pictures:
                 self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
 
     def write_scene(self, path: str | os.PathLike, values: np.ndarray) -> None:
-        """Write a frame as Mitsuba's file; values : see `write_frame`."""
+        """Write a frame as Mitsuba's file; values : displacement (M, 3) m, or heights (H, W) m"""
         unit = self.renderer.calibration
         height = values if self.heights else gel_mapper(unit.camera)(values)
         write_scene(path, unit, of_unit(height, unit))

@@ -79,7 +79,7 @@ def read(
 
 def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Recording:
     """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header.
-    lean : see `read`"""
+    lean : leave out of a long CSV file what no translation needs"""
     with opened(path) as (container, where, finger, file):
         if columns is not None:
             refuse_bag(path, container)

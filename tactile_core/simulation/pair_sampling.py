@@ -35,7 +35,7 @@ def press_rows(
     The first force is log-uniform within one ratio, so that forces are log-uniform over many presses. A press that
     slides ends with the slide, at constant force along the same path on both sensors. A scene with ``depth_steps``
     pairs contacts of equal depth instead of equal force.
-    pair : the sensors, source and target; keep : see ``pair_row``"""
+    pair : the sensors, source and target; keep : both solutions' fields to add"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)

@@ -67,7 +67,7 @@ class Motion(NamedTuple):
 class Slipping(NamedTuple):
     """Slipping nodes ``at`` (s,), and how their forces may change.
 
-    normal, lean : (k, 3) of all nodes, as in ``Points``; across : (s, 3) unit, across normal and friction
+    normal, lean : (k, 3) of all nodes; lean 0 where they stick; across : (s, 3) unit, across normal and friction
     pressing, limit : (s,) N, of the normal force and of friction
     against : (s,) m/N, slip along friction over its limit: how far a node moves across friction under 1 N
     curved : (q,), which of them have normals that turn; bend : (q, 3, 3) 1/m, second derivatives of the distance there
@@ -155,7 +155,7 @@ def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
 
 @Loop
 def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001, ANN201
-    """Describe the slipping nodes ``at`` (s,); curved (q,), bend (q, 3, 3) 1/m : see ``Slipping``."""
+    """Describe the slipping nodes ``at`` (s,); curved : (q,), whose normals turn; bend : (q, 3, 3) 1/m"""
     s = len(at)
     across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
     turning = np.empty((len(curved), 3, 3))

@@ -97,7 +97,7 @@ def direct_light(
 def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
     """Replace ``facing`` (H, W), cosine times distance of a light's middle, in place, by the mean over its visible
     points. These are so close together that they differ in direction alone: n . (l + d), d from the middle to a point.
-    seen : (H, W) uint32, bit k for point k visible; cloud : (n, 3) m, the points; soften : see ``direct_light``"""
+    seen : (H, W) uint32, bit k for point k visible; cloud : (n, 3) m, the points; soften : smooth over 3 x 3 pixels"""
     every = 2 ** len(cloud) - 1
     box = bounding_box(seen != every, margin=1)
     if box is None:
