@@ -1,12 +1,15 @@
-"""frames.h5 as other programs read it: netCDF's rules, xarray, pandas."""
+"""frames.h5: what is kept and nothing else, as other programs read it: netCDF's rules, xarray, pandas."""
 
 from __future__ import annotations
+
+import json
 
 import h5py
 import numpy as np
 import pytest
 
 from tactile_core.jobs.frames_file import ALWAYS, FramesFile
+from tactile_core.recordings import flags
 
 FRAMES = 5
 SHAPES = {"electrodes": (19,), "force": (3,), "contact_center": (2,)}
@@ -14,18 +17,29 @@ SHAPES = {"electrodes": (19,), "force": (3,), "contact_center": (2,)}
 
 @pytest.fixture
 def frames(tmp_path):
-    """A file with every attribute that a conversion writes."""
+    """A file with every attribute that a conversion writes, written in two parts; latents are not kept."""
     arrays = {name: np.arange(FRAMES * np.prod(SHAPES.get(name, ()), dtype=int), dtype=float) for name in ALWAYS}
     arrays = {name: values.reshape(FRAMES, *SHAPES.get(name, ())) for name, values in arrays.items()}
     arrays |= {"flags": np.zeros(FRAMES, np.uint16), "frame": np.arange(FRAMES, dtype=np.int32)}
-    arrays |= {"marker_motion": np.zeros((FRAMES, 6, 2)), "height_map": np.zeros((FRAMES, 4, 3))}
+    arrays |= {"marker_motion": np.zeros((FRAMES, 6, 2)), "height_map": np.ones((FRAMES, 4, 3))}
+    arrays["latent_signal"] = np.ones((FRAMES, 8))
     path, about = tmp_path / "frames.h5", {"recording": "touch", "simulated": np.True_}
     with FramesFile(path, FRAMES, ("marker_motion", "height"), about) as file:
-        file.write(0, arrays)
-        file.annotate("time", start_time=0.0)
+        for start in (0, 3):
+            file.write(start, {name: values[start : start + 3] for name, values in arrays.items()})
+        file.annotate("time", start_time=1.5)
         file.annotate("electrodes", rest=np.ones(19), kind="raw")
         file.annotate("marker_motion", rest=np.ones((6, 2)))
     return path
+
+
+def test_it_holds_what_is_kept_with_units_and_nothing_else(frames):
+    with h5py.File(frames) as file:
+        assert set(file) == {*ALWAYS, "marker_motion", "height_map"}
+        assert all(dataset.attrs["unit"] and dataset.attrs["description"] for dataset in file.values())
+        assert json.loads(file["flags"].attrs["names"]) == flags.names()
+        assert file["flags"].dtype == np.uint16 and file["height_map"].dtype == np.float32
+        assert (file["height_map"][:] == 1).all() and file["time"].attrs["start_time"] == 1.5
 
 
 def test_no_attribute_or_dataset_breaks_netcdf_rules(frames):

@@ -3,14 +3,10 @@ from __future__ import annotations
 import json
 import os
 
-import h5py
-import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.jobs import results
-from tactile_core.jobs.frames_file import ALWAYS, FramesFile
-from tactile_core.recordings import flags
 
 KNOWN = ("electrodes", "displacement_biotac", "displacement_digit")
 
@@ -55,26 +51,6 @@ def test_a_folder_without_permission_is_refused(tmp_path):
     with pytest.raises(TactileError, match="cannot be written"):
         results.result_folders(["touch.csv"], tmp_path, False)
     tmp_path.chmod(0o700)
-
-
-def write_frames(path, keep=("height",)):
-    columns = {name: np.zeros((5, 2), np.float64) for name in ALWAYS}
-    columns |= {"flags": np.zeros(5, np.uint16), "height_map": np.ones((5, 4, 3)), "latent_signal": np.ones((5, 8))}
-    with FramesFile(path, 5, keep, {"recording": "touch"}) as file:
-        for start in (0, 3):
-            file.write(start, {name: column[start : start + 3] for name, column in columns.items()})
-        file.annotate("time", start_time=1.5)
-
-
-def test_frames_file_holds_what_is_kept_with_units_and_nothing_else(tmp_path):
-    write_frames(tmp_path / "frames.h5")
-    with h5py.File(tmp_path / "frames.h5") as file:
-        assert set(file) == {*ALWAYS, "height_map"}
-        assert all(dataset.attrs["unit"] and dataset.attrs["description"] for dataset in file.values())
-        assert json.loads(file["flags"].attrs["names"]) == flags.names()
-        assert file["flags"].dtype == np.uint16 and file["height_map"].dtype == np.float32
-        assert (file["height_map"][:] == 1).all()
-        assert file["time"].attrs["start_time"] == 1.5
 
 
 def test_results_of_another_verb_and_files_of_others_are_not_replaced(tmp_path):
