@@ -111,8 +111,8 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     """Say what pictures ignore or change of the scene: lamps, motion blur, frames without motion, colour management."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
-    points = [lamp.name for lamp in lamps if lamp.data.type == "POINT" and lamp.data.energy > 0]
-    found += [f"{name}: left out by the preset fast" for name in points if preset == "fast"]
+    if preset == "fast":
+        found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps if lamp.data.type == "POINT"]
     action = gel.animation_data and gel.animation_data.action
     if action and not action.frame_range[0] <= scene.frame_current_final <= action.frame_range[1]:
         first, last = action.frame_range

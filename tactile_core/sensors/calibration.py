@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from .camera import COLOURS, Camera, Led
 from .toml_fields import number
 
@@ -277,5 +277,4 @@ class Calibration:
 
 
 def _check_range(where: str, value: float, least: float, most: float) -> None:
-    if not (math.isfinite(value) and least <= value <= most):
-        raise TactileError(where, f"{value:g}", f"{least:g} to {most:g}")
+    finite_number(value, where, f"{least:g} to {most:g}", least, most)

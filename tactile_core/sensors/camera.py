@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 from ..geometry.lattice import Lattice
 from .descriptor import of_kind
 from .gel_sensor import GelSensor
@@ -66,9 +66,8 @@ class Camera:
                 raise TactileError(f"camera, {name}", repr(getattr(self, name)), "+1 or -1")
         if not (math.isfinite(self.centre_x) and math.isfinite(self.centre_z)):
             raise TactileError("camera, centre", f"({self.centre_x}, {self.centre_z})", "finite metres")
-        if not (math.isfinite(self.apparent_height) and self.apparent_height >= LOWEST_CAMERA):
-            expected = f"{LOWEST_CAMERA} m or more, above the gel"
-            raise TactileError("camera, apparent_height", repr(self.apparent_height), expected)
+        expected = f"{LOWEST_CAMERA} m or more, above the gel"
+        finite_number(self.apparent_height, "camera, apparent_height", expected, LOWEST_CAMERA)
         of_kind(self.sensor, GelSensor)  # refused where it is none
 
     @property
@@ -169,8 +168,7 @@ class Led:
             raise TactileError(f"led {self.colour}, position", repr(self.position), "three metres, the third above 0")
         if not (math.isfinite(self.radius) and self.radius > 0):
             raise TactileError(f"led {self.colour}, radius", repr(self.radius), "metres above 0")
-        if not (math.isfinite(self.radiance) and self.radiance >= 0):
-            raise TactileError(f"led {self.colour}, radiance", repr(self.radiance), "grey levels, 0 or more")
+        finite_number(self.radiance, f"led {self.colour}, radiance", "grey levels, 0 or more", 0.0)
 
     @property
     def channel(self) -> int:
