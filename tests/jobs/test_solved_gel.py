@@ -35,8 +35,6 @@ def arrays(gels, force, center):
 def pressed():
     """A ball of 5 mm pressed into the middle of the gel under 1 N."""
     pytest.importorskip("scipy", reason="contacts are solved with scipy, of the extra [fem]")
-    from tactile_core.mechanics.solve import solve
-
     return solve("digit", Sphere(5e-3), Placement(-8e-3, 1e-3), force=1.0)
 
 
@@ -82,8 +80,6 @@ def _mini(coarse_mini):
 
 
 def test_a_contact_found_on_one_gel_is_solved_on_another(pressed):
-    from tactile_core.mechanics.solve import solve
-
     place = Placement(-8e-3, 1e-3)
     true = solve(MINI, Sphere(5e-3), place, force=1.0).displacement[None]
     gel = pressed.displacement

@@ -45,6 +45,7 @@ def test_info_writes_a_map_by_which_the_file_is_the_same_recording(own, tmp_path
     mapped, known = recordings.read(own, columns), recordings.read(tmp_path / "known.csv")
     for name in ("time", "electrodes", "pdc"):
         np.testing.assert_allclose(getattr(mapped, name), getattr(known, name), atol=1e-9)
+    np.testing.assert_array_equal(recordings.read(own, map_file).electrodes, mapped.electrodes)  # the map by its name
     parts = list(chunks.read_parts(own, columns))
     assert len(parts) == 1 and np.array_equal(parts[0].recording.electrodes, known.electrodes)
 
@@ -64,13 +65,6 @@ def test_a_map_leads_through_convert_and_batch(own, tmp_path):
     assert note["options"]["prepare"]["columns"]["pdc"] == "pdc raw"
     assert main(["batch", *words, "--out", str(tmp_path / "job")]) == 0
     assert list((tmp_path / "job" / "shards").rglob("*.h5"))
-
-
-def test_a_map_s_file_may_be_named_in_python(own, tmp_path):
-    assert main(["info", str(own), "--columns", str(tmp_path / "map.toml")]) == 0
-    by_name = recordings.read(own, tmp_path / "map.toml")
-    by_map = recordings.read(own, column_map.read(tmp_path / "map.toml"))
-    np.testing.assert_array_equal(by_name.electrodes, by_map.electrodes)
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,12 @@ def rows_of(electrodes: np.ndarray, pdc: np.ndarray | None = None) -> recordings
     return assemble("touch.csv", "CSV", electrodes=electrodes, stamps=np.arange(len(electrodes)) / 100, pdc=pdc)
 
 
+@pytest.fixture(autouse=True)
+def tools(monkeypatch):
+    """Networks and drawer that are made up, where a verb asks for them."""
+    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
+
+
 class Clock:
     """Stands in for the module `time`: only sleeping makes it go on. slept : s"""
 
@@ -102,7 +108,6 @@ def test_another_file_of_the_same_name_is_told(slide_csv, tmp_path):
 
 
 def test_a_long_gap_is_not_waited_for(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     electrodes = recordings.read(slide_csv(frames=40)).electrodes
     np.savez(tmp_path / "gap.npz", electrodes=electrodes, time=np.r_[0.0, 1e6 + np.arange(39) / 100])
     monkeypatch.setattr(playback, "time", clock := Clock())
@@ -142,7 +147,6 @@ def test_without_a_quiet_part_rest_is_guessed_in_the_end():
 
 
 def test_watch_shows_the_last_picture_and_tells_the_latency(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(playback, "time", Clock())
     for more in (["--idle", "0.2"], ["--play"], ["--play", "--speed", "4"], ["--play", "--speed", "0"]):
         out = tmp_path / "now.png"
@@ -188,7 +192,6 @@ def test_a_known_unit_gives_the_rest_of_a_recording_that_begins_in_contact():
 
 
 def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(playback, "time", Clock())
     own, columns, sensor = tmp_path / "own.csv", tmp_path / "map.toml", tmp_path / "sensor.toml"
     own.write_text(slide_csv(frames=90).read_text(encoding="utf-8").replace("ele", "taxel "), encoding="utf-8")
@@ -203,7 +206,6 @@ def test_watch_takes_a_map_a_tare_and_a_sensor(slide_csv, tmp_path, monkeypatch,
 
 
 def test_watch_without_a_display_says_what_to_do(slide_csv, monkeypatch, capsys):
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setenv("MPLBACKEND", "agg")
     import matplotlib
 
@@ -227,7 +229,6 @@ def test_a_window_that_is_closed_ends_the_watch(slide_csv, monkeypatch, capsys):
             pyplot.close(window)
         return exists(window)
 
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     monkeypatch.setattr(pyplot, "get_backend", lambda: "a window's")
     monkeypatch.setattr(pyplot, "show", lambda block: shown.append(block))
     monkeypatch.setattr(pyplot, "fignum_exists", look)
@@ -240,7 +241,6 @@ def test_a_bag_is_played_by_each_of_its_fingers(tmp_path, monkeypatch, capsys):
     pytest.importorskip("rosbags", reason="rosbags is absent: pip install tactile-core[ros]")
     import bags
 
-    monkeypatch.setattr(convert, "load_tools", lambda *files, **options: fake_tools.tools())
     electrodes = 3000 + np.random.default_rng(2).normal(0, 1, (60, 19))
     still = np.full(60, 2000.0)
     press = SimpleNamespace(time=np.arange(60) / 100, electrodes=electrodes, pdc=still, tac=still, tdc=still)
