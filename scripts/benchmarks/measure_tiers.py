@@ -27,8 +27,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is 
 
 from benchmarks.measured_rows import parser_of, read_table
 from benchmarks.mechanics import tiers
-from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved, write_truth
-from benchmarks.mechanics.random_contacts import RandomContact
+from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, fast_misses, miss, solved, write_truth
+from benchmarks.mechanics.random_contacts import RandomContact, random_contacts
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic, provenance
 from tactile_core.mechanics.error_estimate import REFERENCE_SHARE, TABLE
@@ -85,7 +85,7 @@ def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
 def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], list[dict]]:
     """Measure every tier of one sensor; also returns the contacts that the reference tier solved."""
     full = FULL[sensor]
-    contacts = drawn(QUICK if quick else full, SEED)
+    contacts = list(random_contacts(QUICK if quick else full, SEED))
     kept = {tier: [keep(work, sensor, tier, i, contact) for i, contact in enumerate(contacts[:count])]
             for tier, count in (("fast", full), ("full", full), ("reference", 0 if quick else REFERENCE))}  # fmt: skip
     pairs, (scene, _) = read_pairs(TRAINING / "test_contacts.h5"), load_scene(TRAINING)

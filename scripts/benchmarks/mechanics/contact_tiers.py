@@ -70,11 +70,6 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
                 yield miss(int(press), share, found.displacement, found.axial_force, true, along)
 
 
-def drawn(count: int, seed: int) -> list[RandomContact]:
-    """Random contacts, depths even up to the greatest that mechanics is asked for."""
-    return list(random_contacts(count, seed))
-
-
 def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
     """Solve a contact from rest, without friction; return it, its depth over the thickness, and CPU s. Raises
     TactileError."""
@@ -140,7 +135,7 @@ def read_truth(file: Path, sensor: str) -> list[Truth]:
     """Return the reference tier's contacts on one sensor, from a file of ``write_truth``."""
     with np.load(file, allow_pickle=False) as arrays:
         columns = {name: arrays[f"{sensor}_{name}"] for name in ("number", "share", "displacement", "force", "seconds")}
-        contacts = drawn(int(columns["number"].max()) + 1, int(arrays["seed"]))
+        contacts = list(random_contacts(int(columns["number"].max()) + 1, int(arrays["seed"])))
     return [
         Truth(int(number), contacts[number], float(share), moved * SCALE, float(force), float(seconds))
         for number, share, moved, force, seconds in zip(*columns.values(), strict=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.measure_tiers import FAST_EDGES
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.accuracy import Row, row
@@ -23,7 +24,6 @@ COVER = 0.9, 0.98  # least and largest share of contacts below a right bound of 
 FEWEST = 200  # contacts for a target: with fewer the share is 1.5 % off and more by chance
 TABLE = "| what | among | contacts | bound, median | measured, median | below the bound |", "|---|---|---|---|---|---|"
 FOLDS = 5
-EDGES = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6  # of depth over thickness, as scripts/benchmarks/measure_tiers.py has them
 
 
 @dataclass(frozen=True)
@@ -77,12 +77,12 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
         misses = list(fast_misses(sensor, pairs, scene))
         bounds = np.empty((len(misses), 2))
         for fold in range(FOLDS):
-            table = by_depth([each for each in misses if each.press // EVERY % FOLDS != fold], EDGES)
+            table = by_depth([each for each in misses if each.press // EVERY % FOLDS != fold], FAST_EDGES)
             for number, each in enumerate(misses):
                 if each.press // EVERY % FOLDS == fold:
                     entry = next((one for one in table if each.share <= one["depth_share_to"]), table[-1])
                     bounds[number] = entry["shape_95_um"], 100 * entry["force_95"]
-        edges = [next(edge for edge in EDGES if each.share <= edge + 1e-6) for each in misses]
+        edges = [next(edge for edge in FAST_EDGES if each.share <= edge + 1e-6) for each in misses]
         depths = [f"to {edge:g} of the thickness" for edge in edges]
         order = np.argsort(edges, kind="stable")
         for what, unit, found, bound in (

@@ -46,13 +46,11 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)
     corners = sensors.skin_of(sensor).skin_surface("inner").faces[feet.face]
-    core_nodes, core_out, core_gap = _over_core(sensor, mesh)
-    side_nodes, side_out, side_gap = _beside_core(sensor, mesh)
-    nodes = mesh.inner[np.r_[corners.ravel(), core_nodes, side_nodes]]
-    single = len(core_nodes) + len(side_nodes)
-    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(single)]
-    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), core_out, side_out])
-    return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, core_gap, side_gap])
+    free, outward, gap = _free_nodes(sensor, mesh)
+    nodes = mesh.inner[np.r_[corners.ravel(), free]]
+    columns = np.r_[np.repeat(np.arange(len(feet.gap)), 3), len(feet.gap) + np.arange(len(free))]
+    out = np.concatenate([(feet.weights[..., None] * feet.outward[:, None]).reshape(-1, 3), outward])
+    return SensingPoints(axes_of(nodes), np.repeat(columns, 3), out.ravel(), np.r_[feet.gap, gap])
 
 
 def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
@@ -82,20 +80,16 @@ def electrode_feet(sensor: str = sensors.SOURCE) -> ElectrodeFeet:
     return ElectrodeFeet(face, weights, (place - positions) / gap[:, None], gap)
 
 
-def _over_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes under the pad that face the core: node, its normal there (n, 3), gap (n,) m; even in z."""
-    nodes = facing_nodes(sensor, mesh)
+def _free_nodes(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Free inner nodes, those that face the core before those beside it: node (n,), direction from the core's nearest
+    point (n, 3), gap (n,) m; even in z."""
+    facing = facing_nodes(sensor, mesh)
+    nodes = np.r_[facing, _beside(sensor, mesh)]
     mirrored, right = _right_images(sensor, nodes)
-    gap, outward = Core(sensor).distance(_inner(sensor)[right])
+    outward, gap = (values[right] for values in above_core(sensor))
+    over = slice(0, len(facing))
+    gap[over], outward[over] = Core(sensor).distance(_inner(sensor)[right[over]])
     return nodes, np.where(mirrored[:, None], outward * [1.0, 1.0, -1.0], outward), gap
-
-
-def _beside_core(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes that never meet the core: node, direction from its nearest point (n, 3), gap (n,) m."""
-    nodes = _beside(sensor, mesh)
-    mirrored, right = _right_images(sensor, nodes)
-    outward, gap = above_core(sensor)
-    return nodes, np.where(mirrored[:, None], outward[right] * [1.0, 1.0, -1.0], outward[right]), gap[right]
 
 
 def _inner(sensor: str) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..solids.fluid_cavity import FluidCavity
 from ..solids.sparse_cholesky import DampedFactor, LinearSystem, NotPositiveDefiniteError, PatternFactor, held_back
 from .contact_set import ContactSet, Obstacle, PlacedIndenter
 from .penalty_points import LET_THROUGH, NO_PUSH, PenaltyPoints, Push
-from .solved_contact import EXACT, ContactState, NoEquilibriumError, NotConvergedError, Tolerance, guarded
+from .solved_contact import EXACT, ContactState, NoEquilibriumError, NotConvergedError, Tolerance
 
 SLIDING_TOLERANCE = 3e-6  # of the largest forces: with friction the balance converges linearly
 MAX_ITERATIONS, MAX_GUARDED = 40, 60  # the second with penalty points: they slow the end (assumed)
@@ -137,7 +137,7 @@ class FiniteStrainContact:
             except _FAILURES:
                 steps += 1
                 if self._penalty and not touch.guarded:
-                    touch = guarded(touch)
+                    touch = dataclasses.replace(touch, guarded=True)
                     continue
                 size, failures = min(size, goal - done) / 2, failures + 1
                 if size < min(step, 1.0) * SMALLEST_STEP or failures > self.most_failures:
@@ -174,7 +174,9 @@ class FiniteStrainContact:
             if all(settled) and share == 1 and (small or max(outer.imbalance, imbalance) < enough):
                 push = self._push(start, outer, at, spring)
                 found = ContactState(start.depth, pose, state, outer, inner, push, start.guarded, fluid, iteration)
-                return self._solve(pose, guarded(found)) if self._lets_through(found) and not start.guarded else found
+                if start.guarded or not self._lets_through(found):
+                    return found
+                return self._solve(pose, dataclasses.replace(found, guarded=True))
             sizes.append(float(np.abs(step).max()))
             if abs(sizes[-1] - sizes[-3]) < _SAME * sizes[-1]:
                 raise NotConvergedError  # nodes alternate between two faces of the indenter

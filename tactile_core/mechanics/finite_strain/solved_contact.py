@@ -17,7 +17,7 @@ from .penalty_points import Push
 class ContactState:
     """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : nodes that touch.
 
-    pose : of the indenter; push : on the penalty points, once they are used (``guarded``)
+    pose : of the indenter; push : on the penalty points, which ``guarded`` switches on
     fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
     """
@@ -37,11 +37,6 @@ class ContactState:
     def force(self) -> np.ndarray:
         """Total force (3,) N of the indenter on the sensor."""
         return self.outer.forces.sum(axis=0) + self.push.total
-
-
-def guarded(touch: ContactState) -> ContactState:
-    """Return the same contact with penalty points switched on, to continue from."""
-    return dataclasses.replace(touch, guarded=True)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, drawn, fast_misses, miss, solved
+from benchmarks.mechanics.contact_tiers import SENSORS, Miss, by_depth, fast_misses, miss, solved
+from benchmarks.mechanics.random_contacts import random_contacts
 
 from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
@@ -42,6 +43,6 @@ def test_the_fast_tier_is_near_the_full_one_on_test_contacts(sensor):
 
 
 def test_a_random_contact_is_solved_as_deep_as_drawn():
-    contact = drawn(2, 3)[1]
+    *_, contact = random_contacts(2, 3)
     found, share, seconds = solved("digit", contact, "fast")
     assert found.converged and share == pytest.approx(contact.depth / 0.5 * 0.6, rel=2e-3) and seconds > 0

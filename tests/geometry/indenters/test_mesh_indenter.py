@@ -135,22 +135,15 @@ def test_hollow_and_separate_bodies_are_fine(tmp_path):
     assert distance[1] < -0.3e-3 and distance[2] < -0.3e-3
 
 
-def test_the_cache_gives_the_same_bytes(ball, ball_file, caplog):
+def test_the_cache_gives_the_same_bytes(ball, ball_file):
     (kept,) = [path for path in cache_folder().glob("indenter-*/hull.npy") if len(np.load(path)) == len(ball.hull)]
     kept = kept.with_name("coefficients.npy")
-    written, changed = kept.read_bytes(), kept.stat().st_mtime_ns
+    changed = kept.stat().st_mtime_ns
     mesh_indenter._load.cache_clear()
     again = MeshIndenter.from_file(ball_file, spacing=SPACING)
     assert kept.stat().st_mtime_ns == changed  # read, not built
     np.testing.assert_array_equal(again.grid.coefficients, ball.grid.coefficients)
     assert again.error == ball.error
-    for damaged in (written[: len(written) // 2], written[:-8] + bytes(8)):  # cut, and changed: built again
-        kept.write_bytes(damaged)
-        mesh_indenter._load.cache_clear()
-        MeshIndenter.from_file(ball_file, spacing=SPACING)
-        assert kept.read_bytes() == written
-        assert "it is built again" in caplog.text
-        caplog.clear()
 
 
 def test_settings_and_content_have_their_own_cache(ball, tmp_path):

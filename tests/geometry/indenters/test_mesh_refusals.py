@@ -161,15 +161,6 @@ def test_files_that_a_mesh_names_are_not_opened(tmp_path):
     assert not [name for name in opened if "look" in name]
 
 
-def test_full_disk_says_so(ball_file, monkeypatch):
-    def full(*_args, **_kwargs):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(np, "save", full)
-    with pytest.raises(TactileError, match=r"No space left.*TACTILE_CACHE"):
-        MeshIndenter.from_file(ball_file, spacing=0.31e-3)
-
-
 def test_inside_counts_layers():
     """A box whose faces lie exactly on grid nodes, then the same box twice."""
     box = trimesh.creation.box((2, 2, 2)).triangles
