@@ -44,8 +44,8 @@ def finite_number(
 ) -> float:
     """Return a value as a float; raises TactileError unless it is a finite number from ``least`` to ``most``."""
     try:
-        number = math.nan if isinstance(value, str) else float(value)
-    except (TypeError, ValueError):
+        number = math.nan if isinstance(value, str | bytes | bytearray | bool) else float(value)
+    except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and least <= number <= most):
         raise TactileError(where, f"{value!r:.80}", expected, advice)

@@ -27,8 +27,10 @@ def test_a_message_quotes_a_long_finding_in_part():
     assert len(error.found) == 5010
 
 
-@pytest.mark.parametrize("value", [None, "1", [1, 2], math.nan, math.inf, 3, -1])
+@pytest.mark.parametrize("value", [None, "1", b"1", True, 10**400, [1, 2], math.nan, 3, -1])
 def test_what_is_no_number_of_a_range_is_refused(value):
     with pytest.raises(TactileError, match=r"Gel, force: .*; expected 0 to 2 N. Lift it"):
         finite_number(value, "Gel, force", "0 to 2 N", 0.0, 2.0, "Lift it")
     assert finite_number(2, "Gel, force", "0 to 2 N", 0.0, 2.0) == 2.0
+    with pytest.raises(TactileError, match="Gel, force: inf; expected any"):
+        finite_number(math.inf, "Gel, force", "any")

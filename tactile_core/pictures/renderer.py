@@ -90,9 +90,12 @@ class Renderer:
         self.dots = None if calibration.markers is None else MarkerField(calibration)
         given = resting_picture(calibration, self.rest_radiance) if background is None else background
         self.background = camera_array(given, (*self.camera.shape, 3), "background")
-        if background is not None and not (self.background.min() >= 0 and 1 < self.background.max() <= LARGEST_LEVEL):
-            found = f"values from {self.background.min():g} to {self.background.max():g}"
-            raise TactileError("background", found, "levels 0 to 255", "Multiply shares of 1 by 255")
+        least, most = float(self.background.min()), float(self.background.max())
+        shares = np.asarray(given).dtype.kind == "f" and 0 < most <= 1
+        if background is not None and (shares or least < -0.5 or most > LARGEST_LEVEL + 0.5):  # .5: resampled
+            advice = "Multiply shares of 1 by 255" if shares else ""
+            raise TactileError("background", f"values from {least:g} to {most:g}", "levels 0 to 255", advice)
+        self.background = self.background.clip(0, LARGEST_LEVEL)
         self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)

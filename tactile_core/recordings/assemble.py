@@ -121,7 +121,7 @@ def assemble(
     _check_share(path, np.any(bad, axis=1), problems, row_word)
     readings = electrodes[:LOOKED_AT][np.isfinite(electrodes[:LOOKED_AT]).all(axis=1)]
     if len(readings):
-        _refuse_mirrored(path, np.median(readings, axis=0), sensor)
+        _refuse_mirrored(path, np.where(absent, np.nan, np.median(readings, axis=0)), sensor)
     if not snapshots:
         _refuse_turns(path, readings)
     seconds, start, jumps, of_clock = clock_of(stamps, rows, row_word)
@@ -146,9 +146,12 @@ def assemble(
 
 
 def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
-    """Raise TactileError where electrodes rest at levels (e,) that are low where a unit's are high."""
-    typical = typical_rest(sensor)
-    if typical is None or np.quantile(levels, 0.1) < LEAST_MIRRORED or np.median(levels) > COUNT_MAX / 2:
+    """Raise TactileError where electrodes rest at levels (e,) that are low where a unit's are high; NaN: not judged"""
+    typical, known = typical_rest(sensor), np.isfinite(levels)
+    if typical is None:
+        return
+    levels, typical = levels[known], typical[known]
+    if np.quantile(levels, 0.1) < LEAST_MIRRORED or np.median(levels) > COUNT_MAX / 2:
         return
     off, usual = levels - levels.mean(), typical - typical.mean()
     if off @ usual < MIRRORED * np.sqrt(off @ off * (usual @ usual)):

@@ -26,7 +26,8 @@ ENDINGS = (*FOLDER_ENDINGS, ".npy", ".json", ".jsonl", ".txt", ".tsv", ".gz")  #
 ZIP_STARTS = (b"PK\x03\x04", b"PK\x05\x06")
 UNZIP = "unzip; of a spreadsheet save the sheet as CSV"
 PACKED = {b"BZh": "bunzip2", b"\xfd7zXZ": "unxz", b"\x28\xb5\x2f\xfd": "unzstd", ZIP_STARTS[0]: UNZIP}
-NPY_NAME, HEAD = b".npy", 1024  # how arrays in an NPZ file, a zip, are called; bytes in which the first one's name is
+NPY_NAME = b".npy"  # how arrays in an NPZ file, a zip, are called
+HEAD, DIRECTORY = 1024, 2**16  # bytes in which the first one's name is; at a zip's end, in which all names are
 
 
 class Opened(NamedTuple):
@@ -64,7 +65,7 @@ def opened(path: str) -> Iterator[Opened]:
             head = plain.read(HEAD)
             start = head[:START_BYTES]
             for packed, program in PACKED.items():
-                if start.startswith(packed) and NPY_NAME not in head:
+                if start.startswith(packed) and NPY_NAME not in head + _end(plain):
                     raise TactileError(file, "a packed file", "a recording, or a gzipped text", f"Unpack it: {program}")
             container = _container(start)
             if plain is not stream and container not in ("csv", "json"):
@@ -75,6 +76,12 @@ def opened(path: str) -> Iterator[Opened]:
                 raise TactileError(file, f"topic {topic!r} of a file without topics", "path, or path#finger")
             plain.seek(0)
             yield Opened(container, file, finger, plain)
+
+
+def _end(file: BinaryIO) -> bytes:
+    """Return the last ``DIRECTORY`` bytes of a file."""
+    file.seek(max(file.seek(0, os.SEEK_END) - DIRECTORY, 0))
+    return file.read()
 
 
 def container_of(path: str) -> str:

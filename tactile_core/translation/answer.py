@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, finite_number
 
 CONTACTS = 1, 2  # that may be looked for in a frame
 MOST_SAMPLES = 100  # contacts per frame; 50 bytes each (assumed enough)
@@ -38,11 +38,13 @@ class Answer:
 
     def __post_init__(self) -> None:
         """Raise TactileError for an unknown kind, a shift longer than the gel, too many samples or contacts."""
-        shift = self.mount_shift_mm
-        pair = isinstance(shift, tuple) and len(shift) == 2
+        shift, expected = self.mount_shift_mm, f"a tuple (x, z) within {FARTHEST:g} mm"
+        if not (isinstance(shift, tuple) and len(shift) == 2):
+            raise TactileError("Answer, mount_shift_mm", f"{shift!r:.80}", expected)
+        for each in shift:
+            finite_number(each, "Answer, mount_shift_mm", expected, -FARTHEST, FARTHEST)
         for name, right, expected in (
             ("kind", self.kind in (LIKELY, MEAN), f"{LIKELY} or {MEAN}"),
-            ("mount_shift_mm", pair and all(abs(one) <= FARTHEST for one in shift), f"(x, z) within {FARTHEST:g} mm"),
             ("samples", self.samples in range(MOST_SAMPLES + 1), f"0 to {MOST_SAMPLES}"),
             ("contacts", self.contacts in CONTACTS, "1 or 2"),
         ):
@@ -72,6 +74,8 @@ def parse_answer(
 ) -> Answer:  # fmt: skip
     """Return the options of a command line; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises TactileError for a
     shift or a number of samples out of range."""
+    if not 0 <= samples <= MOST_SAMPLES:
+        raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
     shift = (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift)
     return Answer(kind, frames_apart, shift, samples, contacts)
 

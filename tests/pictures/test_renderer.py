@@ -193,6 +193,8 @@ def test_a_gel_that_reaches_the_camera_is_refused(any_variant, small):
 def test_a_background_in_other_units_is_refused(levels, small):
     with pytest.raises(TactileError, match=rf"background: values from {levels:g} to .*; expected levels 0 to 255"):
         Renderer(small, "fast", background=np.full((*small.camera.shape, 3), levels))
+    for kept in (0.0, -0.1, 255.2):  # a dark room, and what resampling leaves
+        assert Renderer(small, "fast", background=np.full((*small.camera.shape, 3), kept)).background.max() <= 255
 
 
 def test_heights_in_millimetres_are_refused(small):

@@ -230,8 +230,13 @@ def test_counts_that_are_mirrored_are_refused(press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=4095 - counts, time=press.time)
     with pytest.raises(TactileError, match=r"a.npz, electrodes: levels .* seems to hold 4095 - counts: subtract"):
         recordings.read(tmp_path / "a.npz")
-    np.savez(tmp_path / "a.npz", electrodes=counts / 4, time=press.time)  # counts of 10 bit lie there too
-    assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
+    np.savez(tmp_path / "a.npz", electrodes=np.column_stack([4095 - counts[:, :18], np.full(len(counts), np.nan)]))
+    with pytest.raises(TactileError, match="seems to hold 4095 - counts"):
+        recordings.read(tmp_path / "a.npz")
+    odd = np.roll(counts, 5, axis=1)  # of another pattern; counts of 10 bit lie there too, changes from rest below
+    for kept in (counts / 4, odd / 2, 2 * REST_COUNTS.mean() - counts, 150 - (counts - REST_COUNTS.min()) / 10):
+        np.savez(tmp_path / "a.npz", electrodes=kept, time=press.time)
+        assert len(recordings.read(tmp_path / "a.npz")) == len(press.time)
 
 
 @pytest.mark.parametrize("names", ["E{}_tared", "filtered_E{}", "delta/E{}"])
@@ -289,6 +294,11 @@ def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tm
         packed.writestr("xl/workbook.xml", "")
     with pytest.raises(TactileError, match=r"a packed file; .*Unpack it: unzip; of a spreadsheet save"):
         recordings.read(tmp_path / "a.xlsx")
+    np.savez(tmp_path / "a.npz", electrodes=press.electrodes)
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as notes, zipfile.ZipFile(tmp_path / "a.npz") as arrays:
+        notes.writestr("notes.txt", "n" * 3000)
+        notes.writestr("electrodes.npy", arrays.read("electrodes.npy"))
+    assert len(recordings.read(tmp_path / "b.npz")) == len(press.time)
 
 
 def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines):

@@ -28,7 +28,7 @@ UNITS = {"place": "mm", "force": "%", "peak": "%", "iou": "1"}
 TARGETS = {"place": 0.35, "force": 5.0, "peak": 14.0, "iou": 0.55}  # docs/sources.md, Targets
 TOUCHED = 0.1  # N, from which on a contact's place and force are judged
 SEED = 11  # of gains, noise and rest
-REST_OFF = 3.0  # counts: what an electrode drifts by in two minutes since the tare, at most (`readout.Wiring.drift`)
+REST_OFF = 3.0  # counts: what an electrode drifts by in two minutes since the tare, at most (88 counts in an hour)
 
 Truth = dict[str, np.ndarray]
 Errors = dict[str, np.ndarray]  # by UNITS, a number per judged frame

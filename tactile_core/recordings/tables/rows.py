@@ -50,15 +50,16 @@ def row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, p
             values = []
         if values and all(-LARGEST < value < LARGEST for value in values):  # false for NaN and infinity
             return values
-    return _bad_row(cells, header.names, kinds, frame, line_number, problems)
+    return _bad_row(cells, header, kinds, frame, line_number, problems)
 
 
 def _bad_row(
-    cells: list[str], names: tuple[str, ...], kinds: Cells, frame: int, line_number: int, problems: list[Problem]
+    cells: list[str], header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]
 ) -> list[float]:
-    width = len(names)
+    names, width = header.names, len(header.names)
     if len(cells) > width:
-        found = f"{len(cells)} cells where the header has {width} (commas within numbers?)"
+        within = " (commas within numbers?)" if header.separator == "," else ""
+        found = f"{len(cells)} cells where the header has {width}{within}"
         problems.append(Problem(frame, line_number, "row", found))
         return [np.nan] * width
     if len(cells) < width:  # the last cell that is there may be cut in its middle

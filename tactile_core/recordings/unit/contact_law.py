@@ -20,6 +20,7 @@ from ...sensors import SOURCE, contact_pressures_of, contacts_of, divider, typic
 from ...sensors.descriptor import of_kind
 from ...sensors.fluid_sensor import Fluid
 from ..doubt import Doubt, Reason
+from ..electrode_faults import DEAD_FRAMES
 from ..flags import Flag
 from ..polarity import contact_signals, patterns, spread_out, touching, unit
 from ..rest_level import Framewise
@@ -52,6 +53,7 @@ FEWEST_PRESSED = 6  # such contacts: the logarithm scatters by .28 for one, .11 
 LEAST_PRESSURE, MOST_PRESSURE = 0.6, 2.0
 CONDUCTIVITIES = np.linspace(-1.5, 1.5, 151)  # logarithms over a typical unit's, tried for a level at rest
 MOST_LEFT = 0.45  # share that a contact leaves of what a conductivity does: between units at rest and hard grips
+LEAST_USED = 0.6  # of the electrodes, which judge a level; of ten, three of 100 units at rest looked like a contact
 LEAST_APART = 100.0  # counts, norm of a level's difference without conductivity: units differ by 106 to 434
 
 
@@ -201,14 +203,16 @@ def as_contact(level: np.ndarray, sensor: str, readings: Sequence[np.ndarray] = 
     """Return the share (0..1) that one contact explains of a level (e,) counts, beside the conductivity that fits best.
 
     It is of the level's difference to a typical unit's rest. None if too little for a contact, or without a model.
-    readings : (T, e) counts of each recording; electrodes that stand still in one, or rest where none does, are faulty
-    and left out"""
+    readings : (T, e) counts of each recording; electrodes that stand still in all, or rest where none does, are faulty
+    and left out, where most others are not"""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None
     used = (level > divider.RESTS[0]) & (level < divider.RESTS[1])
-    for each in readings:
-        used &= np.ptp(each, axis=0) != 0
+    if sum(map(len, readings)) >= DEAD_FRAMES:
+        used &= np.ptp(np.concatenate(readings), axis=0) != 0
+    if used.mean() < LEAST_USED:  # a quiet finger, read in few bits
+        used[:] = True
     level, typical = level[used], typical[used]
     rest = divider.of_films(np.exp(CONDUCTIVITIES)[:, None], typical)
     change = divider.typical(level - rest, rest, typical)

@@ -27,6 +27,15 @@ def test_units_at_rest_are_not_under_load():
     assert [seed for seed in range(20) if as_contact(unit(seed), "biotac") is not None] in ([], [8])
 
 
+def test_electrodes_that_stand_still_in_one_recording_or_nearly_all_of_a_quiet_finger_are_no_faults():
+    still, random = np.tile(REST_COUNTS, (400, 1)), np.random.default_rng(0)
+    few = still + random.integers(0, 2, still.shape) * (np.arange(19) < 6)
+    assert [seed for seed in range(20) if as_contact(unit(seed), "biotac", [few]) is not None] in ([], [8])
+    level = REST_COUNTS + contact_signals()[HARD[-1]]
+    grips = [level + random.normal(0, 1, (400, 19)), level[None]]  # a row alone
+    assert as_contact(level, "biotac", grips) == as_contact(level, "biotac")
+
+
 @pytest.mark.parametrize("contact", HARD)
 def test_a_hard_grip_is(contact):
     rest = divider.of_films(1.2, REST_COUNTS)
