@@ -116,7 +116,8 @@ def run_demo(folder: Path) -> int:
 
 
 def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
-    """Run ruff, then pytest on up to WORKERS processes of one thread; return the status of the first that fails."""
+    """Run ruff and, whatever it finds, pytest, all tests on up to WORKERS processes of one thread; return the first
+    status that is not 0."""
     extras = ("plain" if options.numpy else "dev", *(("train",) if options.train else ()))
     python = install(options.venv, extras, options.numpy)
     variables, workers = environment(), min(os.cpu_count() or 1, WORKERS)

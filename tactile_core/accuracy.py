@@ -93,7 +93,8 @@ def mean(values: np.ndarray) -> float | None:
 
 def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
     """Compute four metrics (C,) of displacement predicted against true (C, n, 3) m, by name: rms_um, max_um,
-    core_height_um, and peak_depth_percent. depth : `height` on the DIGIT, `lengths` on the BioTac"""
+    core_height_um, and peak_depth_percent; all but max_um are NaN without contact.
+    depth : `height` on the DIGIT, `lengths` on the BioTac"""
     return {
         "rms_um": 1e6 * rms_in_contact(predicted, true),
         "max_um": 1e6 * max_error(predicted, true),

@@ -79,9 +79,10 @@ def take_over(thing: bpy.types.Object, other: bpy.types.Object) -> None:
 
 
 def follow(thing: bpy.types.Object, before: float) -> None:
-    """Fit a sensor's style to a new animation: its range, unless it was set by hand, and what it colours by.
+    """Fit a sensor's style of displacement or contact patch to a new animation: its range, unless that was set by hand,
+    its legend, and the error below which colours fade.
 
-    before : m, largest displacement of the animation that it replaces
+    before : m, largest displacement of the animation that it replaces, 0 for none; another range was set by hand
     """
     style = styles.style_of(thing)
     if style not in ("DISPLACEMENT", "CONTACT_PATCH"):

@@ -22,9 +22,10 @@ _BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; th
 
 @dataclasses.dataclass(frozen=True)
 class Result:
-    """Result of a simulation.
+    """Result of a simulation, in the sensor's frame.
 
-    seconds (T,), force (T, 3) N; apex (T, 3) m, turn (T, 3, 3): where the indenter stood, on the gel if any.
+    seconds (T,); force (T, 3) N, on the sensor
+    apex (T, 3) m, turn (T, 3, 3), columns the indenter's axes: where the indenter stood, on the gel if any
 
     moved : displacement (T, n, 3) m of each sensor that was solved, by their names
     picked : which tiers, in words, where a bound was given

@@ -164,7 +164,7 @@ class FramesFile:
             self._file.create_dataset(f"labels/{name}", data=column, dtype=h5py.string_dtype(), track_times=False)
 
     def annotate(self, name: str, **attributes: Any) -> None:
-        """Add attributes to a dataset that exists."""
+        """Add attributes to a dataset that exists, by its name in the file; bools become integers, arrays flat ones."""
         self._file[name].attrs.update({key: netcdf_value(value) for key, value in attributes.items()})
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:

@@ -164,7 +164,7 @@ def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None
 
 
 def to_toml(unit: Calibration) -> str:
-    """Format a calibration, numbers with six digits; a photograph is named relative to the file."""
+    """Format a calibration, numbers with six digits; a photograph is named without its folder, beside the file."""
     camera, coating, response = unit.camera, unit.coating, unit.response
     sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"
     ambient = "\n".join(f"{colour} = {toml_value(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))

@@ -211,7 +211,8 @@ def share_done(options: Options, state: checkpoint.State) -> float:
 def epoch_losses(
     stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
 ) -> list[Callable[[], torch.Tensor]]:
-    """Return one function per step of pass ``epoch``; called in order, each returns the loss of its batch."""
+    """Return one function per step of pass ``epoch``, from 0; called in order, each returns the loss of its batch.
+    index : number of the stage; with seed and epoch it seeds what is drawn"""
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
     generator = torch.Generator().manual_seed(int(rng.integers(2**62)))

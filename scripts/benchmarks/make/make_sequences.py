@@ -69,7 +69,8 @@ def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def sequence(scene: Scene, motion: str, random: np.random.Generator) -> dict[str, np.ndarray]:
-    """Arrays (40, ...) of one sequence; drawn again where a sensor does not bear it."""
+    """Arrays (40, ...) of one sequence, 6 of its frames at rest; drawn again where a contact fails or touches nothing.
+    motion : one of ``MOTIONS``"""
     while True:
         indenter = scene.indenters[int(random.integers(len(scene.indenters)))].build()
         place, force = draw_place(random, scene.pairs), float(np.exp(random.uniform(*np.log(FORCES))))

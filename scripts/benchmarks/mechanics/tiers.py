@@ -24,7 +24,8 @@ _DEPTHS = {"digit": (0.2, 0.4, 0.6, 0.8, 1.2), "biotac": (0.3, 0.6, 0.9, 1.2)}  
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield tiers' errors and times under a 7 mm ball at one place, without and (in the long form) with friction."""
+    """Yield tiers' errors and times under a ball of 7 mm diameter at one place; quick : one depth per sensor, without
+    friction, else all depths, and one of them with friction"""
     for sensor in ("digit", "biotac"):
         depths = _DEPTHS[sensor][1:2] if quick else _DEPTHS[sensor]
         yield from _sensor(sensor, [1e-3 * d for d in depths], 0.0)

@@ -50,8 +50,8 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Optional library. module : to import; package : in the index; use : what needs it
-    extra : the one of this package's that brings it, or "" """
+    """Library that is tried. module : to import; package : in the index; use : what needs it
+    extra : the one of this package's that brings it, "" for a library that always comes along"""
 
     module: str
     package: str

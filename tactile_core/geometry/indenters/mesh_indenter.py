@@ -66,10 +66,11 @@ class MeshIndenter(Summary, Indenter):
         Building takes 1 to 15 s of CPU time, minutes for 100,000 slender triangles or where numba is missing.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
-        spacing : m, of the grid; of a body of more than 8 million nodes, that of its lowest 5 mm, and coarser above
+        spacing : m, 1e-5 to 1e-3, of the grid; of one of over 8 million nodes that of its lowest 5 mm, coarser above
         The body's lowest point, or the middle of its lowest flat, becomes the own origin.
         Raises TactileError for anything that is no closed, outward surface of an indenter's size, and for one that
-        crosses itself by more than the grid's spacing (less is not seen); ModuleNotFoundError without extra [fem].
+        crosses itself by more than the grid's spacing (less is not seen), for arguments out of range, files that cannot
+        be read or are too large; ModuleNotFoundError without extra [fem].
         """
         _check(path, scale, up, spacing)
         content = mesh_file.read_bytes(path)

@@ -222,7 +222,8 @@ def _write_words(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[summary.Summary], out: Path,
     asked: Asked,
 ) -> None:  # fmt: skip
-    """Write the card, the page and their numbers."""
+    """Write the card, the page and their numbers; what survives of the labels where scikit-learn is installed.
+    named : the recipe, as the user named it"""
     rows: list[survival.Row] | None = None
     if survival.installed():
         with asked.bar("what survives", "step") as shown:

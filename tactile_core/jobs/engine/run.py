@@ -190,7 +190,8 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
-    """Write only the job, for `tactile batch --array`; returns its folder. Raises as `begun` does."""
+    """Write only the job of the result `out`, for `tactile batch --array`; returns its folder, <out>.parts. Raises as
+    `begun` does."""
     with begun(Path(out), job) as folder:
         return folder
 

@@ -213,7 +213,8 @@ def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return sensing points (v,) with z >= 0; for all w the own or the image's index among these, and sign 1 or -1."""
+    """Return the sensing points (v,) that stand for all w, by `images`; the index of each one's among these (w,), and
+    sign (w,), -1 where it is the image."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)

@@ -120,7 +120,8 @@ def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each of ``count`` sensing points itself or its image with z >= 0, (count,), and if it is the image."""
+    """Return for all ``count`` sensing points the index of the point that stands for each, (count,), and if it is its
+    image: at z < 0 a free node's image does, else the point itself, as electrodes' feet always do."""
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():

@@ -153,8 +153,8 @@ class ContactSet:
         """Line search: return the share of a step after which friction balances all other forces along it, at most 1.
 
         Newton's steps overshoot where many nodes begin to slip. move : (k, 3) m, of the nodes, in ``begin``'s frames
-        force : N m, the work of all other forces over the step, at its start
-        stiffness : N m, what the whole step adds to it, and to friction as linearised by ``gripping``
+        force : N m, slope of the energy along the step at its start, without friction's; negative where it drives on
+        stiffness : N m, what the whole step adds to that slope, and to friction's as linearised by ``gripping``
         """
         if not self.friction:
             return 1.0
