@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import TactileError
 from . import atomic, checksummed
-from .hdf5_checked import open_checked
+from .hdf5_checked import declared, open_checked
 from .outside import damage_reported
 
 
@@ -37,6 +37,7 @@ def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, n
 
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and (not names or name in names):
+            declared(item, f"{file}, {name}")
             found[name] = item[rows] if item.shape else item[()]
 
     with damage_reported(file, "shard", "Run the job again, which makes it again"), open_checked(file) as opened:

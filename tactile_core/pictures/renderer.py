@@ -88,14 +88,11 @@ class Renderer:
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
         self.rest_radiance = self._spread_radiance(resting)
         self.dots = None if calibration.markers is None else MarkerField(calibration)
-        given = resting_picture(calibration, self.rest_radiance) if background is None else background
-        self.background = camera_array(given, (*self.camera.shape, 3), "background")
-        least, most = float(self.background.min()), float(self.background.max())
-        shares = np.asarray(given).dtype.kind == "f" and 0 < most <= 1
-        if background is not None and (shares or least < -0.5 or most > LARGEST_LEVEL + 0.5):  # .5: resampled
-            advice = "Multiply shares of 1 by 255" if shares else ""
-            raise TactileError("background", f"values from {least:g} to {most:g}", "levels 0 to 255", advice)
-        self.background = self.background.clip(0, LARGEST_LEVEL)
+        shape = *self.camera.shape, 3
+        if background is None:
+            self.background = camera_array(resting_picture(calibration, self.rest_radiance), shape, "background")
+        else:
+            self.background = _given_background(background, shape)
         self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)
@@ -215,6 +212,17 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
     pairs = white[1:] + white[:-1]
     grain = (pairs[:, 1:] + pairs[:, :-1]) / 2 @ np.linalg.cholesky(CHANNELS).T * unit.noise
     return grain.repeat(side, 0).repeat(side, 1)[:height, :width].astype(np.float32)
+
+
+def _given_background(picture: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
+    """Return a user's picture (H, W, 3), levels, as float32 of a shape; raises TactileError for other units."""
+    levels = camera_array(picture, shape, "background")
+    least, most = float(levels.min()), float(levels.max())
+    shares = np.asarray(picture).dtype.kind == "f" and 0 < most <= 1
+    if shares or least < -0.5 or most > LARGEST_LEVEL + 0.5:  # .5: what resampling adds
+        advice = "Multiply shares of 1 by 255" if shares else ""
+        raise TactileError("background", f"values from {least:g} to {most:g}", "levels 0 to 255", advice)
+    return levels.clip(0, LARGEST_LEVEL)
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:

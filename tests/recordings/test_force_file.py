@@ -78,7 +78,7 @@ def test_what_is_no_force_beside_the_recording_is_refused(columns, said, tmp_pat
     [
         ("force.csv", "", "an empty file"),
         ("nothere.csv", None, "neither a file nor columns of"),
-        ("touch.csv", "PK\x03\x04 no archive", "npz"),
+        ("touch.csv", "PK\x03\x04 no archive", "a packed file"),
     ],
 )
 def test_other_files_are_refused(named, content, said, tmp_path):
