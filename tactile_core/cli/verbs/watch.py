@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     """Show the newest frames until the recording ends, the window is closed, or Ctrl-C."""
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
-    from ...recordings import PrepareOptions, electrode_gains
+    from ...recordings import PrepareOptions
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
     from ...recordings.recording import split
@@ -100,6 +100,8 @@ def run(options: argparse.Namespace) -> int:
     prepare = PrepareOptions(tare=None if options.tare == "auto" else options.tare, polarity=options.polarity)
     unit = None
     if options.sensor is not None:
+        from ...recordings import electrode_gains  # reads by msgspec
+
         unit = electrode_gains.read(options.sensor).gains_for(path, split(path).section, options.sensor, sensor)
     view = live.View(tools, options.rate, prepare, unit)
     for sentence in tools.drawer.describe_gel():
