@@ -27,6 +27,7 @@ from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, same_line, thickness_under
+from ..pictures.body_heights import out_of_body
 from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
@@ -92,7 +93,8 @@ class Gel:
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
         self._touch: tuple[Pose, float] | None = None  # the first touch found last, and the greatest depth there, m
-        self._contact = GelContact.untouched(len(self.surface.rest), Pose(np.zeros(3), np.eye(3), PUSH))
+        self._under = Pose(np.zeros(3), np.eye(3), PUSH)  # of the contact that was solved last
+        self._contact = GelContact.untouched(len(self.surface.rest), self._under)
 
     def press(self, pose: Any, force: float | None = None) -> GelContact:
         """Move the indenter to a pose, along a straight line from the last one, and return the contact there.
@@ -159,14 +161,17 @@ class Gel:
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
-        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact. Where a hard
-        slide folds the gel over itself a height is a guess. Raises TactileError for the BioTac, and for a gel without a
-        calibration."""
+        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact, in which it
+        follows the indenter between its nodes, too. Where a hard slide folds the gel over itself a height is a guess.
+        Raises TactileError for the BioTac, and for a gel without a calibration."""
         if not sensors.is_gel(self.sensor):
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
             raise TactileError("Gel, picture", found, "a Gel of a sensor with a camera, as the DIGIT")
+        camera = self._renderer.camera
         with folds_counted():
-            return gel_mapper(self._renderer.camera)(self._contact.displacement)
+            heights = gel_mapper(camera)(self._contact.displacement)
+        touching = (self.surface.rest + self._contact.displacement)[self._contact.patch]
+        return out_of_body(heights, camera, self.indenter, self._under, touching)
 
     def picture(self) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 of the last contact. Raises TactileError for a sensor without camera."""
@@ -282,6 +287,7 @@ class Gel:
         if found is None:
             return dataclasses.replace(GelContact.untouched(len(self.surface.rest), pose), flags=tuple(flags))
         linear, nodes = found.linear, self._compliance.touchable[found.linear.nodes]
+        self._under = linear.pose
         pressed = traction(self.sensor, nodes, found.corrected.factor * linear.nodal_force)
         patch = np.zeros(len(pressed), bool)
         patch[nodes] = True

@@ -1,0 +1,47 @@
+"""Heights of gel under a body whose shape and pose are known.
+
+Contact is solved at nodes; between them the surface's spline dips into a body finer than their spacing, as an edge, a
+letter or a groove. No gel is inside a rigid body: there its heights are the body's own, at each pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry.indenters import Indenter, Pose
+from ..sensors.camera import Camera
+from .height_map import MOVE_TOLERANCE
+
+_ROUNDS = 6  # of Newton's method, at most; at walls that stand nearly upright the last 15 um of 300 may be left
+_LEAST_SLOPE = 0.2  # of the distance along +y, by which a step is divided: a surface 80 degrees steep
+_BEYOND = 0.5e-3  # m, beyond the outermost nodes that touch: more than a gel's spacing
+
+
+def out_of_body(
+    heights: np.ndarray, camera: Camera, indenter: Indenter, pose: Pose, touching: np.ndarray
+) -> np.ndarray:
+    """Return heights (H, W) float32, m, of gel raised along +y out of the body that presses it.
+
+    heights : (H, W) m, of ``HeightMapper`` for the same camera; pose : of the body, in the sensor's frame
+    touching : (k, 3) m, the displaced nodes that touch; pixels beyond them stay as they are"""
+    rows, columns = (
+        np.flatnonzero((seen > places.min(initial=np.inf) - _BEYOND) & (seen < places.max(initial=-np.inf) + _BEYOND))
+        for seen, places in ((camera.gel_x, touching[:, 0]), (camera.gel_z, touching[:, 2]))
+    )
+    if not (len(rows) and len(columns)):
+        return heights
+    near = np.ix_(rows, columns)
+    x, z = np.meshgrid(camera.gel_x[rows], camera.gel_z[columns], indexing="ij")
+    points = np.stack([x, heights[near] + camera.height_zero_y, z], axis=-1).reshape(-1, 3)
+    gap, gradient = pose.distance(indenter, points)
+    lowest, inside = points[:, 1].copy(), gap < 0
+    left = np.flatnonzero(inside)
+    for _ in range(_ROUNDS):
+        points[left, 1] -= gap[inside] / np.maximum(gradient[inside, 1], _LEAST_SLOPE)
+        gap, gradient = pose.distance(indenter, points[left])
+        inside = np.abs(gap) > MOVE_TOLERANCE
+        left = left[inside]
+        if not len(left):
+            break
+    found = heights.copy()
+    found[near] += np.maximum(points[:, 1] - lowest, 0).reshape(x.shape)
+    return found
