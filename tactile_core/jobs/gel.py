@@ -1,9 +1,4 @@
-"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out.
-
-gel = Gel("digit", indenter=Sphere(3e-3))
-for pose in poses:                      # 4 x 4, or (position, quaternion), in the sensor's frame
-    contact = gel.press(pose)
-    picture = gel.picture()"""
+"""A fingertip in a simulator's loop: the pose of an indenter in, the contact and the camera's picture out."""
 
 from __future__ import annotations
 
@@ -27,8 +22,8 @@ from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, same_line, thickness_under
-from ..pictures.body_heights import out_of_body
 from ..pictures.height_map import folds_counted, gel_mapper
+from ..pictures.known_body import checked_texture, out_of_body, reflectance_on
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
@@ -61,6 +56,9 @@ class Gel:
     friction : Coulomb's coefficient; 0 for none
     calibration : the camera and its lights, of ``load_calibration``, or their file; None for the one that ships
     preset : of the pictures
+    texture : (h, w), 0 black to 1 white or 8 bits, of the indenter: what shows through the coating where it touches.
+        It spans the body, columns along its own x, rows from the greatest own y down; a photograph of the face that
+        presses is its mirror image. None for the calibration's reflectance everywhere
     Raises TactileError for another sensor, and for meshes and values that no indenter can have; ModuleNotFoundError
     without the extra [fem], and without [render] for presets other than ``fast``.
     """
@@ -68,6 +66,7 @@ class Gel:
     def __init__(
         self, sensor: str = sensors.TARGET, indenter: Any = None, *,
         friction: float = FRICTION, calibration: Calibration | str | os.PathLike[str] | None = None, preset: str = FAST,
+        texture: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         if preset not in NAMES:
             raise TactileError("Gel, preset", repr(preset), f"one of {', '.join(NAMES)}")
@@ -77,6 +76,7 @@ class Gel:
         self.sensor, self.preset = sensor, preset
         self.friction = finite_number(friction, "Gel, friction", "a coefficient of zero or more", 0.0)
         self.indenter: Indenter = as_indenter(indenter)
+        self.texture = None if texture is None else checked_texture(texture)
         self.surface = sensors.sensor_surface(sensor)
         self._calibration = None if calibration is None else calibration_of(calibration, "Gel, calibration")
         if self._calibration is not None and self._calibration.camera.sensor != sensor:
@@ -175,8 +175,10 @@ class Gel:
 
     def picture(self) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 of the last contact. Raises TactileError for a sensor without camera."""
-        heights = self.height_map()
-        return self._renderer(heights, self._renderer.marks(self._contact.displacement))
+        heights, reflectance = self.height_map(), None
+        if self.texture is not None:
+            reflectance = reflectance_on(self.texture, heights, self._renderer.camera, self.indenter, self._under)
+        return self._renderer(heights, self._renderer.marks(self._contact.displacement), reflectance)
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.

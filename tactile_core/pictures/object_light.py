@@ -21,7 +21,10 @@ def contact_share(risen: np.ndarray) -> np.ndarray:
     return share.clip(0, 1, out=share)
 
 
-def object_light(unit: Calibration, risen: np.ndarray) -> np.ndarray:
-    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by ``risen`` (H, W) m."""
-    levels = (unit.through * unit.facing).astype(np.float32)
-    return levels[:, None, None] * contact_share(risen)
+def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
+    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by ``risen`` (H, W) m.
+    reflectance : (H, W) of the object at each pixel, 0 black to 1 white; None for the calibration's, everywhere"""
+    amount, share = unit.through, contact_share(risen)
+    if reflectance is not None:
+        amount, share = unit.coating.transmission, share * reflectance
+    return (amount * unit.facing).astype(np.float32)[:, None, None] * share

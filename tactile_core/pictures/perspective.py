@@ -92,19 +92,20 @@ class Perspective:
         below = np.full(self.camera.shape, low)
         open_ = np.ones(self.camera.shape, bool)
         for level in np.linspace(high, low, MARCH_LEVELS + 1, dtype=np.float32)[1:]:
-            hidden = open_ & (self._at(height, np.full_like(above, level)) >= level)
+            hidden = open_ & (self.seen_of(height, np.full_like(above, level)) >= level)
             below[hidden] = level
             open_ &= ~hidden
             above[open_] = level
         for _ in range(BISECTIONS):
             middle = (above + below) / 2
-            hidden = self._at(height, middle) >= middle
+            hidden = self.seen_of(height, middle) >= middle
             below = np.where(hidden, middle, below)
             above = np.where(hidden, above, middle)
         return (above + below) / 2
 
-    def _at(self, height: np.ndarray, level: np.ndarray) -> np.ndarray:
-        return bilinear(height, *self._places(1 - level * self.inverse))
+    def seen_of(self, values: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        """Return what the pixels see of a map ``values`` (H, W) float32 of gel that they see at heights (H, W) m."""
+        return bilinear(values, *self._places(1 - seen * self.inverse))
 
 
 def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:

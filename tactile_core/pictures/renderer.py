@@ -100,12 +100,16 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
-    def __call__(self, height_map: np.ndarray, marks: np.ndarray | None = None) -> np.ndarray:
+    def __call__(
+        self, height_map: np.ndarray, marks: np.ndarray | None = None, reflectance: np.ndarray | None = None
+    ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 of a height_map (H, W) m; equal to the background where nothing changed.
-        marks : (H, W) share of light that dots leave, from ``marks``; required for a unit with dots"""
+        marks : (H, W) share of light that dots leave, from ``marks``; required for a unit with dots
+        reflectance : (H, W), 0 black to 1 white, of the object behind each point of height_map, whose light shows
+            through the coating where it touches; None for the calibration's ``object_reflectance`` everywhere"""
         if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
             return self._rest_picture.copy()
-        return self.picture(self.radiance(height_map), marks=marks)
+        return self.picture(self.radiance(height_map, reflectance), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
         """Yield pictures (H, W, 3) uint8 of a height_map (H, W) m, less and less noisy; the last is that of a call.
@@ -133,24 +137,32 @@ class Renderer:
         """Return the share (H, W) of light that dots leave under displacement (n_nodes, 3) m; None without dots."""
         return None if self.dots is None else self.dots.marks(displacement)
 
-    def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m."""
-        return self._spread_radiance(self._heights(height_map, "height map"))
+    def radiance(self, height_map: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
+        """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m.
+        reflectance : see ``__call__``"""
+        if reflectance is not None:
+            reflectance = camera_array(reflectance, self.camera.shape, "reflectance")
+            if reflectance.min() < 0 or reflectance.max() > 1:
+                found = f"values from {reflectance.min():g} to {reflectance.max():g}"
+                raise TactileError("reflectance", found, "0 black to 1 white", "Divide grey levels by 255")
+        return self._spread_radiance(self._heights(height_map, "height map"), reflectance)
 
-    def _spread_radiance(self, heights: np.ndarray) -> np.ndarray:
+    def _spread_radiance(self, heights: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
         seen = self.view(heights)
         if self._light is not None:
-            return self._completed(np.moveaxis(self._light.radiance(heights), -1, 0), seen)
+            return self._completed(np.moveaxis(self._light.radiance(heights), -1, 0), seen, reflectance)
         light = self._lamps.light(self.view, seen)
         light *= self.calibration.facing.astype(np.float32)[:, None, None]
-        return self._completed(light, seen)
+        return self._completed(light, seen, reflectance)
 
-    def _completed(self, light: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Return (H, W, 3): the LEDs' radiance (3, H, W), the ambient light of gel seen at heights (H, W) m and the
-        light of the touching object, spread by the coating."""
+    def _completed(self, light: np.ndarray, seen: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
+        """Return (H, W, 3): the LEDs' radiance (3, H, W) and the ambient light of gel seen at heights (H, W) m, spread
+        by the coating, and the light of the touching object. reflectance : see ``__call__``"""
         spread = self._spread(light + raised_light(self.calibration, seen))
-        if self.calibration.through:
-            spread += object_light(self.calibration, seen - self.view.start)
+        if reflectance is not None:
+            reflectance = self.view.seen_of(reflectance, seen)
+        if reflectance is not None or self.calibration.through:
+            spread += object_light(self.calibration, seen - self.view.start, reflectance)
         return np.moveaxis(spread, 0, -1)
 
     def picture(

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 import trimesh
 
+from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Box, Cylinder, Sphere
 from tactile_core.jobs.gel import Gel
 from tactile_core.mechanics.fast.active_set import UnsolvedError
 from tactile_core.pictures.calibrate.ball_print import print_on
 from tactile_core.pictures.height_map import gel_mapper
+from tactile_core.pictures.renderer import Renderer
 
 
 def pressed(indenter, depth, friction=0.5):
@@ -104,3 +106,43 @@ def test_a_contact_beside_the_picture_changes_nothing_in_it():
     gel.press(gel.touching(3e-3, 0.0, 0.2e-3))
     assert gel.contact.patch.any()
     assert (gel.height_map() == gel_mapper()(gel.contact.displacement)).all()
+
+
+def test_a_texture_shows_through_where_the_body_touches_and_turns_with_it():
+    """One dark quarter, at own +x and +y: darker in the picture there; the body's reflectance is the calibration's."""
+    texture = np.full((60, 60), 255, np.uint8)
+    texture[:30, 30:] = 0  # rows from the greatest own y down
+    white, marked = (Gel("digit", Box((6e-3,) * 3, 0.1e-3), texture=each) for each in (np.ones((2, 2)), texture))
+    camera = gel_mapper().camera
+    x, z = np.meshgrid(camera.gel_x + 7e-3, camera.gel_z, indexing="ij")
+    for turned in (1, -1):
+        pose = white.touching(-7e-3, 0.0, 0.3e-3)
+        pose[:3, :2] *= turned  # half a turn about own z
+        for gel in (white, marked):
+            gel.reset()
+            gel.press(pose)
+        apart = white.picture().astype(int) - marked.picture()
+        own_x, own_y = turned * x, turned * z  # of ``touching``: own y along z
+        dark = (own_x > 0.3e-3) & (own_y > 0.3e-3) & (own_x < 2.5e-3) & (own_y < 2.5e-3)
+        light = ((own_x < -0.3e-3) | (own_y < -0.3e-3)) & (np.abs(x) < 5e-3)
+        assert apart[dark].mean() > 5
+        assert (apart[light] == 0).all()
+    untouched = Gel("digit", Box((6e-3,) * 3, 0.1e-3), texture=texture)
+    assert (untouched.picture() == Gel("digit", Sphere(1e-3)).picture()).all()
+
+
+@pytest.mark.parametrize(
+    ("texture", "words"),
+    [(np.ones((4, 4, 3)), "Average"), (np.full((4, 4), 7.0), "Divide"), (np.full((4, 4), np.nan), "nan"),
+     (np.ones((1, 4)), "2 x 2"), ([["a"]], "grey")],
+)  # fmt: skip
+def test_what_is_no_texture_is_refused(texture, words):
+    with pytest.raises(TactileError, match=words):
+        Gel("digit", Sphere(3e-3), texture=texture)
+
+
+def test_what_is_no_reflectance_is_refused():
+    renderer = Renderer(preset="fast")
+    for reflectance, words in ((np.ones((2, 2)), "shape"), (np.full(renderer.camera.shape, 2.0), "Divide")):
+        with pytest.raises(TactileError, match=words):
+            renderer(gel_mapper().rest + np.float32(1e-4), reflectance=reflectance)

@@ -1,4 +1,4 @@
-"""Heights of gel under a body whose shape and pose are known.
+"""What pixels show of gel under a body whose shape, pose and texture are known.
 
 Contact is solved at nodes; between them the surface's spline dips into a body finer than their spacing, as an edge, a
 letter or a groove. No gel is inside a rigid body: there its heights are the body's own, at each pixel."""
@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import TactileError
 from ..geometry.indenters import Indenter, Pose
 from ..sensors.camera import Camera
 from .height_map import MOVE_TOLERANCE
+from .perspective import lookup
 
 _ROUNDS = 6  # of Newton's method, at most; at walls that stand nearly upright the last 15 um of 300 may be left
 _LEAST_SLOPE = 0.2  # of the distance along +y, by which a step is divided: a surface 80 degrees steep
@@ -45,3 +47,34 @@ def out_of_body(
     found = heights.copy()
     found[near] += np.maximum(points[:, 1] - lowest, 0).reshape(x.shape)
     return found
+
+
+def checked_texture(texture: np.ndarray) -> np.ndarray:
+    """Return a texture (h, w), 0 black to 1 white or grey levels of 8 bits, as float32 from 0 to 1. Raises
+    TactileError for another."""
+    values = np.asarray(texture)
+    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "uf":
+        found, expected = f"{values.dtype} of shape {values.shape}", "grey (h, w), 2 x 2 or more"
+        raise TactileError("texture", found, expected, "Average the three colours of a picture")
+    values = values.astype(np.float32) / np.float32(255 if values.dtype == np.uint8 else 1)
+    if not (values.min() >= 0 and values.max() <= 1):
+        found = f"values from {values.min():g} to {values.max():g}"
+        raise TactileError("texture", found, "0 black to 1 white, or 8 bits", "Divide grey levels by 255")
+    return values
+
+
+def reflectance_on(
+    texture: np.ndarray, heights: np.ndarray, camera: Camera, indenter: Indenter, pose: Pose
+) -> np.ndarray:
+    """Return the reflectance (H, W) float32 of the body behind gel at heights (H, W) m.
+
+    texture : (h, w) of ``checked_texture``, projected along the body's own z over its ``bounds``: columns along own x,
+        rows against own y, so that the first row is at the greatest y; 0 beside the body"""
+    x, z = np.meshgrid(camera.gel_x, camera.gel_z, indexing="ij")
+    own = pose.to_own(np.stack([x, heights + camera.height_zero_y, z], axis=-1).reshape(-1, 3))
+    lower, upper = indenter.bounds()
+    share = ((own - lower) / (upper - lower)).astype(np.float32)  # 0 to 1 over the body
+    behind = ((share[:, :2] >= 0) & (share[:, :2] <= 1)).all(axis=1)
+    rows, columns = texture.shape
+    at = lookup((1 - share[:, 1]) * rows - 0.5, share[:, 0] * columns - 0.5, texture.shape)
+    return (at(texture) * behind).reshape(heights.shape)
