@@ -104,7 +104,7 @@ class Perspective:
         return (above + below) / 2
 
     def seen_of(self, values: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Return what the pixels see of a map ``values`` (H, W) float32 of gel that they see at heights (H, W) m."""
+        """Return what the pixels see (H, W) of a map ``values`` (H, W) float32; seen : (H, W) m, heights they see."""
         return bilinear(values, *self._places(1 - seen * self.inverse))
 
 
