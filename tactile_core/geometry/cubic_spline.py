@@ -32,18 +32,19 @@ class EvenSpline:
         return self.start + self.step * np.arange(self.count)
 
     def refined(self, factor: int) -> EvenSpline:
-        """Return the spline on a grid with factor intervals for each of this one, same ends."""
+        """Return a spline whose grid has ``factor`` intervals for each of this one's, with the same ends."""
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return, for each position (n,), its first of four coefficients (n,) and its place (n,), 0..1, in the cell."""
+        """Return, for each position (n,), the index (n,) of its first of four coefficients, and its place (n,), 0 to 1,
+        in the interval between two nodes."""
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Return the matrix (n, count) from values at nodes to the spline at position (n,), by derivative 1 to its
-        slope."""
+        """Return the matrix (n, count) from values at nodes to the spline's values at position (n,), or, with
+        derivative 1, to its slopes there."""
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)
@@ -87,15 +88,15 @@ _STEPS = np.arange(-1, 3)[:, None]
 def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray:
     """Return points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
 
-    axes : contiguous
-    closed : whether the last column joins the first; places beyond other ends lie on them
+    axes : contiguous; places : real-valued, node (i, j) at (i, j)
+    closed : true if the last column joins the first; places beyond an end that is not joined count as the end
     """
     return _points_on_grid(axes, np.ascontiguousarray(places, float), closed)
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return, for places (2, n) as (row, column) of a grid of ``shape`` (rows, columns), the 4 x 4 nodes (4, 4, n)
-    around each, as row * columns + column, and their Catmull-Rom weights. closed : the last column joins the first"""
+    around each, as row * columns + column, and their Catmull-Rom weights (4, 4, n). closed : see ``on_grid``"""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)
@@ -113,7 +114,8 @@ def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tupl
 
 
 def catmull_rom(t: np.ndarray | float) -> np.ndarray:
-    """Return the weights (4, ...) of the nodes -1, 0, 1, 2 at places t between 0 and 1: cubic, once differentiable."""
+    """Return the weights (4, ...) of the nodes -1, 0, 1, 2 at places t (...) between 0 and 1: cubic, once
+    differentiable."""
     square = t * t
     cube = square * t  # numpy's general power takes ten times as long
     return np.array([

@@ -51,30 +51,29 @@ class Lattice:
 
     @functools.cached_property
     def axes(self) -> np.ndarray:
-        """The resting nodes of the grid axis by axis, (3, rows, columns) m."""
+        """Resting nodes of the grid, poles left out, axis by axis, (3, rows, columns) m."""
         return np.ascontiguousarray(np.moveaxis(self.grid(self.rest), 2, 0))
 
     @functools.cached_property
     def window_rest(self) -> np.ndarray:
-        """The resting nodes (rows, columns, 3) m of the window."""
+        """Resting nodes (rows, columns, 3) m of the window, which the surface must have."""
         return self.grid(self.rest)[self.window]
 
     @functools.cached_property
     def window_axes(self) -> tuple[EvenSpline, EvenSpline]:
-        """Splines through the window's nodes along x and across z."""
+        """Splines through the window's nodes: through their x, m, by row, and through their z, m, by column."""
         return EvenSpline.through(self.window_rest[:, 0, 0]), EvenSpline.through(self.window_rest[0, :, 2])
 
     def grid(self, values: np.ndarray) -> np.ndarray:
-        """Return the values at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
+        """Return ``values`` at nodes (..., n_nodes, k) as a grid (..., rows, columns, k); poles left out."""
         rows, columns = self.shape
         values = np.asarray(values)
         return values[..., : rows * columns, :].reshape(*values.shape[:-2], rows, columns, values.shape[-1])
 
 
 def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
-    """Return the triangles of a grid, two per cell, outward if the cross product (row x column) points outward.
-
-    closed : the last column joins the first. Returns (n, 3) int32.
+    """Return the triangles (n, 3) int32 of a grid, two per cell, nodes counted row by row; outward if the cross product
+    of the steps to the next row and to the next column is. closed : true if the last column joins the first
     """
     row = np.arange(rows - 1)[:, None]
     column = np.arange(columns if closed else columns - 1)[None, :]
@@ -86,7 +85,7 @@ def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
 
 
 def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
-    """Return a fan of triangles that closes a ring of nodes at a pole; (n, 3) int32."""
+    """Return a fan of triangles (n, 3) int32 that closes a ring (n,) of nodes at a pole; nodes by number."""
     return np.stack([np.full(len(ring), pole), ring, np.roll(ring, -1)], -1).astype(np.int32)
 
 
@@ -98,7 +97,8 @@ _STEEPEST = 1.1  # largest slope of a distance: 1, and a little more for a mesh'
 
 
 class LatticeBlocks:
-    """Blocks of nodes ``rest`` (n, 3) m on a grid of ``shape`` (rows, columns); each node after the grid is a block."""
+    """Search index: blocks of 6 x 6 nodes, of ``rest`` (n, 3) m on a grid of ``shape`` (rows, columns), looked at only
+    where near; each node after the grid, a pole, is a block."""
 
     def __init__(self, rest: np.ndarray, shape: tuple[int, int]) -> None:
         row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])

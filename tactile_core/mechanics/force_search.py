@@ -37,16 +37,18 @@ def touch_at_force(
     guess: float | None = None,
     slid_to: float | None = None,
 ) -> _Found:
-    """Find the contact whose force along ``direction`` (3,) is ``force``, N, by secants of F^(2/3) and by bisection.
-
-    move : solves the contact at a depth, m, going on from another one; last : the contact to begin from
-    limit : m, greatest depth; guess : m, a depth near the one sought
-    slid_to : m, depth of first touch here; given if the indenter has slid since ``last``
-    Raises TactileError, which begins with ``where``, if no depth is found; UnreachableError beyond the limit.
+    """Find the contact whose force along ``direction`` (3,), a unit vector, is ``force``, N, to a thousandth, by
+    secants of F^(2/3) and by bisection.
+    move : function of a depth, m, and a solved contact that solves the one at that depth, going on from the other
+    last : the contact to begin from
+    limit : m, greatest depth; guess : m, a depth near the one sought (None: an eighth of the limit)
+    slid_to : m, depth of first touch here; given if the indenter has slid since ``last``, else None
+    Raises TactileError, which begins with ``where``, if no depth is found in 30 steps; UnreachableError beyond the
+    limit.
     """
     goal, before = _root(force), last
     low, high = (before.depth, _root(before.force @ direction)) if slid_to is None else (slid_to, 0.0), None
-    lets_go = low[1] > goal
+    lets_go = low[1] > goal  # the last contact bears more: go back toward first touch
     if lets_go:
         low, high = (0.0, 0.0), low
     depth = _next_depth(low, high, goal, limit) if lets_go else max(low[0], min(guess, limit) if guess else limit / 8)
@@ -67,7 +69,7 @@ def touch_at_force(
 
 
 def unreachable(where: str, force: float, limit: float) -> UnreachableError:
-    """Return the error for a force, N, that no depth within the limit, m, gives."""
+    """Return the error for a force, N, that no depth within the limit, m, gives; ``where`` begins its text."""
     expected = f"a force that is found within {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
     return UnreachableError(where, f"force {force:g} N", expected, "Press less, or to a depth")
 
@@ -80,8 +82,9 @@ def _root(force: float) -> float:
 def _next_depth(
     low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
 ) -> float:
-    """Return the depth, m, to try next for F^(2/3) = goal, from (depth, F^(2/3)) known ``low``, below it, and ``high``,
-    above it, None so far. limit : m, greatest depth, a quarter of which is the longest step up; halve : bisect"""
+    """Return the depth, m, to try next for F^(2/3) = goal, from two known pairs (depth, F^(2/3)): ``low`` below the
+    goal, and ``high`` above it, None if none is known yet.
+    limit : m, greatest depth, a quarter of which is the longest step up; halve : bisect instead of the secant's step"""
     if high is None:
         slope = low[1] / low[0] if low[0] else 0.0
         return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)

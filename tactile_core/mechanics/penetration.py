@@ -35,11 +35,11 @@ class PenetrationError(TactileError):
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
-    """Return the largest penetration, m, of a body under a surface grid (rows, columns, 3) m at nodes and halfway
-    between.
+    """Return the largest penetration, m, of an indenter through a surface ``grid`` (rows, columns, 3) m, at nodes and
+    halfway between; 0 if it reaches neither.
 
-    closed : the last column joins the first; where : begins the error's text
-    Raises PenetrationError if it is over 0.1 mm and over ``share`` of the body's ``depth``, m."""
+    closed : true if the grid's last column joins the first; where : begins the error's text
+    Raises PenetrationError for one over 0.1 mm and over ``share`` of the indenter's ``depth``, m from first touch."""
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
     near = np.array(np.divmod(np.flatnonzero(gap < _CLOSE), columns), float)
@@ -55,8 +55,9 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """Return the depth, m, of a body's foremost point under a surface ``grid`` (rows, columns, 3) m; 0 if it lies
-    apart. closed : true if the grid's last column joins the first"""
+    """Return the depth, m, of an indenter's foremost point under a surface ``grid`` (rows, columns, 3) m, negative
+    outside it; 0 if no node is near that point's line, or it is not of the body (the middle of a ring).
+    closed : true if the grid's last column joins the first"""
     foremost = pose.support(indenter, pose.direction)
     met = None
     if abs(pose.distance(indenter, foremost[None])[0][0]) < _ON_BODY:
@@ -68,10 +69,12 @@ def check_follows(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
     closed: bool, behind: float = BEHIND,
 ) -> None:  # fmt: skip
-    """Raise PenetrationError where a body, ``depth`` m deep, has passed in between a surface's nodes.
-
-    grid : (rows, columns, 3) m, the nodes; closed : whether its last column joins the first
-    normals : (k, 3) of the body, at the nodes that carry force; behind : least allowed cosine between them and motion
+    """Raise PenetrationError where an indenter, ``depth`` m beyond first touch, has passed in between a surface's
+    nodes.
+    where : begins the error's text; grid : (rows, columns, 3) m, the nodes; closed : true if its last column joins the
+        first
+    normals : (k, 3), outward, of the indenter at the nodes that carry force
+    behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back
     """
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
@@ -102,8 +105,8 @@ _NEAR = 0.5e-3  # m, from the indenter to points whose curvature counts
 
 
 def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
-    """Return an indenter's least radius of curvature, m, at its tip and at those points (n, 3) m near it; inf: none
-    is."""
+    """Return an indenter's least radius of curvature, m, at its tip and at those of ``points`` (n, 3) m that lie within
+    0.5 mm outside it; 10 um at least, infinity where none is so near."""
     points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
     gap, _ = pose.distance(indenter, points)
     near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)

@@ -49,7 +49,8 @@ def same_line(first: Pose, second: Pose) -> bool:
 
 
 def between(first: Pose, second: Pose, share: float) -> Pose:
-    """Return the pose at a share 0..1 of the way: apex on a straight line, axes turned about one axis (Rodrigues)."""
+    """Return the pose at a ``share``, 0 (first) to 1 (second), of the way: apex on a straight line, axes turned about
+    one axis (Rodrigues' formula)."""
     apex = first.apex + share * (second.apex - first.apex)
     turn = second.axes @ first.axes.T
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
@@ -64,9 +65,8 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch.
-
-    ``_FARTHEST`` if the indenter has slid off the sensor.
+    """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch; negative
+    where the resting surface rises. ``_FARTHEST`` if the indenter has slid off the sensor.
     """
     if same_line(pose, slid):
         return 0.0
@@ -103,8 +103,8 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 
 
 def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
-    """Find first touch of an indenter that comes along a pose's direction from outside, wherever on its line it stands.
-
+    """Find first touch of an indenter that comes from outside along the direction of ``pose``, which may stand anywhere
+    on that line.
     Raises TactileError if it passes the sensor by.
     """
     before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
@@ -112,10 +112,10 @@ def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pos
 
 
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
-    """Find where a body's foremost point meets a surface: row and column, real-valued, (1, 2), and point (1, 3) m.
-
-    axes : (3, rows, columns) m, the surface's nodes; closed : whether its last column joins the first
-    None if no node lies near the point's line.
+    """Find where the line on which an indenter's foremost point moves meets a surface, on the side met first.
+    axes : (3, rows, columns) m, x, y, z of the surface's nodes; closed : true if its last column joins the first
+    Returns the place (1, 2), row and column with fractions, and the point (1, 3) m; None if no node lies within 1 mm of
+    the line.
     """
     foremost = pose.support(indenter, pose.direction)
     along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
@@ -142,7 +142,8 @@ def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> t
 
 
 def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
-    """Find the pose at first touch of nodes or ``more`` points (j, 3) m, and those close then, nearest first."""
+    """Find the pose at first touch of the lattice's nodes or of ``more`` points (j, 3) m, and the numbers of at most 12
+    that are close then, nearest first; ``more`` are numbered from the lattice's last node on."""
     rest = np.concatenate([lattice.rest, more]) if len(more) else lattice.rest
     for clear in _CLEAR:
         away, reach = pose.moved(-clear), 2 * clear
@@ -174,7 +175,7 @@ def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose
 
 
 def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, reach: float) -> tuple:
-    """Return nodes (k,) less than ``reach`` m outside an indenter, and distances (k,) m. Points ``more`` (p, 3) m
+    """Return nodes (k,) less than ``reach`` m outside an indenter, and their distances (k,) m. Points ``more`` (p, 3) m
     follow, near or not, numbered from the lattice's last node on."""
     nodes, gap = lattice.blocks.near(indenter, pose, reach)
     if len(more):
@@ -184,9 +185,9 @@ def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, re
 
 
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
-    """Move until the first of the points (n, 3) m is touched, by ``_FARTHEST`` at most, if it slides past them all.
-
-    Newton's steps never overshoot a convex part; past another one, the negative distance leads back.
+    """Move an indenter until it touches the first of the points (n, 3) m; by ``_FARTHEST`` at most, if it slides past
+    them all.
+    Newton's steps never overshoot a convex part; where one overshoots another part, the negative distance leads back.
     """
     own, travel, left = pose.to_own(points), 0.0, _FARTHEST
     ahead = pose.own_direction  # in its frame points come the other way
@@ -211,9 +212,9 @@ FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, 
 class Placement:
     """Place and angle of an indenter, the same for both sensors.
 
-    x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto it
+    x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto them
     tilt : rad, between the indenter's axis and the surface normal; at most 0.8 either way
-    tilt_heading : rad, the way its upper end leans: 0 toward +x, pi / 2 toward -z
+    tilt_heading : rad, the way the indenter's upper end leans: 0 toward +x, pi / 2 toward -z
     Raises TactileError for a larger tilt.
 
     >>> tactile.Placement(x=2e-3, z=0.0, tilt=0.1)
@@ -234,9 +235,8 @@ class Placement:
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
-    """Pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z) of a gel.
-
-    The indenter's tilt is from the surface normal there.
+    """Find the pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z) of a
+    gel. The indenter's tilt is from the surface normal there.
     """
     point, outward = sensors.surface_point(sensor, place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
@@ -264,5 +264,6 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """Return the depth, m, of a share of the thickness under an indenter at first touch; at most 2.4 mm."""
+    """Return the depth, m, that is ``share`` of the thickness under an indenter whose ``pose`` is at first touch; at
+    most 2.4 mm."""
     return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)

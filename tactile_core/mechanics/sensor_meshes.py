@@ -26,9 +26,9 @@ _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int
 
 def vtk_order() -> np.ndarray:
     """Return the node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
-
-    VTK counts corners, then edges, faces -x +x -y +y -z +z and the middle, bottom before top and the bottom's edges
-    before the upright ones last: Schroeder, Martin, Lorensen, The Visualization Toolkit, vtkTriQuadraticHexahedron.
+    VTK counts corners, edges (of the bottom, of the top, then the upright ones), faces -x +x -y +y -z +z and the
+    middle; bottom corners before top ones: Schroeder, Martin, Lorensen, The Visualization Toolkit,
+    vtkTriQuadraticHexahedron.
     """
     square = [(0, 0), (2, 0), (2, 2), (0, 2)]
     sides = [(1, 0), (2, 1), (1, 2), (0, 1)]
@@ -65,7 +65,8 @@ def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, col
 
 
 def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> None:
-    """Write a surface, binary STL: triangles ``faces`` (m, 3) of nodes (n, 3) m and their unit normals, float32, m.
+    """Write a surface, binary STL: triangles ``faces`` (m, 3) int, outward, of nodes (n, 3), m, and unit normals,
+    float32.
     Raises what ``write_ply`` raises."""
     corners = _checked(path, "nodes", nodes, len(nodes))[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -78,11 +79,12 @@ def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> 
 def write_vtu(
     path: str | os.PathLike, mesh: HexMesh, solid: FiniteStrainSolid | None = None, state: State | None = None
 ) -> None:
-    """Write a volume of triquadratic hexahedra, at rest or with a solved ``state`` of its ``solid``.
-
-    At points ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that the outside exerts on each node
-    (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and ``von_mises`` Pa of it, see
-    ``stress.at_nodes``; in cells ``von_mises``, mean over the cell's volume, and ``pressure`` Pa, compression positive.
+    """Write a volume of triquadratic hexahedra, at rest or with a solved ``state`` of its ``solid`` (give both or
+    none).
+    Points have ``clamped`` (0 or 1) and, if solved, ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that
+    the outside exerts on each node (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and that
+    stress's ``von_mises`` Pa, see ``stress.at_nodes``; cells have ``von_mises``, mean over the cell's volume, and
+    ``pressure`` Pa at the cell's middle, compression positive.
     Raises what ``write_ply`` raises, and FloatingPointError for a state that is turned inside out.
     """
     point_data: Data = {"clamped": mesh.clamped.astype(np.uint8)}
@@ -94,7 +96,7 @@ def write_vtu(
 
 
 def solid_data(solid: FiniteStrainSolid, state: State) -> tuple[Data, Data]:
-    """Return the point and cell data of ``write_vtu`` by name."""
+    """Return the point data and the cell data of a solved state by name, as listed in ``write_vtu``."""
     cauchy = stress.cauchy(solid, state)
     at_nodes = stress.at_nodes(solid, cauchy)
     six = [at_nodes[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
@@ -165,7 +167,7 @@ SUFFIXES = (".ply", ".stl", ".vtu")
 
 
 def check_suffix(path: str | os.PathLike) -> None:
-    """Raise TactileError for a file name that says none of the formats."""
+    """Raise TactileError for a file name that ends in none of ``SUFFIXES``, whatever the case."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"the ending {Path(path).suffix!r}", " or ".join(SUFFIXES), "It chooses the format")
 
@@ -202,7 +204,8 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the touchable side's mesh nodes (n,) and triangles (m, 3), outward: eight per quadratic face."""
+    """Return the touchable side's mesh nodes (n,), ascending, and triangles (m, 3) of positions in that list, outward:
+    eight per quadratic face, fewer where an edge is one node."""
     faces = outer_faces(mesh).reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T
@@ -215,8 +218,8 @@ def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
 def write_surface(
     path: str | os.PathLike, sensor: Sensor, displacement: np.ndarray, columns: Mapping[str, np.ndarray]
 ) -> None:
-    """Write a sensor's surface moved by ``displacement`` (n, 3) m; ``columns`` (n,) or (n, 3) by name go along.
-
+    """Write a sensor's surface moved by ``displacement`` (n, 3) m, in the format that the ending of ``path`` says, with
+    that displacement and ``columns``, (n,) or (n, 3) by name.
     PLY and STL hold the deformed places; VTU the resting ones and the displacement beside them, as VTK's own tools
     expect it. STL has no room for columns. Raises what the writers raise.
     """

@@ -38,8 +38,8 @@ _LAYER = 1e-3
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
     """Return the traction (n, 3) Pa on a resting surface under displacement (n, 3) m, touched in ``patch`` (n,) bool.
 
-    sensor : its name; nodes of the patch that cannot be touched carry none. Linear elasticity, the BioTac's fluid
-        included, its core left out."""
+    Nodes of the patch that cannot be touched, or would pull, carry none. Linear elasticity, the BioTac's fluid
+    included, its core left out."""
     compliance, areas = compliance_of(sensor), node_areas(sensor)
     outward = sensors.rest_normals(sensor)
     nodes = np.flatnonzero(patch[compliance.touchable])
@@ -75,7 +75,7 @@ USUAL_RADIUS = 4e-3  # m, the median of translated patches of the test contacts
 
 @dataclass(frozen=True)
 class BodyContact:
-    """A body pressed into a sensor. body : its shape; place : where, and which way it leans; force : N"""
+    """A body pressed into a sensor. body : its shape; place : where, and which way it leans; force : N, its size"""
 
     body: Indenter
     place: Placement
@@ -90,7 +90,8 @@ class BodyContact:
 
 
 def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Placement:
-    """Return the placement at (x, z) m of a press along ``motion`` (3,) into a surface of normal ``outward`` (3,)."""
+    """Return the placement at ``x``, ``z``, m, of a press along ``motion`` (3,), of any length, into a surface of
+    outward unit normal ``outward`` (3,); its tilt is cut to 0.8 rad."""
     along, side = tangents(outward)
     up = -motion / np.linalg.norm(motion)
     tilt = float(np.arccos(np.clip(up @ outward, -1, 1)))
@@ -99,8 +100,8 @@ def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Plac
 
 
 def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
-    """Radius, m, of the ball whose paraboloid fits a pressed patch best, within ``RADII``; USUAL_RADIUS for few nodes.
-
+    """Radius, m, of the ball whose paraboloid fits a pressed patch best, within ``RADII``; ``USUAL_RADIUS`` if the
+    patch has less than 5 nodes.
     points : (k, 3) m of its nodes, displaced; outward : (3,), normal of the patch
     """
     if len(points) < LEAST_NODES:
@@ -151,8 +152,9 @@ class _Trial:
 
 
 def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> BodyContact:
-    """Find the contact of a BioTac's skin displaced by (3650, 3) m: the most likely of `likely_contacts`.
-
+    """Find the body pressed into a BioTac's skin: the most likely of `likely_contacts`, whose arguments and errors
+    hold.
+    displacement : (3650, 3) m of the skin's nodes
     >>> contact = skin_contact(displacement, [tactile.indenters.Sphere(2e-3)])
     >>> gel = contact.on_gel().displacement
     """
@@ -211,7 +213,7 @@ def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
 
 
 def _moved(dent: _Dent, trial: _Trial) -> _Trial:
-    """Move a trial by the offset of its load's centre; returns the likelier of the two."""
+    """Press a trial's body again, its aim moved by how far its load's centre is off; return the likelier trial."""
     after = _trial(dent, trial.contact.body, trial.aim + dent.centre - trial.dent.centre)
     return trial if after is None or after.unlike > trial.unlike else after
 

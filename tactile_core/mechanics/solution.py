@@ -19,9 +19,9 @@ TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """A point of a path: ``depth`` m or ``force`` N along the motion, and ``slide`` (2,) m from the first touch.
+    """A point of a path: either ``depth``, m from first touch, or ``force``, N, along the motion; the other is None.
 
-    slide : along the finger and across it, in the indenter's own axes
+    slide : m, sideways from the place of first touch, along the indenter's own axes: one along the finger, one across
     """
 
     depth: float | None = None
@@ -42,17 +42,18 @@ class OnDemand:
 @dataclasses.dataclass(frozen=True, repr=False)
 class Solution(Summary):
     """A solved contact, SI units, whatever the tier.
-
-    tier : which solver made it; converged : whether it may be used; iterations : of its last step
+    tier : the solver; converged : false if the iteration ended early: do not use it; iterations : of its last step
     displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
     thickness : m, of the sensor at the place of first touch
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
-    pressure : Pa, rise of the BioTac's fluid pressure, 0 for the DIGIT
+    pressure : Pa, rise of the BioTac's fluid pressure, 0 for a gel
     centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
-    penetration : m, largest depth of a node in the indenter or the core; slipping : share of touching nodes that slip
-    core_nodes : number of inner-skin nodes that press on the core; load_steps : number since the solution before
-    volume : the solid and its state, of the full and the reference tier
-    between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points), if any
+    penetration : m, largest depth of a surface node in the indenter; of the fast tier, also of inner skin in the core
+    slipping : share, 0 to 1, of touching nodes that slip; 0 without friction
+    core_nodes : number of inner-skin nodes that press on the core; on_demand : functions behind the costly properties
+    load_steps : number since the solution before
+    volume : the solid and its state, of the full and the reference tier; None from the fast one
+    between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points); None without
     """
 
     tier: Tier
@@ -76,12 +77,14 @@ class Solution(Summary):
 
     @functools.cached_property
     def electrode_gaps(self) -> np.ndarray:
-        """Film (e,) m over each electrode; (0,) on a gel. The fast tier's is not corrected."""
+        """Thickness (e,) m of the fluid film over each electrode; (0,) on a gel. From the fast tier, that of its linear
+        part, without the learned correction."""
         return self.on_demand.electrode_gaps()
 
     @functools.cached_property
     def films(self) -> np.ndarray:
-        """Film (k,) m at the nodes of the conducting sheet; (0,) on a gel. The fast tier's is not corrected."""
+        """Thickness (k,) m of the fluid film at the nodes of the conducting sheet; (0,) on a gel. From the fast tier,
+        that of its linear part, without the learned correction."""
         return self.on_demand.films()
 
     @functools.cached_property
@@ -108,6 +111,7 @@ class Solution(Summary):
 
 
 def centre_of_pressure(places: np.ndarray, nodal_force: np.ndarray) -> np.ndarray:
-    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by nodal_force (k, 3) N; NaN without any."""
+    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by the size of nodal_force (k, 3) N; NaN where no
+    force is."""
     weight = np.linalg.norm(nodal_force, axis=1)
     return weight @ places[:, [0, 2]] / weight.sum() if weight.any() else np.full(2, np.nan)

@@ -71,7 +71,7 @@ def solve_path(
     limit: float | None = None,
 ) -> Iterator[Solution]:
     """Yield the solution of each step of a path; with friction each depends on the steps before.
-
+    sensor, indenter, place, tier, friction : as in ``solve``
     steps : taken one by one in the fast tier; all at once in the others, whose mesh is made for the deepest
     limit : m, the greatest depth (default: 60 % of the thickness there)
     Raises what ``solve`` raises; solutions already yielded hold.
@@ -132,11 +132,11 @@ def _check(step: Step, limit: float) -> None:
 def _guessed_depths(
     sensor: Sensor, indenter: Indenter, pose: Pose, steps: list[Step], limit: float, friction: float
 ) -> list[float]:
-    """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces, else the limit, m.
-    friction : Coulomb's coefficient"""
+    """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces; the limit, m, for
+    forces that it does not reach. friction : Coulomb's coefficient"""
     if not any(step.force for step in steps):
         return [step.depth or 0.0 for step in steps]
-    fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)
+    fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)  # any thickness: only errors, not asked for, need it
     depths = []
     try:
         for step in steps:
@@ -157,7 +157,7 @@ class _Fast:
         self.press = CorrectedPress(compliance_of(sensor), indenter, pose, limit, friction)
 
     def to(self, step: Step) -> Solution:
-        """Solve the next step, see ``solve_path``; a given force is the corrected one."""
+        """Solve the next step, see ``solve_path``; a given force is reached after the learned correction."""
         pose, compliance = self.pose.slid(*step.slide), self.press.compliance
         if step.force:
             found = self.press.at_force(step.force, pose)

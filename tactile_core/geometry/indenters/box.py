@@ -15,9 +15,9 @@ from .scene_form import SceneForm, Size
 
 @dataclasses.dataclass(frozen=True)
 class Box(Indenter):
-    """A box along the own axes that touches with its flat lower face; ``edge`` rounds edges and corners.
+    """A box along the own axes that touches with its flat lower face.
 
-    sizes : three full lengths along x, y, z, m; edge : m
+    sizes : full lengths along x, y, z, m; edge : m, radius of its edges and corners, less than half the smallest size
     """
 
     sizes: tuple[float, float, float]
@@ -30,8 +30,8 @@ class Box(Indenter):
             raise TactileError("box, edge", f"{self.edge * 1e3:g} mm", "less than half of the smallest size")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the exact distance (n,) m of points (n, 3) m, a smaller box's less the edge radius, and gradient (n,
-        3)."""
+        """Return the exact distance (n,) m of points (n, 3) m, that of a smaller box less the edge radius, and its
+        gradient (n, 3)."""
         return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:

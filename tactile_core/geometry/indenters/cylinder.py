@@ -19,7 +19,7 @@ _ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # axis -> axes across
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder(Indenter):
-    """An upright cylinder that touches with its flat end; ``edge`` rounds the rim. Lengths in m."""
+    """An upright cylinder that touches with its flat end. Lengths in m; ``edge`` is the radius of its rounded rims."""
 
     radius: float
     edge: float

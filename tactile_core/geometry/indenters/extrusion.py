@@ -14,9 +14,9 @@ from .indenter import NEAREST
 
 
 class Outline(NamedTuple):
-    """A two-dimensional signed distance at n places: ``value`` (n,) m, ``slope`` (n, 2), ``radius`` (n,) m.
-
-    radius : of curvature of the lines of equal distance
+    """A two-dimensional signed distance at n places: ``value`` (n,) m, positive outside, and ``slope`` (n, 2), its
+    gradient.
+    radius : (n,) m, of curvature of the line of equal distance through each place; infinite where it is straight
     """
 
     value: np.ndarray
@@ -35,9 +35,10 @@ def disc(across: np.ndarray, radius: float) -> Outline:
 
 
 def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance (n,) m and gradient (n, 3): two components across, then one along.
-
-    along : (n,) m, from the middle of the span; half_span : m, of the prism before it is inflated by ``edge`` m
+    """Return the signed distance (n,) m from a rounded prism, and its gradient (n, 3): two components across, one
+    along.
+    outline : of the prism, at the places across; along : (n,) m, the places along its axis, from its middle
+    half_span : m, half the prism's length before it is inflated by ``edge`` m
     """
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
@@ -56,7 +57,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``distance``; for along and half_span see there."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``; for outline, along and half_span see there."""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

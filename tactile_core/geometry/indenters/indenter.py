@@ -44,7 +44,8 @@ class Indenter(Protocol):
         return np.array(lower), np.array(upper)
 
     def preview(self, hull: Hull) -> Surface:
-        """Return nodes (n, 3) m and triangles (m, 3) that show the body; hull : makes them of a convex one's support"""
+        """Return nodes (n, 3) m, own frame, and triangles (m, 3) that show the body.
+        hull : function that makes them of a convex body's ``support``"""
         return hull(self.support)
 
     @functools.cached_property
@@ -65,7 +66,8 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def check_length(kind: str, name: str, value: float) -> None:
-    """Raise TactileError for a length ``value``, m, that is no number between 0.001 mm and 1 m; kind, name : whose"""
+    """Raise TactileError for a length ``value``, m, that is no number between 0.001 mm and 1 m.
+    kind, name : of the shape and of its length, for the message"""
     expected, advice = "a length in m, between 0.001 mm and 1 m", "Check the unit: scenes give millimetres"
     finite_number(value, f"{kind}, {name}", expected, 1e-6, 1.0, advice)
 
@@ -105,15 +107,17 @@ class Pose:
         return _OWN_DOWN if self.push is None else self.push @ self.axes
 
     def moved(self, depth: float) -> Pose:
-        """Return the pose after moving ``depth`` m along ``direction``."""
+        """Return the pose after moving ``depth`` m along ``direction``, into the sensor; negative: out of it."""
         return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
-        """Return the pose after sliding by ``along`` and ``across``, m, the indenter's own x and y."""
+        """Return the pose after sliding by ``along``, m, along the indenter's own x and ``across``, m, along its own
+        y."""
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:
-        """Transform sensor points (n, 3) m to the indenter's frame, in which sticking points stay put as it moves."""
+        """Transform points (n, 3) m from the sensor's frame to the indenter's, in which points that stick to the
+        indenter stay put as it moves."""
         return (points - self.apex) @ self.axes
 
     def from_own(self, points: np.ndarray) -> np.ndarray:
@@ -135,8 +139,8 @@ class Pose:
 
 
 def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two unit tangents (..., 3) of a surface whose normals are ``outward`` (..., 3): along +x, and aside, along
-    x outward (on the pad toward -z)."""
+    """Return two unit tangents (..., 3) of a surface with unit normals ``outward`` (..., 3): ``along``, the tangent
+    nearest to +x, and the cross product along x outward (on the pad toward -z)."""
     along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     return along, np.cross(along, outward)
@@ -147,7 +151,7 @@ def pose_on(
 ) -> Pose:
     """Return the pose in which the indenter just touches ``point`` (3,) m of a surface, unit normal ``outward`` (3,).
 
-    tilt : rad, between its axis (the way it moves) and that normal
+    tilt : rad, between the indenter's axis, along which it moves, and that normal
     tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
     """
     along, side = tangents(outward)

@@ -13,9 +13,9 @@ from .scene_form import SceneForm, Size
 
 @dataclasses.dataclass(frozen=True)
 class LyingCylinder(Cylinder):
-    """A cylinder along the own x that touches with its side; ``edge`` rounds both rims. Lengths in m.
+    """A cylinder along the own x that touches with its side. Lengths in m; ``edge`` is the radius of its rounded rims.
 
-    An edge as large as the radius makes the ends half balls.
+    An edge as large as the cylinder's radius makes the ends half balls.
     """
 
     length: float = 20e-3

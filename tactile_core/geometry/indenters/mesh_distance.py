@@ -13,9 +13,8 @@ _TOGETHER = 20_000  # points looked up at a time without numba
 
 
 class NearTriangles:
-    """Triangles (m, 3, 3), any unit, sorted into cubes of side ``cell`` by pieces no longer than that.
-
-    The cubes are larger for many long triangles. middles : (k, 3), of the pieces
+    """Search index of triangles (m, 3, 3), any unit: cut into pieces no longer than ``cell``, sorted into cubes of that
+    side; it is raised for many long triangles. middles : (k, 3), of the pieces
     """
 
     def __init__(self, triangles: np.ndarray, cell: float) -> None:

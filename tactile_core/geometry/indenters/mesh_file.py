@@ -47,7 +47,7 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> Any:
     """Return the mesh (a trimesh, mm) in an indenter's own frame: its lowest flat or point touches z = 0 at the origin.
 
-    where : the file, for its suffix and for messages; scale : m per unit of the file
+    content : of the file; where : the file, for its suffix and for messages; scale : m per unit of the file
     up : the file's axis, one of ``UPS``, that points out of the sensor
     Raises TactileError unless it is closed, wound outward, and has the size of an indenter. Whether it crosses itself
     shows when its grid is built.
@@ -61,9 +61,9 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
 
 def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
-    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; ``scale`` m per file unit.
+    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), not moved; those that coincide are united.
 
-    Raises TactileError as ``solid`` does.
+    where : names the mesh in messages; scale : m per unit of the vertices. Raises TactileError as ``solid`` does.
     """
     import trimesh
 
@@ -121,7 +121,8 @@ def _check_whole(content: bytes, path: pathlib.Path) -> None:
 
 
 def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Raise TactileError for vertices (n, 3) and faces (m, 3) that are no triangles, or more than MAX_FACES."""
+    """Raise TactileError unless vertices (n, 3) and faces (m, 3) are 1 to MAX_FACES triangles of finite coordinates.
+    where : names the mesh in messages"""
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         found = f"vertices {vertices.shape}, faces {faces.shape}"
         raise TactileError(where, found, "three coordinates, three corners")
@@ -143,7 +144,8 @@ def _check_length(content: bytes, path: pathlib.Path) -> None:
 
 
 def check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
-    """Raise TactileError for a body of an extent, in units of ``scale`` m, that is no indenter's."""
+    """Raise TactileError for a body whose largest extent, in units of ``scale`` m, is not 0.2 to 100 mm.
+    where : names the mesh in the message"""
     smallest, largest = EXTENT_MM
     if smallest <= extent * scale * 1e3 <= largest:
         return

@@ -16,9 +16,9 @@ _ACROSS, _AROUND = 24, 64  # of the preview: nodes across and along the wire
 
 @dataclasses.dataclass(frozen=True)
 class Ring(Indenter):
-    """A torus that lies flat: a round wire of radius ``tube`` whose middle is a circle of ``radius``, m.
+    """A torus that lies flat: a round wire of radius ``tube``, m, whose middle is a circle of ``radius``, m.
 
-    Its outer diameter is 2 (radius + tube). Its own origin is in the plane below the hole's middle.
+    Its outer diameter is 2 (radius + tube). Its own origin is below the hole's middle, in the plane on which it lies.
     """
 
     radius: float

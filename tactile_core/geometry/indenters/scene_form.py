@@ -15,11 +15,11 @@ from .indenter import Indenter
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """A size of a shape as scenes give it.
+    """A size of a shape as scene files give it.
 
-    field : its name there, which ends in its unit, ``_mm`` or ``_deg``; count : how many numbers it takes
-    default : where a scene leaves it out; None: it must be given
-    slider : name of the Add menu's size that sets it; empty: a new object has the default
+    field : its name in scenes, which ends in its unit, ``_mm`` or ``_deg``; count : how many numbers it takes
+    default : its value, in that unit, where a scene leaves it out; None: it must be given
+    slider : name of the size in Blender's Add menu that sets it; empty: a new object has the default
     """
 
     field: str
@@ -50,7 +50,8 @@ class SceneForm:
     icon: str = ""
 
     def build(self, values: Mapping[str, Any]) -> Indenter:
-        """Build the shape from a scene's values by field. Raises TactileError for sizes that no body can have."""
+        """Build the shape from a scene's values, mm or degrees, by ``Size.field``. Raises TactileError for sizes that
+        no body can have."""
         return self.shape(**{argument: size.in_si(values[size.field]) for argument, size in self.sizes.items()})
 
 

@@ -17,7 +17,7 @@ _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 class Several(Indenter):
     """A rigid group of indenters, for several contacts at once: the nearest part counts.
 
-    Exact outside. Inside, where parts overlap, the true depth is at least the one returned.
+    Its distance is exact outside. Inside, where parts overlap, the true depth is at least the one returned.
 
     parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0
     """
@@ -50,7 +50,8 @@ class Several(Indenter):
         return curvature
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """Return the farthest part's support point (3,) m, the mean if several are equally far; see ``Indenter``."""
+        """Return the farthest of the parts' support points along a direction (3,), (3,) m, the mean of equally far
+        ones; see ``Indenter.support``."""
         places = np.array([pose.support(indenter, direction) for indenter, pose in self.parts])
         reach = places @ direction
         return places[reach > reach.max() - SQUARE].mean(axis=0)
@@ -70,7 +71,7 @@ class Several(Indenter):
 
 
 def joined(parts: Iterable[tuple[Indenter, Pose]], hull: Hull) -> Surface:
-    """Join the surfaces that show bodies, each in its pose, into one; hull : see ``Indenter.preview``"""
+    """Join the surfaces that show ``parts``, pairs of a body and its pose, into one; hull : see ``Indenter.preview``"""
     nodes, faces, count = [], [], 0
     for body, pose in parts:
         own, triangles = body.preview(hull)

@@ -108,7 +108,8 @@ BAND = 1e-3  # m, over which the fine grid's values pass into the coarse one's, 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class TipGrid(Summary):
-    """The spline ``fine`` up to the height z = ``top``, m, the spline ``coarse`` from BAND above it; see SplineGrid."""
+    """The spline ``fine`` up to the height z = ``top``, m, and ``coarse`` from 1 mm (``BAND``) above that; in between
+    one passes into the other. See SplineGrid."""
 
     fine: SplineGrid
     coarse: SplineGrid

@@ -38,10 +38,10 @@ _FINE = 2  # times the triangles are halved to find what the grid leaves unresol
 class BiotacSheet:
     """The fluid film between core and inner skin; e electrodes, 19 of the BioTac.
 
-    fluid : what conducts; sheet : on the nodes that bound fluid, with the electrodes and the 4 of the excitation
-    wet : (k,) the sheet's nodes in the inner skin's surface
+    fluid : what conducts; sheet : the grid for the currents, with the e electrodes, then the 4 of the excitation
+    wet : (k,) the sheet's nodes, by number in the inner skin's lattice
     sensing : (k,) the same nodes' indices among ``sensing_points.sensing_nodes``
-    film : (k,) m, thickness at rest; outward : (k, 3), from the core to the skin
+    film : (k,) m, thickness at rest; outward : (k, 3), unit, from the core to the skin
     unresolved : (e + 4,) ohm that the grid leaves out at each electrode, in a film of 1 m and 1 S/m
     """
 
@@ -54,32 +54,34 @@ class BiotacSheet:
     unresolved: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
-        """Thickness (k,) m for a displacement (n_inner, 3) m of the whole inner skin, at least the thinnest."""
+        """Return the film's thickness (k,) m, at least ``fluid.thinnest``, for a displacement (n_inner, 3) m of the
+        whole inner skin."""
         moved = np.einsum("ki,ki->k", displacement[self.wet], self.outward)
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Return the film's thickness (k,) m at the sheet's nodes, by the change (f,) m of all f sensing nodes'
-        gaps."""
+        """Return the film's thickness (k,) m at the sheet's nodes, at least ``fluid.thinnest``, by the change (f,) m of
+        all f sensing nodes' gaps, positive where they open."""
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (e + 4,) ohm that the coarse grid leaves out near each electrode, for films (k,) m."""
+        """Return the resistance (e + 4,) ohm that the grid leaves out near each electrode, for films (k,) m."""
         return self.unresolved / (self.fluid.conductivity * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (e,) ohm of each electrode to the excitation for films (k,) m."""
+        """Return the resistance (e,) ohm of each electrode to the excitation for films (k,) m."""
         potentials = self.sheet.potentials(films, self.fluid.conductivity)
         return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
     def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-        """Return each electrode's impedance over that at rest, (e,), by resistance and at_rest, both (e,) ohm."""
+        """Return each electrode's impedance over that at rest, (e,), from its resistance now and at_rest, both (e,)
+        ohm; the interface adds to both."""
         return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 
 @functools.cache
 def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
-    """The sheet of the resting finger; a solve takes 10 ms.
+    """Make the sheet of a sensor's resting finger; a solve takes 10 ms.
 
     The film ends on a core that carries the electrodes, so that films over electrodes are the published gaps: the
     public mesh's core stands 0.25 mm over the electrodes of the trunk and 0.6 mm under those of the tip.
@@ -107,7 +109,7 @@ def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
 
 
 def sensing_films(contact: Contact) -> np.ndarray:
-    """Film thickness (k,) m of the sheet in a contact of the fast tier, from the gaps of its sensing points."""
+    """Return the film's thickness (k,) m at the sheet's nodes in a contact of the fast tier."""
     skin = contact.compliance
     return biotac_sheet(skin.name).films_of((contact.sensing_gaps - skin.watch_gap)[skin.feet :])
 
@@ -156,7 +158,8 @@ _PAD = -2e-3  # m, y below which dents lie
 
 
 class ReducedSheet:
-    """Resistances of a sheet whose potentials are sums of ``fields`` (n - 1, r), given at all nodes but the first."""
+    """Resistances of ``sheet`` where potentials are sums of r fields (n - 1, r), at all nodes but the first, which is
+    0."""
 
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields
@@ -177,7 +180,7 @@ class ReducedSheet:
 
 @functools.cache
 def reduced_sheet(sensor: str = sensors.SOURCE) -> ReducedSheet:
-    """The reduced sheet of the resting finger; made in 1 s, once, it solves a contact in 3 ms."""
+    """Make the reduced sheet of a sensor's finger; made in 1 s, once, it solves a contact in 3 ms."""
     sheet = biotac_sheet(sensor)
     rest = sheet.sheet.matrix(sheet.film)[1:, 1:].tocsc()
     at_rest, dented = _potentials(sheet, sheet.film), [_potentials(sheet, films) for films in _dents(sheet)]
@@ -207,7 +210,8 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
 
 
 def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Noise-free change (e,) of a sensor's raw counts against rest in a contact, of a unit at ``rest_counts``; 3 ms."""
+    """Return the change (e,) of the electrodes' raw counts against rest in a contact, without noise, of a unit whose
+    counts at rest are ``rest_counts``; takes 3 ms. sensor : the fluid sensor whose contact it is"""
     films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
     rest = rest_counts(sensor)
     return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest
@@ -215,7 +219,7 @@ def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.n
 
 @functools.cache
 def rest_counts(sensor: str) -> np.ndarray:
-    """Counts at rest (e,) of a typical unit; of a sensor where they are not known, those of its conducting sheet."""
+    """Return the raw counts (e,) at rest of a typical unit; where they are not known, those of its conducting sheet."""
     known = sensors.places_of(sensor).rest_counts
     if np.isfinite(known).all():
         return known

@@ -14,8 +14,8 @@ _DISC_SAMPLES = 16  # parts of a triangle's edge, 0.03 mm each, to measure what 
 class ThinSheet:
     """A conducting sheet on a triangulated surface, of a thickness that changes from solve to solve.
 
-    nodes : (n, 3) m; faces : (m, 3) int, one connected piece; centers : (k, 3) m, the electrodes; radius : m, theirs
-    refine : how often each triangle is cut into four; films stay given at ``nodes``
+    nodes : (n, 3) m; faces : (m, 3) int, one connected piece; centers : (k, 3) m, of the electrodes; radius : m, theirs
+    refine : how often each triangle is cut into four; films stay given at the n nodes before that
     """
 
     def __init__(
@@ -35,9 +35,9 @@ class ThinSheet:
 
     def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
         """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant per column.
-
         film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
-        Only combinations of currents that sum to zero have a meaning: the current leaves at the first node.
+        Each current leaves at the first node, which is at 0 V: only sums of columns for currents that add up to zero
+        have a meaning.
         """
         from ..solids.sparse_cholesky import factor
 
@@ -61,8 +61,8 @@ class ThinSheet:
     def unresolved(self, refine: int) -> np.ndarray:
         """Return each electrode's error of resistance on this grid against a refined one, (k,) ohm at 1 m and 1 S/m.
 
-        Near an electrode the film has nearly one thickness h: the error there is this value over sigma h. refine : how
-        often the finer grid cuts each triangle into four"""
+        Near an electrode the film has nearly one thickness h: the error there is this value over conductivity times h.
+        refine : how often the finer grid cuts each triangle into four"""
         film = np.ones(len(self.given[0]))
         miss = ThinSheet(*self.given, refine).potentials(film) - self.potentials(film)
         elsewhere = miss[~np.eye(len(miss), dtype=bool)]  # one constant, from the node where the current leaves

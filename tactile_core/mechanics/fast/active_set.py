@@ -44,9 +44,9 @@ class Work:
 
 @dataclasses.dataclass(frozen=True)
 class Pressing:
-    """State of an active-set solve.
-
-    pressing : (k,) N; active : (k,) bool; step : m, of the depth; factor : Cholesky factor of the active block.
+    """Solution of a contact's complementarity problem, see ``complement``.
+    pressing : (k,) N, 0 or more; active : (k,) bool, nodes that touch; step : m, by which the indenter goes deeper
+    factor : (j, j), Cholesky factor of the matrix among the active nodes
     """
 
     pressing: np.ndarray
@@ -65,11 +65,12 @@ def complement(
     factors: dict[bytes, np.ndarray] | None = None,
 ) -> Pressing:
     """Find forces p >= 0 with gaps g = matrix p + gap - step along >= 0 and p g = 0 at every node.
-
-    matrix : (k, k) m/N; gap : (k,) m; active : (k,) bool, first guess
-    along : (k,) or None; with it, ``step`` is free and ``along . p`` is ``force`` N, otherwise ``step`` is 0
-    factors : Cholesky factors of this symmetric matrix by active set, used and added to
-    Raises UnsolvedError.
+    matrix : (k, k) m/N, symmetric, how forces open gaps; gap : (k,) m, without forces; active : (k,) bool, first guess
+    along : (k,), by how much each gap closes per metre of ``step``, which is then free so that ``along . p`` is
+        ``force``, N; None: ``step`` is 0
+    factors : Cholesky factors of this matrix by active set, used and added to; None to keep none
+    Raises UnsolvedError where the matrix is not positive definite, no node can carry the force, or exchanges do not
+    end.
     """
     fewest, patience = len(gap) + 1, _PATIENCE
     pressing, step = np.zeros(len(gap)), 0.0

@@ -37,10 +37,10 @@ class Segment(NamedTuple):
 
 class Basis(NamedTuple):
     """Unknowns of one half's matrix: first the touched nodes' axes, then loads, then the other nodes' axes.
-
     touched : how many are axes of touched nodes; rows : how many are those or loads
-    unknown : (n,) int, axis 3 i + k of the i-th kept node, or number of the load, of each
-    step : (n,) float32; an entry's own step is the product of its row's and its column's
+    unknown : (n,) int, for each unknown its axis 3 i + k of the i-th kept node, or its load's number
+    step : (n,) float32; the quantisation step of an entry is the product of its row's and its column's
+    segments : stretches of unknowns that are transformed together
     """
 
     touched: int
@@ -59,7 +59,9 @@ def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> 
 
 
 def unpack(path: Path, made_from: str) -> tuple[Half, Half] | None:
-    """Read the even and the odd half from a shipped file; None if there is none, or it is of another solid."""
+    """Read the even and the odd half from a shipped file; None if there is none, or it is of another solid.
+    made_from : name of the solid's cache entry (``compliance.cache_entry``), which the file states
+    """
     if not path.is_file():
         return None
     import h5py

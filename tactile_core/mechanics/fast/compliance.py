@@ -93,7 +93,10 @@ def compliance_of(sensor: str) -> Compliance:
 
 
 class Solid(NamedTuple):
-    """Solid from which a compliance is computed; touchable : (m,) surface nodes."""
+    """Solid from which a compliance is computed.
+    name : of the sensor; lattice : its surface; touchable : (m,), the lattice's nodes that may carry contact force
+    mesh : of the volume
+    """
 
     name: str
     lattice: Lattice
@@ -110,7 +113,7 @@ def solid_of(sensor: str) -> Solid:
 
 
 class Stored(NamedTuple):
-    """Cache entry of a sensor's matrices: path, and bytes on disk, 0 before they are built.
+    """Cache entry of a sensor's matrices: ``folder``, and ``bytes`` on disk, 0 before they are built.
 
     surface, touchable, volume : number of the surface's nodes, of the touchable ones, of the solid's
     """
@@ -123,7 +126,7 @@ class Stored(NamedTuple):
 
 
 def stored(sensor: str) -> Stored:
-    """Return the cache entry of a sensor; builds and loads nothing."""
+    """Return the cache entry of a sensor's matrices, built or not; builds and loads nothing."""
     solid = solid_of(sensor)
     folder = cache_entry(solid)
     files = [folder / f"{array}.npy" for array in ARRAYS]
@@ -140,7 +143,8 @@ def _touchable_skin(sensor: str) -> np.ndarray:
 
 
 def cache_entry(solid: Solid) -> pathlib.Path:
-    """Return the cache's folder, named by all that decides the arrays."""
+    """Return the folder of a solid's matrices in the cache, named by a hash of all that decides them; it may not
+    exist."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     sensing = sensing_points_of(name, mesh)
@@ -213,15 +217,16 @@ def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the sensing points (v,) that stand for all w, by `images`; the index of each one's among these (w,), and
-    sign (w,), -1 where it is the image."""
+    """Return the sensing points (v,) under which halves are solved; for each of all w points, the index (w,) among
+    these of the one that stands for it (itself, or its image, see `images`), and a sign (w,), -1 for an image."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
 
 
 def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
-    """Join the halves of a solid and add the fluid; yield each of ``ARRAYS`` with its name, so that none need stay."""
+    """Join the halves of a solid and add the fluid; yield the name and values of each of ``ARRAYS``, one by one to save
+    memory. Overwrites the halves."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
     kept, column, sign = kept_loads(solid)

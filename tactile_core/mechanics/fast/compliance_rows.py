@@ -126,7 +126,8 @@ class ComplianceBlock:
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Update ``normal``'s matrix after the normals of nodes ``at`` (j,) have turned; normals : (k, 3), new ones"""
+        """Return a copy of ``matrix`` (k + c, k + c), of ``normal``, updated where normals have turned.
+        normals : (k, 3), all as they are now; at : (j,), positions among the block's nodes of those that turned"""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
         strips = _contract(rows[:, :size], normals[at].astype(np.float32), normals.astype(np.float32)).astype(float)

@@ -51,9 +51,9 @@ def condense(
     mesh: HexMesh, material: Material, keep: np.ndarray, touched: np.ndarray, loads: csc_array, parity: int
 ) -> Half:
     """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
-
-    touched : (r,) indices of those that forces act on, sorted
-    loads : (3 n_nodes, w) sparse, unit loads anywhere. Raises ValueError for a solid that is not even in z.
+    touched : (r,) indices, among ``keep``, of those that forces act on, sorted
+    loads : (3 n_nodes, w) sparse, unit loads on any nodes, one a column
+    Raises ValueError for a solid that is not mirror symmetric in z, or is held nowhere.
     """
     tree = _Elimination(mesh, material, keep, loads, parity)
     dofs, stiffness = tree.group(np.arange(len(tree.cells)))
@@ -197,8 +197,8 @@ class MirrorSymmetry:
         self._place[axes_of(half)] = np.arange(count)  # after the other: on the mirror plane this one is right
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return motions (w, 3 n) float32 from halves even, odd (3 k, v): of load column[i], mirrored if sign[i] is
-        -1."""
+        """Return motions (w, 3 n) float32 of all surface nodes from the halves' even, odd (3 k, v) under v loads: the
+        i-th is under load column[i] of (w,), or its mirror image if sign[i] of (w,) is -1."""
         return self._joined(even.T, odd.T, column, sign.astype(np.float32))
 
     def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:

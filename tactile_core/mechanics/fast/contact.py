@@ -46,7 +46,7 @@ class _Around(NamedTuple):
 class ContactProblem:
     """An indenter in front of one sensor; solves for depths, for forces along the motion, and for other poses.
 
-    Nodes are followed only where the indenter can reach them, ``reach`` m in from the pose at depth 0.
+    Nodes are followed only where the indenter can reach them, ``reach`` m in from ``pose``, which is at depth 0.
     friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
     work : what contacts may cost, None for as much as they take; a solve raises ExhaustedError where it is used up
     """
@@ -68,13 +68,13 @@ class ContactProblem:
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
-        """Solve the contact at a given depth, m, going on from ``start`` where there is one."""
+        """Solve the contact at a depth, m, going on from ``start`` (None: from rest); it may not have converged."""
         return self._walk(self.pose.moved(depth), None, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
-        """Solve the contact of the indenter at another pose, moved there from ``start`` in one step.
-
-        axial_force : N; with it the indenter then moves along its own direction until it bears that force
+        """Solve the contact at another pose, going on from ``start`` (None: from rest) in one step, or in some where
+        one does not settle; it may not have converged.
+        axial_force : N; the indenter then moves on along its direction until it bears that force; None: it stays there
         """
         self._look_near(pose, start)
         return self._walk(pose, axial_force, start)
@@ -112,7 +112,8 @@ class ContactProblem:
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of followed nodes: all of ``near``, but where points between nodes are too."""
+        """Sorted touchable indices (n,) of followed nodes: ``near`` without points between nodes, which
+        ``EdgeContactProblem`` follows too."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:

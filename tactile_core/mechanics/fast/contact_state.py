@@ -26,8 +26,8 @@ class Contact:
     force : (3,); axial_force : its part along the motion
     nodes : (k,) touchable indices that carry force; nodal_force : (k, 3). Forces between nodes are spread over the
         nodes whose cubic interpolation gives their places: some nodes then have a small outward force
-    slipping : (k,) bool, nodes whose friction is spent; without friction all
-    converged : whether it may be used; iterations : linearised problems solved for it
+    slipping : (k,) bool, nodes whose friction is at its limit; without friction all
+    converged : false if the solve ended early: do not use it; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
     penetration : m, the largest depth of a node in the indenter or of the inner skin in the core
     sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
@@ -72,7 +72,7 @@ class Contact:
 
     @property
     def electrode_gaps(self) -> np.ndarray:
-        """Film (e,) m over each electrode; (0,) on the DIGIT."""
+        """Thickness (e,) m of the fluid film over each electrode; (0,) on a gel."""
         return self._gaps(self.compliance.feet)
 
     def _gaps(self, count: int) -> np.ndarray:
@@ -94,7 +94,8 @@ def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
 
 
 def borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces (k, 3) N that nodes (k,) bore in a contact, and which of them slipped (k,)."""
+    """Return forces (k, 3) N that ``nodes`` (k,), touchable indices, bore in the contact ``before``, 0 for others, and
+    which of them slipped (k,)."""
     force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
     same = among(nodes, before.nodes)
     at = np.searchsorted(before.nodes, nodes[same])
@@ -122,8 +123,8 @@ _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well be
 @dataclasses.dataclass
 class Candidates:
     """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
-
-    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess; probe : (k, 3) m, 0 or beside a crease
+    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess
+    probe : (k, 3) m, offset beside a node in a crease at which its face's distance is measured, else 0
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
     looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known
     """
@@ -137,7 +138,7 @@ class Candidates:
 
     @property
     def faced(self) -> np.ndarray:
-        """Mark (k,) bool the nodes that need no further check: doubled ones, or ``split`` found one face alone."""
+        """Mark (k,) bool the nodes that need no more looks for a second face: they are doubled, or looks found none."""
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
@@ -145,7 +146,7 @@ class Candidates:
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let more nodes (j,) enter, all touching at first; displacement : (j, 3) m; probe : (j, 3) m, 0 off creases"""
+        """Let more nodes (j,) enter, all touching at first; displacement, probe : (j, 3) m, see the class"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")
@@ -157,9 +158,10 @@ class Candidates:
     def split(
         self, at: np.ndarray, left: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray
     ) -> None:
-        """Double nodes ``at`` (j,) that lie in a crease: they touch the face that they are at and the one they left.
-
-        left, normals : (j, 3), a point of the face that each left, and the normal there; rest : (k, 3) m, of all nodes
+        """Double the nodes at positions ``at`` (j,) that lie in a crease of the indenter, which stands at ``pose``:
+        they touch the face that they are at and the one they left.
+        left, normals : (j, 3), a point m of the face that each left, and the normal there
+        rest : (k, 3) m, of all candidates
         At the crease both faces are equally near, so each face's distance is measured a little beside it (``probe``).
         """
         self.looks[at] += 1
@@ -187,9 +189,9 @@ def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.
 
 
 def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
-    """Return the displacements (n, 3) m along the motion that bring points (n, 3) m to an indenter's front at ``pose``.
-
-    far : m, how deep points may lie in the indenter. Points that lie in front of it already stay.
+    """Return displacements (n, 3) m, along the motion, that bring points (n, 3) m to the front of an indenter at
+    ``pose``.
+    far : m, how deep points may lie in the indenter. Points that lie in front of the indenter already stay.
     """
     own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
     ahead = pose.own_direction
@@ -204,9 +206,8 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
 
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return where (n, 3) m, in its frame, nodes moving straight from ``first`` to ``last`` first meet an indenter.
-
-    Nodes that do not meet it are given at ``last``, nodes that begin inside it at ``first``.
+    """Return the places (n, 3) m where nodes that move straight from ``first`` to ``last``, (n, 3) m, first meet an
+    indenter, all in its frame: ``last`` for nodes that do not meet it, ``first`` for those that begin inside it.
     """
     way = last - first
     share, on_way = np.zeros(len(first)), np.arange(len(first))

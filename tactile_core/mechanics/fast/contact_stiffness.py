@@ -34,11 +34,11 @@ class ContactStiffness:
         self._updates = 0
 
     def among(self, block: ComplianceBlock, active: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the stiffness (j, j) float32 N/m among a block's ``active`` (k + c,) points, and its rows' places.
+        """Return the stiffness (j, j) float32 N/m among a block's ``active`` (k + c,) bool points, and the place (j,)
+        of each of its rows among the block's 3 k + c degrees of freedom.
 
-        places : (j,), each row's among the block's 3 k + c degrees of freedom; three of a node follow each other.
-            Rows of points that are not active are zero
-        The next call changes it in place. Raises UnsolvedError where the compliance is not positive definite.
+        The three rows of a node follow each other; rows of points that are not active are zero. The next call changes
+        the stiffness in place. Raises UnsolvedError where the compliance is not positive definite.
         """
         wanted = np.concatenate([np.repeat(active[: block.k], 3), active[block.k :]])
         if not len(wanted):
@@ -60,8 +60,8 @@ class ContactStiffness:
         return self._inverse, self._rows
 
     def _is_quick(self, gone: int, new: np.ndarray, wanted: np.ndarray) -> bool:
-        """Return true if it is not better made anew. gone : rows that go; new, wanted : (m,) bool, that come, and
-        all"""
+        """Return true if changing the inverse costs less than making it anew, and adds up little rounding.
+        gone : how many rows go; new, wanted : (m,) bool, the block's degrees of freedom that come, and all wanted"""
         size, most = int(wanted.sum()), len(self._inverse) + int(new.sum())
         effort = _GOES * gone * len(self._inverse) ** 2 + _COMES * int(new.sum()) * most**2
         return size >= _SMALL and effort <= _FEW * size**3 and self._updates <= _MOST_UPDATES

@@ -45,9 +45,10 @@ class PatchFrame:
 
 @dataclasses.dataclass(frozen=True)
 class Learned:
-    """A sensor's correction, with friction or without. f features, n supports, k fields on a grid of g = LINES x LINES.
-
-    shift, scale : (f,) of the features; supports : (n, f) scaled features; support_rubs : (n,), 0 without friction to 1
+    """A sensor's correction, with friction or without: kernel ridge regression from f features of a contact, by its
+    likeness to n supports (contacts learned from), to a factor and k fields on a grid of g = LINES x LINES places.
+    shift, scale : (f,); a scaled feature is (feature - shift) / scale; supports : (n, f) scaled features
+    support_rubs : (n,), friction of the supports, 0 without to 1
     widths : (3,), of the kernels of force on all features, on the ``ESSENTIAL`` ones, and of fields
     force_weights : (2, n), of two estimates of the log of the force factor, then averaged; field_weights : (n, k)
     fields : (k, g, 3), per metre of depth, in the surface's own frames
@@ -65,7 +66,7 @@ class Learned:
     trust: np.ndarray
 
     def log_factor(self, features: np.ndarray) -> float:
-        """Return the log of the factor by which the linear model's force is too small; features : (f,), not scaled"""
+        """Return the log of the factor by which to multiply the linear model's force; features : (f,), not scaled"""
         every = self._near(features, ALL, self._all, self.widths[0]) @ self.force_weights[0]
         few = self._near(features, ESSENTIAL, self._few, self.widths[1]) @ self.force_weights[1]
         return self._trusted(features, 1) * float(every + few) / 2
@@ -100,11 +101,11 @@ class Correction:
     rubbing: Learned
 
     def factor(self, features: np.ndarray) -> float:
-        """Return the factor by which the linear model's force is too small; features : (f,)"""
+        """Return the factor by which to multiply the linear model's force; features : (f,), not scaled"""
         return float(np.exp(self._blend(features, Learned.log_factor)))
 
     def field(self, features: np.ndarray) -> np.ndarray:
-        """Return the correction on the grid (g, 3), per metre of depth; features : (f,)"""
+        """Return the correction on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
         return self._blend(features, Learned.field)
 
     def _blend(self, features: np.ndarray, of: Callable[[Learned, np.ndarray], _Answer]) -> _Answer:
@@ -177,9 +178,9 @@ def frame(compliance: Compliance, contact: Contact) -> PatchFrame:
 
 
 def features(compliance: Compliance, contact: Contact, at: PatchFrame) -> np.ndarray:
-    """Features (f,) of a fast contact, without units: lengths over the thickness, stresses over E.
+    """Compute the features (f,) of a fast contact, without units: lengths over the thickness, stresses over E.
 
-    All are continuous in the nodal forces, so that a force can be searched for.
+    at : the contact's ``frame``. All are continuous in the nodal forces, so that a force can be searched for.
     """
     material, thickness = sensors.describe(compliance.name).material, sensors.thickness(compliance.name)
     nodes = compliance.touchable[contact.nodes]
@@ -205,7 +206,8 @@ MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1
 
 
 def grid_places() -> np.ndarray:
-    """Places (LINES, LINES, 2) of the fields' grid, in patch radii."""
+    """Return the places (LINES, LINES, 2) of the fields' grid, along the finger and across it from the patch's centre,
+    in patch radii."""
     line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
     return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 
@@ -218,7 +220,7 @@ def _frames_by_axis(sensor: str) -> np.ndarray:
 
 @functools.cache
 def learned() -> dict[str, Correction]:
-    """Load the shipped correction of each sensor."""
+    """Load the shipped corrections, by the sensor's name."""
     names = [field.name for field in dataclasses.fields(Learned)]
     with shipped(FILE).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         return {
@@ -239,7 +241,8 @@ class Corrected:
 
 
 def force_factor(compliance: Compliance, contact: Contact) -> float:
-    """Factor by which a fast contact's forces are too small."""
+    """Return the factor by which to multiply a fast contact's forces; 1 without contact, or where no correction
+    ships."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return 1.0
@@ -247,7 +250,8 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
 
 
 def correct(compliance: Compliance, contact: Contact) -> Corrected:
-    """Correct a fast contact to the full tier's result at the same depth; unchanged where no correction ships."""
+    """Correct a fast contact to the full tier's result at the same depth; unchanged without contact, or where no
+    correction ships for the sensor."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return Corrected(contact.displacement, 1.0)
@@ -259,7 +263,8 @@ def correct(compliance: Compliance, contact: Contact) -> Corrected:
 
 
 def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.ndarray, scale: float) -> np.ndarray:
-    """Return a displacement (n, 3) m plus ``scale`` m times a field on the grid (g, 3), in the sensor's axes."""
+    """Return displacement (n, 3) m plus ``scale``, the depth in m, times ``field`` (g, 3), learned per metre of depth
+    on the grid of the patch frame ``at`` in the surface's own axes; the sum is in the sensor's axes."""
     return _add_field(
         displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, field, scale
     )

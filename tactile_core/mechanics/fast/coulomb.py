@@ -38,10 +38,10 @@ class Law(NamedTuple):
 
 class Points(NamedTuple):
     """Points of an iterate: what they bear and where they stand.
-
-    force : (k, 3) N; core : (c,) N; active : (k + c,) bool, which touch; slips : (k,) bool
+    force : (k, 3) N, on the nodes; core : (c,) N, of the points that press on the core
+    active : (k + c,) bool, which touch; slips : (k,) bool
     normal, lean : (k, 3), unit, of the indenter, and along friction (0 where nodes stick): f = p (normal + mu lean)
-    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, from the spots where nodes stick
+    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, offset of nodes from the spots of the indenter where they stick
     """
 
     force: np.ndarray
@@ -66,12 +66,12 @@ class Motion(NamedTuple):
 
 class Slipping(NamedTuple):
     """Slipping nodes ``at`` (s,), and how their forces may change.
-
-    normal, lean : (k, 3) of all nodes; lean 0 where they stick; across : (s, 3) unit, across normal and friction
+    normal, lean : (k, 3) of all nodes, as in ``Points``; across : (s, 3), unit, normal x lean
     pressing, limit : (s,) N, of the normal force and of friction
     against : (s,) m/N, slip along friction over its limit: how far a node moves across friction under 1 N
-    curved : (q,), which of them have normals that turn; bend : (q, 3, 3) 1/m, second derivatives of the distance there
-    turning : (q, 3, 3) N/m, change of their forces with their motion, at the same normal forces
+    curved : (q,), positions in ``at`` of those whose normals turn; bend : (q, 3, 3) 1/m, second derivatives of the
+        distance there; turning : (q, 3, 3) N/m, change of their forces with their motion, at the same normal forces
+    friction : Coulomb's coefficient
     """
 
     at: np.ndarray
@@ -155,7 +155,7 @@ def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
 
 @Loop
 def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001, ANN201
-    """Describe the slipping nodes ``at`` (s,); curved : (q,), whose normals turn; bend : (q, 3, 3) 1/m"""
+    """Compute ``Slipping``, where the arguments are told, for nodes ``at`` (s,) of ``points`` with a ``motion``."""
     s = len(at)
     across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
     turning = np.empty((len(curved), 3, 3))
@@ -271,8 +271,8 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 @Loop
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
     """Let nodes that return to the contact slip instead of stick, since sticking is what pulled them off.
-
-    points, after : before and after ``sort_points``; turned : (k, 3), new normals; friction : Coulomb's coefficient
+    points, after : argument and result of ``sort_points``; turned : (k, 3), new normals; friction : Coulomb's
+        coefficient
     left : (k,) bool, nodes that have left so far. Updates it, the nodes' forces and ``after.slips`` in place.
     Returns the largest gap, m, of the nodes that touch now."""
     force, _, active, _, normal, _, gap, _, off = points

@@ -50,8 +50,8 @@ class _Sprung(Frictionless):
 
 
 class EdgeContactProblem(ContactProblem):
-    """Contact problem without friction whose candidates are nodes, and from number m on points between them. reach : m,
-    as in ``ContactProblem``"""
+    """Contact problem without friction whose candidates are the m touchable nodes and, numbered from m on, points
+    between them. pose, reach (m), work : as in ``ContactProblem``"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None
@@ -71,7 +71,8 @@ class EdgeContactProblem(ContactProblem):
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError if the body is between nodes in spite of the points, or behind nodes."""
+        """Raise PenetrationError if the indenter is over 0.1 mm deep between nodes in spite of the points, or has nodes
+        behind it."""
         surface, deformed = self.compliance.surface, contact.deformed
         gap, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable])
         normals = normals[np.abs(gap) < _ON_BODY]
@@ -195,7 +196,9 @@ class SpringRows:
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return sorted nodes (j,), forces (j, 3) N of force (k, 3) N; numbers : (k,) distinct, sorted, in ``near``"""
+        """Share force (k, 3) N on nodes and points out to nodes: return those (j,), sorted, and forces (j, 3) N on
+        them.
+        numbers : (k,), where force acts, distinct and sorted, as in ``near``"""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])

@@ -27,10 +27,10 @@ _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # most nodes, least curvature x force 
 
 
 class Friction:
-    """Solves for the nodes of one block.
-
-    rest : (k, 3) m; core_gap : (c,) m; spots : (k, 3) m, where nodes stick, in the indenter's frame
-    friction : Coulomb's; stiffness : inverse of the previous solve, of whatever block, which this one updates"""
+    """Solves for the k nodes and c points over the core of one block.
+    rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
+    spots : (k, 3) m, where nodes stick, in the indenter's frame; friction : Coulomb's coefficient
+    stiffness : inverse of the previous solve, of whatever block, which this one updates"""
 
     def __init__(
         self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,

@@ -41,10 +41,10 @@ _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 @dataclasses.dataclass
 class Try:
     """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core_force (c,) N, shift m along the motion.
-
-    active : (k + c,) bool; settled : whether it fulfils the tolerances; iterations : so far
-    slipping : (k,) bool, nodes whose friction is spent
-    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, normals"""
+    active : (k + c,) bool, which touch; settled : true if it fulfils the tolerances; iterations : so far
+    slipping : (k,) bool, nodes whose friction is at its limit; without friction all
+    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, and normals
+        (j, 3) there; None if no node does"""
 
     displacement: np.ndarray
     force: np.ndarray
@@ -84,11 +84,12 @@ class Pace:
         return len(best) >= _HOPE + _WINDOW and best[-1] > _NEARER * best[-1 - _WINDOW]
 
     def after(self, gap: np.ndarray, active: np.ndarray) -> float:
-        """Return the share, 0 to 1, of the next step to take, from gap (k,) m, which should be 0 where active (k,)."""
+        """Return the share, 0 to 1, of the next step to take. gap : (k,) m, which should be 0 where active (k,) bool"""
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
-        """Return the share of the next step to take, for the largest gap or penetration ``wrong``, m."""
+        """Return the share, 0 to 1, of the next step to take; wrong : m, the largest gap or penetration now. The share
+        falls while that hardly falls, after the first four calls, and grows again."""
         self._calls += 1
         if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
             self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)
@@ -100,10 +101,10 @@ class Pace:
 
 
 class Frictionless:
-    """Solves for the nodes of one block.
+    """Solves for the k nodes and c points over the core of one block.
 
-    rest : (k, 3) m; core_gap : (c,) m; probe : (k, 3) m, toward the second face of nodes in a crease
-    faced : (k,) bool, nodes whose faces are known: they are not looked at for creases
+    rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
+    probe, faced : (k, 3) m and (k,) bool, see ``Candidates``
     most_curved : most tangent directions in the Newton step; more of them cost more time than they save
     """
 

@@ -17,10 +17,10 @@ from .coulomb import LARGEST_TILT, LARGEST_TURN, Motion, Points, Slipping, known
 
 
 class Change(NamedTuple):
-    """Change of forces in a Newton step, r columns: without motion and, if the indenter may move, per metre of it.
-
+    """Change of forces in a Newton step in r columns: with the indenter at rest and, if it may move, per metre of that.
     forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, without the turn of normals
-    moved : (q, 3, r) m, of curved nodes along the indenter; turns : (s, r) N, of friction across itself
+    moved : (q, 3, r) m, motion of the nodes ``Slipping.curved``, relative to the indenter
+    turns : (s, r) N, change of friction across itself
     """
 
     forces: np.ndarray
@@ -150,7 +150,9 @@ def slide(known, answer, slipping):  # noqa: ANN001, ANN201
 
 @Loop
 def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
-    """Compute forces (k, 3), (c,) N from force, core after a ``Change``; step : m, of the indenter."""
+    """Compute the forces (k, 3) N on nodes and (c,) N on the core's points from force and core, those before, after a
+    ``Change``, turning those of slipping nodes by at most 1 rad (friction) and 0.3 rad (normals). step : m, the
+    indenter's motion"""
     forces, bearing, moved, turns = change
     k, new, new_core, last = len(force), force.copy(), core.copy(), forces.shape[1] - 1
     for a in range(k):

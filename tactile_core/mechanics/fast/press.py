@@ -30,9 +30,9 @@ _POWER_FROM, _POWERS = 1e-2, (0.7, 1.5)  # least growth that determines the powe
 @dataclasses.dataclass(frozen=True)
 class FastContact:
     """A contact of the linear model with its correction. Forces N, by the indenter on the sensor.
-
-    linear : as solved; corrected : shape and factor of force; force : (3,), axial_force : along the motion, corrected
-    pressure : Pa, rise of the fluid's; depth : m, from first touch at the place that the indenter has slid to
+    linear : contact before the correction; corrected : corrected shape, and factor of force
+    force : (3,), corrected; axial_force : its part along the motion; pressure : Pa, corrected rise of the fluid's
+    depth : m, from first touch at the place that the indenter has slid to
     """
 
     linear: Contact
@@ -64,9 +64,9 @@ class CorrectedPress:
         self._last_power = 1.0
 
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
-        """Solve the contact at a depth, m, of the press's pose or of another one; it may not have converged.
-
-        touches : whether ``pose`` is known to be at first touch, which is looked for otherwise
+        """Solve the contact at a depth, m, along the motion from ``pose`` (None: the press's own); the result may not
+        have converged (``linear.converged``).
+        touches : true if ``pose`` is known to be at first touch, which is looked for otherwise
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
         """
         there = pose or self.pose
@@ -74,8 +74,9 @@ class CorrectedPress:
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
-        """Solve the contact whose corrected force along the motion is force N; None beyond the limit or if lost.
-        pose : None for the press's own; touches : whether it is known to be at first touch"""
+        """Solve the contact whose corrected force along the motion is force N, to a thousandth; None if that lies
+        beyond the limit, or the search does not find it. pose : None for the press's own; touches : as in
+        ``at_depth``"""
         there = pose or self.pose
         fall, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:

@@ -21,9 +21,9 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 
 
 class SensingPoints(NamedTuple):
-    """Linear map from nodal displacements to changes of w gaps, sparse (3 n_nodes, w), and the gaps at rest.
+    """Linear map from nodal displacements to changes of w gaps, and the gaps at rest.
 
-    rows, columns : (k,) int; weights : (k,); gap : (w,) m
+    rows, columns, weights : (k,), entries of the map's sparse matrix (3 n_nodes, w); gap : (w,) m, at rest
     """
 
     rows: np.ndarray
@@ -41,7 +41,8 @@ class SensingPoints(NamedTuple):
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
-    """List the points: feet over electrodes, each in a triangle of nodes; inner nodes over the core, then beside it."""
+    """List the sensing points in order: feet over electrodes, each in a triangle of nodes, free inner nodes over the
+    core, and those beside it; none on a gel, whose mesh has no inner nodes."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)
@@ -54,7 +55,8 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
 
 
 def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Return the inner skin's free nodes (f,) in the order of their sensing points, which follow the electrodes'."""
+    """Return the inner skin's free nodes (f,), numbered on its lattice, in the order of their sensing points: over the
+    core, then beside it. In the list of all points the electrodes' feet come before them."""
     mesh = skin_mesh(sensor)
     return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
 
@@ -120,8 +122,9 @@ def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for all ``count`` sensing points the index of the point that stands for each, (count,), and if it is its
-    image: at z < 0 a free node's image does, else the point itself, as electrodes' feet always do."""
+    """Return for all ``count`` sensing points the index (count,) of the point that stands for each, and if that is its
+    mirror image, (count,) bool: the image stands for a free node at z < 0; others, and all feet, stand for themselves.
+    """
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count
     for nodes in (_beside(sensor, mesh), facing_nodes(sensor, mesh)) if count else ():

@@ -35,8 +35,9 @@ _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A sensor's solid with all that a contact on it needs; ``graded`` interpolates to the lattice's nodes.
-    cavity : None without fluid; core_nodes : (k,), mesh nodes of the inner skin that may touch the core"""
+    """A sensor's solid with all that a contact on it needs.
+    cavity : the fluid's, None on a gel; core_nodes : (k,), mesh nodes of the inner skin that may touch the rigid core
+    graded : the mesh, fine round the contact, which interpolates to the nodes of the sensor's surface lattice"""
 
     sensor: Sensor
     tier: Literal["full", "reference"]
@@ -48,10 +49,10 @@ class Body:
     def contact(
         self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
     ) -> FiniteStrainContact:
-        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most from its pose.
-
-        friction : Coulomb's; every_edge : add penalty points also for edges near the nodes at first touch, not only at
-            full depth"""
+        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most from ``pose``,
+        its first touch.
+        friction : Coulomb's coefficient; every_edge : add penalty points also for edges that are near nodes at first
+            touch, not only for those near at full depth"""
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
         near = mesh.surface[distance < _REACH]
@@ -65,8 +66,8 @@ class Body:
         )  # fmt: skip
 
     def _faces(self, indenter: Indenter, poses: tuple[Pose, ...], near: np.ndarray) -> np.ndarray | None:
-        """Faces (f, 9) among nodes near an indenter so sharp, in one of the poses, that they slide off it; else
-        None."""
+        """Return faces (f, 9) of the mesh all of whose nodes are among ``near`` (k,), if the indenter is so sharp
+        there, in one of the poses, that nodes slide off it; else None."""
         mesh = self.solid.mesh
         if not BENDS <= min(sharpest(indenter, pose, mesh.nodes[near]) for pose in poses) < BLUNT:
             return None
@@ -74,7 +75,8 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
-        """Return the surface's penetration, m, between nodes. Raises PenetrationError where it is too much."""
+        """Return the indenter's largest penetration, m, at the surface's nodes and between them, see
+        ``penetration_between``. Raises PenetrationError where that is too much."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)
@@ -83,12 +85,12 @@ class Body:
         return penetration_between(where, surface, indenter, touch.pose, touch.depth, closed=closed)
 
     def displacement(self, touch: ContactState) -> np.ndarray:
-        """Displacement (n, 3) m of the sensor's surface lattice."""
+        """Interpolate a contact's displacement (n, 3) m to the nodes of the sensor's surface lattice."""
         moved = touch.state.displacement[self.solid.mesh.surface]
         return self.graded.on_lattice(moved)
 
     def contact_patch(self, touch: ContactState) -> np.ndarray:
-        """Mark (n,) bool the lattice nodes that carry force."""
+        """Mark (n,) bool the surface lattice's nodes whose nearest mesh node carries force."""
         flags = np.isin(self.solid.mesh.surface, touch.outer.nodes[touch.outer.pressing > 0])
         return self.graded.nearest_on_lattice(flags)
 
@@ -101,8 +103,8 @@ def graded_body(
     tier: Literal["full", "reference"] = "full",
     spacing: float = 1.0,
 ) -> Body:
-    """A sensor's body, fine where the indenter, ``depth`` m in, overlaps the resting surface.
-
+    """Make a sensor's body, fine where the indenter, ``depth`` m beyond its ``pose`` at first touch, overlaps the
+    resting surface.
     spacing : of the fine part's nodes, over the tier's own. The reference tier's cells are half as large as the full
     tier's.
     """

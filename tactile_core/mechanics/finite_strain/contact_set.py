@@ -22,12 +22,12 @@ _NO_WAY = np.zeros((0, 3))
 @dataclasses.dataclass
 class ContactSet:
     """Contact of candidate nodes with one obstacle; changes in place during a load step.
-
-    candidates : (m,) mesh nodes that may touch; active, slipping : (m,) bool
+    candidates : (m,) mesh nodes that may touch; active, slipping : (m,) bool, those that touch, and those that slip
     anchor : (m, 3) m, in the indenter's frame, the place to which a touching node is tied
-    pressing : (k,) N, normal forces of the active nodes; rubbing : (k, 3) N, their friction, in the sensor's frame
-    normals : (k, 3) of the obstacle there; imbalance : of friction, relative to the largest normal force
-    friction : Coulomb's coefficient; grip : N/m, stiffness of the springs
+    pressing : (k,) N, normal forces of the k active nodes, positive where they press; rubbing : (k, 3) N, friction on
+        them, in the sensor's frame
+    normals : (k, 3), out of the obstacle at those nodes; friction : Coulomb's coefficient; grip : N/m, the springs'
+    imbalance : largest change of a node's friction in the last ``follow``, over the largest normal force
     """
 
     candidates: np.ndarray
@@ -86,10 +86,10 @@ class ContactSet:
         first_share: float = 0.0,
     ) -> ContactSet:
         """Return the set that starts the next load step: nodes that touched, and those the moved obstacle overlaps.
-
-        candidates : (m,) mesh nodes; at : (n, 3) m, the mesh's nodes now; before : the obstacle's pose until now
+        obstacle : where it is moved to; None: without contact. before : its pose until now, needed with friction
+        candidates : (m,) mesh nodes that may touch; at : (n, 3) m, the mesh's nodes now
         friction, grip : of the new set, see the class
-        first_share : where nothing touched, only nodes enter that overlap by this share of the largest overlap.
+        first_share : where nothing touched, only nodes enter that overlap by this share of the largest overlap
         Anchors of slipping nodes are dragged to where friction holds them."""
         m = len(candidates)
         if obstacle is None or not m:
@@ -154,7 +154,7 @@ class ContactSet:
 
         Newton's steps overshoot where many nodes begin to slip. move : (k, 3) m, of the nodes, in ``begin``'s frames
         force : N m, slope of the energy along the step at its start, without friction's; negative where it drives on
-        stiffness : N m, what the whole step adds to that slope, and to friction's as linearised by ``gripping``
+        stiffness : N m, what the whole step adds to that slope, friction's part as linearised by ``gripping`` included
         """
         if not self.friction:
             return 1.0
@@ -177,8 +177,9 @@ class ContactSet:
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:
-        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals, pressing times the Hessian, on
-        the obstacle's surface, where nodes ``at`` (n, 3) m will lie: deep inside, the curvature misleads."""
+        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals: pressing times the distance's
+        Hessian. at : (n, 3) m, the mesh's nodes; the Hessian is taken where those that touch will lie on the obstacle's
+        surface, for deep inside the curvature misleads."""
         if not self.active.any():
             return np.empty((0, 3, 3))
         return self.pressing[:, None, None] * self.obstacle.curvature(
@@ -204,9 +205,9 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Prescribe the normal steps, which close gaps, and zero for fixed (k, 3) bool axes.
-
-        Returns held (k, 3) bool and their steps (k, 3) m, in ``begin``'s frames."""
+        """Prescribe the touching nodes' normal steps, which close gaps, and zero steps along fixed (k, 3) bool axes.
+        Returns which axes are prescribed (k, 3) bool, and the steps (k, 3) m along them, 0 along others; all, and
+        ``fixed``, in ``begin``'s frames."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True
@@ -233,9 +234,8 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release nodes in tension, add those that penetrate; return true if none was and gaps are below the tolerance.
-
-        at : (n, 3) m, the mesh's nodes; tolerance : m"""
+        """Release touching nodes in tension, add others deeper in the obstacle than ``tolerance``, m; return true if
+        neither happened and touching nodes have gaps below it. at : (n, 3) m, the mesh's nodes now"""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])

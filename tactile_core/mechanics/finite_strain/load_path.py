@@ -33,9 +33,9 @@ _FAILURES = NoEquilibriumError, PenetrationError  # after which another way is t
 
 class LoadPath:
     """A path of one indenter on one sensor; ``to`` goes on from the step before.
-
-    pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth
-    depths : m, of the steps to come, as far as they are known; friction : Coulomb's coefficient"""
+    pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth that forces are sought at
+    depths : m, of the steps to come, guessed for forces; the mesh is made for the deepest
+    friction : Coulomb's coefficient"""
 
     body: Body
     problem: FiniteStrainContact
@@ -66,10 +66,10 @@ class LoadPath:
         self.last = self.problem.start()
 
     def to(self, step: Step, guess: float) -> Solution:
-        """Solve the next step, see ``solve_path``; guess : m, about the depth of a force.
-
-        Where the full tier's mesh finds no contact, tries in turn: a finer mesh, from the start; then, without
-        friction only, friction that fades to 0, and short steps.
+        """Solve the next step, see ``solve_path``; guess : m, about the depth at which a given force is found.
+        Where no contact is found, tries in turn: a finer mesh, from the start (full tier); then, in a contact without
+        friction, friction that fades to 0; then short steps from the start, and penalty points at every edge (full
+        tier).
         """
         before = self.last
         try:
@@ -126,7 +126,8 @@ class LoadPath:
         return self.problem.move(pose, before, self.step)
 
     def _at_force(self, pose: Pose, force: float, guess: float) -> ContactState:
-        """The contact at a force, N, along the motion, near the depth ``guess``, m."""
+        """Find the contact at a force, N, along the motion, near the depth ``guess``, m, under ``pose`` at first
+        touch."""
 
         def move(depth: float, before: ContactState) -> ContactState:
             """Solve the contact at a depth, m, along the pose's direction, going on from the one before."""

@@ -37,12 +37,12 @@ _FAILURES = NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.
 class FiniteStrainContact:
     """Contact of an indenter with a solid along a path of growing depth, or of poses.
 
-    touchable : (m,) mesh nodes that the indenter may touch
-    fixed : (3 n,) bool, degrees of freedom that do not move; None: those of the clamped nodes
-    cavity : incompressible fluid in the solid; ``pre_inflation`` m3 is added to its volume at rest
-    core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch
+    touchable : (m,) mesh nodes that the indenter may touch; pose : of the indenter at depth 0
+    fixed : (3 n,) bool, degrees of freedom that do not move, xyz node by node; None: those of the clamped nodes
+    cavity : incompressible fluid in the solid, or None; ``pre_inflation`` m3 is added to its volume at rest
+    core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch, without friction; None: there is none
     friction : Coulomb's coefficient, between indenter and sensor
-    factor : solver for the solid's sparsity pattern, if there is one already; tolerance : when iterations end
+    factor : solver for the solid's sparsity pattern; None: makes one; tolerance : when iterations end
     first_share : the first active set of a press from rest is of nodes that overlap by this share of the largest
         overlap
     faces : (f, 9) quadratic faces of the surface that get penalty points where the contact fails, see ``PenaltyPoints``
@@ -83,10 +83,10 @@ class FiniteStrainContact:
         return ContactState(0.0, self.pose, self.solid.rest(), ContactSet.none(), ContactSet.none(), NO_PUSH)
 
     def press(self, depth: float, start: ContactState | None = None, step: float = 0.1e-3) -> ContactState:
-        """Solve the contact at ``depth`` m, reached from ``start`` in load steps of at most ``step`` m.
-
-        A step that fails is halved. Raises TactileError, which names the part of the way reached, if a sixteenth of a
-        step fails, or too many have failed.
+        """Solve the contact at ``depth`` m, reached from ``start`` (None: from rest) in load steps of at most ``step``
+        m.
+        A depth no greater than the start's returns the start. A step that fails is halved. Raises NoEquilibriumError,
+        which names the part of the way reached, if a sixteenth of a step fails, or more than 8 have failed.
         """
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
@@ -95,9 +95,8 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel.
-
-        Raises TactileError with the part of the way that was reached.
+        """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel; a
+        turn travels on an arm of 5 mm. Raises as ``press`` does.
         """
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
@@ -105,10 +104,11 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve a contact without friction as ``move``, in steps of ``step`` m, by continuation from one with friction,
-        which fades to 0.
-
-        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without it."""
+        """Solve a contact without friction at another pose, in load steps of ``step`` m, by continuation from one with
+        friction, which fades to 0 at that pose.
+        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without
+        friction.
+        """
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
             for friction in _FADING[1:]:
@@ -184,7 +184,8 @@ class FiniteStrainContact:
         raise NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
-        """Share of a step that leaves every Gauss point a good part of its volume; else FloatingPointError."""
+        """Return the largest share of a step (n, 3) m, of 1, 1/2, 1/4 and 1/8, that leaves every Gauss point over 0.3
+        of its volume; FloatingPointError if none does."""
         before = self.solid.deformation(state.displacement)[1]
         for share in _SHARES:
             if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
@@ -199,7 +200,7 @@ class FiniteStrainContact:
         return self._penalty.push(outer.obstacle, at, spring * self._factor.stiffness)
 
     def _lets_through(self, touch: ContactState) -> bool:
-        """Return true if the indenter has come in between nodes."""
+        """Return true if the indenter is over 50 um deep at a penalty point."""
         obstacle, at = touch.outer.obstacle, self._at(touch.state)
         return bool(self._penalty and obstacle and self._penalty.deepest(obstacle, at) > LET_THROUGH)
 
@@ -221,8 +222,8 @@ class FiniteStrainContact:
     def _newton(
         self, state: State, outer: ContactSet, inner: ContactSet, fluid: float, push: Push, unrest: float
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
-        """Solve for a Newton step. fluid : its pressure, Pa; unrest : the last step's relative imbalance
-
+        """Solve for a Newton step. outer, inner : contact with indenter and core; fluid : its pressure, Pa
+        push : on penalty points; unrest : the last step's relative imbalance
         Returns the steps of displacement (n, 3) m and of the fluid's pressure Pa, the relative imbalance before them,
         the cells' pressure step (n_cells, 4) Pa, and the share of the step that friction allows."""
         lines = self.solid.linearise(state)
@@ -266,8 +267,8 @@ class FiniteStrainContact:
         return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
     def _pull(self, system: LinearSystem, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
-        """Step (n, 3) m, reactions (n, 3) N and rise of the fluid's pressure, Pa, by a linear system of a Newton step.
-
+        """Solve the linear system of a Newton step for the step (n, 3) m, reactions (n, 3) N and rise of the fluid's
+        pressure, Pa.
         swell : (n, 3) m2, gradient of the fluid's volume. Friction of ``outer`` follows the normal forces."""
         rise, prescribed = 0.0, system.prescribed
         known = (system.matrix @ prescribed.ravel()).reshape(-1, 3)

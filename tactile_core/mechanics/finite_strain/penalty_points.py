@@ -34,10 +34,10 @@ _WEIGHTS = _weights()
 
 @dataclasses.dataclass(frozen=True)
 class Push:
-    """Forces on k points between nodes.
-
-    nodes, weights : (k, 9), a point is the nodes' weighted mean; force : (k, 3) N, by the obstacle
-    stiffness : (k, 3, 3) N/m, by which the force falls as the point moves out
+    """Forces on k penalty points that an obstacle has reached.
+    nodes : (k, 9) int, of the mesh, and weights : (k, 9): each point is its nodes' weighted mean
+    force : (k, 3) N, of the obstacle on the points; stiffness : (k, 3, 3) N/m, minus the force's derivative by the
+        point
     """
 
     nodes: np.ndarray
@@ -51,13 +51,14 @@ class Push:
         return self.force.sum(axis=0)
 
     def loads(self, n: int) -> np.ndarray:
-        """Return the loads (n, 3) N on a mesh's n nodes."""
+        """Return the forces' loads (n, 3) N on a mesh's n nodes, shared out by the weights."""
         loads = np.zeros((n, 3))
         np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
         return loads
 
     def add_to(self, residual: np.ndarray, blocks: np.ndarray, pattern: BlockPattern) -> None:
-        """Subtract the loads from residual (n, 3) N, add their stiffness to blocks (n_blocks, 3, 3) N/m, in place."""
+        """Subtract the loads from residual (n, 3) N, internal minus outer forces, and add their stiffness to the
+        matrix's blocks (n_blocks, 3, 3) N/m, in the order of ``pattern``; both in place."""
         residual -= self.loads(len(residual))
         pairs = (self.weights[:, :, None] * self.weights[:, None])[..., None, None] * self.stiffness[:, None, None]
         rows, columns = np.repeat(self.nodes, 9, axis=1), np.tile(self.nodes, 9)
@@ -80,9 +81,9 @@ class PenaltyPoints:
         return np.einsum("pa,pai->pi", self._weights, at[self._nodes])
 
     def push(self, obstacle: Obstacle, at: np.ndarray, stiffness: float) -> Push:
-        """Push of an obstacle on the points.
+        """Return the push of an obstacle on the points more than 20 um inside it.
 
-        at : (n, 3) m, the mesh's nodes; stiffness : N/m, of each point's spring
+        at : (n, 3) m, the mesh's nodes now; stiffness : N/m, of each point's spring
         """
         points = self._points(at)
         distance, normal = obstacle.distance(points)

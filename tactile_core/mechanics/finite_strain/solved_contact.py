@@ -15,11 +15,12 @@ from .penalty_points import Push
 
 @dataclasses.dataclass
 class ContactState:
-    """A solved contact. depth : m, from the problem's own pose; state : of the solid; outer, inner : nodes that touch.
-
-    pose : of the indenter; push : on the penalty points, which ``guarded`` switches on
+    """A solved contact.
+    depth : m, from the problem's own pose; pose : of the indenter now; state : of the solid
+    outer, inner : contact of the surface with the indenter, and of the inner skin with the core
+    push : of the indenter on the penalty points; guarded : true if they are switched on
     fluid : Pa, rise of the fluid's pressure
-    iterations : Newton iterations of the last load step; steps : load steps, halved ones counted
+    iterations : Newton iterations of the last load step; steps : load steps since the start, failed ones counted
     """
 
     depth: float
@@ -43,7 +44,7 @@ class ContactState:
 class Tolerance:
     """Criteria that end an iteration: gaps below ``gap``, and an imbalance below ``balance`` or a step below ``step``.
 
-    gap : m; balance : residual over the largest nodal force, and the fluid's excess volume over its volume
+    gap : m; balance : residual over the largest internal nodal force, or the fluid's excess volume over its volume
     step : m; after so small a step the balance is good, by quadratic convergence
     """
 

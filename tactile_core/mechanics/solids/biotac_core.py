@@ -21,7 +21,7 @@ class Core:
         self.sensor, self._skin = sensor, skin_of(sensor)
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
+        """Return the gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
 
         The gap is (r - R) / |grad (r - R)|, exact to first order, as is the normal where the gap is closed.
         Beyond the table's ends the last radius is held.
@@ -78,8 +78,8 @@ def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def above_core(sensor: str) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin; distances (n,) m.
-
+    """Return unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin, distances (n,)
+    m.
     On the sides too, where ``Core`` has no table.
     """
     import scipy.spatial

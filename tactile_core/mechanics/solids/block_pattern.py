@@ -10,7 +10,7 @@ import numpy as np
 class BlockPattern:
     """Sums cell matrices into one block per pair of neighbouring nodes, and makes sparse matrices of the blocks.
 
-    rows, columns : (n_blocks,) node of each block; diagonal : (n_nodes,) its block
+    rows, columns : (n_blocks,), the two nodes of each block; diagonal : (n_nodes,), each node's block with itself
     """
 
     def __init__(self, cells: np.ndarray, clamped: np.ndarray) -> None:
@@ -39,7 +39,8 @@ class BlockPattern:
         return np.searchsorted(self._places, rows.astype(np.int64) * self.n_nodes + columns)
 
     def turn(self, blocks: np.ndarray, nodes: np.ndarray, frames: np.ndarray) -> None:
-        """Express ``nodes`` (k,) of blocks (n_blocks, 3, 3) in their frames (k, 3, 3), axes as columns; in place."""
+        """Express the rows and columns of ``nodes`` (k,) in blocks (n_blocks, 3, 3) along the axes of these nodes' own
+        frames (k, 3, 3), the columns; in place."""
         index = np.full(self.n_nodes, -1)
         index[nodes] = np.arange(len(nodes))
         for side, of in ((0, self.rows), (1, self.columns)):
@@ -68,8 +69,8 @@ class BlockPattern:
         return rows[keep], columns[keep], keep, starts
 
     def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
-        """Assemble the upper triangle of the free degrees of freedom, scipy CSR, identity rows for ``held`` ones.
-
+        """Assemble the matrix's upper triangle among unclamped degrees of freedom, scipy CSR, identity rows for held
+        ones.
         blocks : (n_blocks, 3, 3); held : (n_free,) bool. The pattern is the same every time: a solver may keep its
             analysis."""
         import scipy.sparse

@@ -41,22 +41,22 @@ class NeoHookean:
     def from_material(cls, material: Material, *, split: bool = False) -> NeoHookean:
         """Return mu = E / (2 (1 + nu)) and kappa = E / (3 (1 - 2 nu)), linear elasticity at small strain.
 
-        split : whether ``SHARE`` times mu of kappa acts at the points
+        split : true to let a part of kappa, 4 mu (``SHARE``), act at the Gauss points, see ``at_points``
         """
         shear = material.youngs / (2 * (1 + material.poisson))
         at_points = SHARE * shear if split else 0.0
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)) - at_points, at_points)
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Return the energy density (...,) J/m3, but for the cells' pressures, of gradients f (..., 3, 3) with
-        determinants j (...,)."""
+        """Return the energy density (...,) J/m3, without the cells' pressures' part, of deformation gradients f (...,
+        3, 3) with determinants j (...,)."""
         isochoric = self.shear / 2 * (j ** (-2 / 3) * np.einsum("...ij,...ij->...", f, f) - 3)
         return isochoric + self.at_points / 2 * (j - 1) ** 2
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative (..., 3, 3, 3, 3)
         by F.
-        f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, of the cells, positive where they are larger"""
+        f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, pressure of the cells, tension positive"""
         cofactor = cofactors(f)
         g = cofactor / j[..., None, None]  # F^-T
         i1 = np.einsum("...ij,...ij->...", f, f)
@@ -119,8 +119,8 @@ class State:
 class FiniteStrainSolid:
     """Residual and tangent of a mesh of one material; see the module for the energy.
 
-    material : linear constants, of ``NeoHookean.from_material``, or the law
-    pattern : of the mesh's cells, if there is one already
+    material : the law, or linear constants to make it of (``NeoHookean.from_material``, not split)
+    pattern : of the mesh's cells; None: made at first use. Raises ValueError for cells that are turned inside out
     """
 
     def __init__(self, mesh: HexMesh, material: Material | NeoHookean, pattern: BlockPattern | None = None) -> None:
@@ -206,8 +206,8 @@ class FiniteStrainSolid:
 @dataclasses.dataclass
 class Linearised:
     """A solid's equations at one state, cell by cell, pressure eliminated.
-
-    residual : (n_cells, 81) N; condensed : the same after elimination of the pressure, with its own residual
+    residual : (n_cells, 81) N, internal forces; condensed : those plus what the pressures' own residual adds as they
+        are eliminated
     stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
     to_pressure, pressure_gap : (n_cells, 4, 81) Pa/m and (n_cells, 4) Pa, for ``pressure_step``"""
 
@@ -219,7 +219,8 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """Return the internal force (3 n,) N, of ``condensed``, which the Newton step needs, or of ``residual``."""
+        """Sum cells to the internal force (3 n,) N on nodes, xyz each: of ``condensed``, which the Newton step needs,
+        or (false) of ``residual``."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)

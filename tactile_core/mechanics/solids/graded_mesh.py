@@ -40,9 +40,9 @@ class Footprint:
 @dataclasses.dataclass(frozen=True)
 class GradedMesh:
     """A graded solid, its matrix's sparsity pattern and solver, and its lines.
-
-    rows (i,), columns (j,) : places of the mesh's lines in the lattice
-    to_rows (rows, i), to_columns (columns, j) : interpolate from the mesh's lines to the lattice's
+    rows (i,), columns (j,) : places of the mesh's lines of nodes, in real-valued rows and columns of the lattice
+    to_rows (rows, i), to_columns (columns, j) : matrices from values on the mesh's lines to values on the lattice's; a
+        skin's last column is its first, and has none
     """
 
     mesh: HexMesh
@@ -63,7 +63,8 @@ class GradedMesh:
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Interpolate flags (n_surface,) at the mesh's surface nodes linearly to the lattice's (n,), true above 1/2."""
+        """Interpolate flags (n_surface,) bool at the mesh's surface nodes linearly to the lattice's (n,) bool, true
+        above 1/2."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 
@@ -92,7 +93,7 @@ class GradedMesh:
 
 
 def graded(sensor: str, footprint: Footprint) -> GradedMesh:
-    """A sensor's solid, fine under ``footprint``."""
+    """Make a sensor's solid, fine in ``footprint`` and ever coarser away from it."""
     return _graded_gel(sensor, footprint) if sensors.is_gel(sensor) else _graded_skin(sensor, footprint)
 
 

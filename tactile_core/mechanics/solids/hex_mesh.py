@@ -17,11 +17,11 @@ GEL_LAYERS = np.array([0.0, 0.25, 0.5, 0.65, 0.8, 0.9, 1.0])
 @dataclasses.dataclass(frozen=True)
 class HexMesh:
     """A solid of quadratic hexahedra.
-
     nodes : (n, 3) float64, m
     cells : (n_cells, 27) int, node a + 3 b + 9 c of a cell at (xi, eta, zeta) = (a, b, c) - 1
     clamped : (n,) bool, nodes that do not move
-    surface : (n_surface,) int, the mesh node of each node of the sensor's surface lattice
+    surface : (n_surface,) int, nodes of the side that is touched, in the order of its grid (a ``skin_solid``'s poles
+        last): of an ungraded mesh the sensor's surface lattice
     inner : (n_inner,) int, likewise for the inner skin (empty for the gel)
     """
 
@@ -83,21 +83,22 @@ def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: 
 
 
 def inner_faces(mesh: HexMesh) -> np.ndarray:
-    """Quadratic faces (n, 9) of the inner skin, seen from outside the fluid: the undersides of the cells on it."""
+    """Return the quadratic faces (n, 9) of the inner skin, the undersides of its cells, in the node order that
+    ``FluidCavity`` takes: outward from the fluid."""
     faces = mesh.cells[:, :9]
     faces = faces[np.isin(faces, mesh.inner).all(axis=1)]
     return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)
 
 
 def outer_faces(mesh: HexMesh) -> np.ndarray:
-    """Quadratic faces (n, 9) of the surface that is touched, node 3 b + a at (xi, eta) = (a, b) - 1."""
+    """Return the quadratic faces (n, 9) of the side that is touched, node 3 b + a at (xi, eta) = (a, b) - 1."""
     faces = mesh.cells[:, 18:]
     return faces[np.isin(faces, mesh.surface).all(axis=1)]
 
 
 @functools.cache
 def gel_mesh(sensor: str = sensors.TARGET) -> HexMesh:
-    """A sensor's gel on the lattice of its surface; the DIGIT's has about 20,000 nodes."""
+    """Make the mesh of a sensor's gel, on the lattice of its surface; the DIGIT's has about 20,000 nodes."""
     shape = sensors.shape_of(sensor)
     surface = shape.surface()
     return gel_solid(surface.grid(surface.rest), shape.back_y)
@@ -105,19 +106,19 @@ def gel_mesh(sensor: str = sensors.TARGET) -> HexMesh:
 
 @functools.cache
 def skin_mesh(sensor: str = sensors.SOURCE) -> HexMesh:
-    """A sensor's skin on its lattice, clamped where its inner side meets the core; the BioTac's has 18,200 nodes."""
+    """Make the mesh of a sensor's skin, clamped where its inner side meets the core; the BioTac's has 18,200 nodes."""
     skin = sensors.skin_of(sensor)
     return skin_solid(skin.skin_grid("outer"), skin.skin_grid("inner"), glued_skin(sensor))
 
 
 def solid_mesh(sensor: str) -> HexMesh:
-    """The solid of a sensor: its gel, or its skin."""
+    """Return the mesh of a sensor's solid: its gel, or its skin."""
     return gel_mesh(sensor) if sensors.is_gel(sensor) else skin_mesh(sensor)
 
 
 @functools.cache
 def glued_skin(sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Mark the inner points of the skin's grid (stations, columns) that lie on or in the core."""
+    """Mark (stations, columns) bool the inner points of the skin's grid that lie on or in the core, or at its ends."""
     inner = sensors.skin_of(sensor).skin_grid("inner")
     return _on_core(sensor, inner.reshape(-1, 3)).reshape(inner.shape[:2])
 

@@ -68,7 +68,7 @@ class PatternFactor:
         self._analysed: tuple[np.ndarray, np.ndarray] | None = None  # the pattern, whose analysis PARDISO keeps
 
     def __call__(self, upper) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy CSR)
-        """A function that solves ``matrix @ x = b`` for b (n, k); valid until the next call.
+        """Return a function that solves ``matrix @ x = b`` for b (n, k); valid until the next call.
 
         upper : the matrix's upper triangle, sorted, all of the diagonal in it. Raises NotPositiveDefiniteError as
         ``factor`` does.
@@ -137,7 +137,7 @@ class DampedFactor:
     Where the solid is unstable (a node about to slide off a ridge) Newton's iteration then follows it to the next
     equilibrium, which does not depend on the damping.
 
-    damping : in use now, over ``stiffness``, a typical node's own, N/m
+    damping : added to each node's own stiffness, over ``stiffness``, N/m, that of a typical node
     """
 
     def __init__(self, solid: FiniteStrainSolid, factor: PatternFactor) -> None:
@@ -150,9 +150,9 @@ class DampedFactor:
         self.damping = self.damping / 4 if self.damping > _LEAST else 0.0
 
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function from forces (n, 3) N to displacements (n, 3) m, which are zero where ``held`` (n, 3).
+        """Return a function from forces (n, 3) N to displacements (n, 3) m, which are zero where held (n, 3) bool.
 
-        blocks : of the tangent on the solid's pattern; the damping is added to them.
+        blocks : (n_blocks, 3, 3) N/m, of the tangent on the solid's pattern; the damping is added to them in place.
         Raises NotPositiveDefiniteError where even much damping is too little.
         """
         free, pattern = self._pattern.free, self._pattern
@@ -188,10 +188,10 @@ def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
 
 class LinearSystem(NamedTuple):
     """Linear system of a Newton step, in the frames of the nodes that touch.
-
     solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
-    residual : (n, 3) N; prescribed : (n, 3) m, of what is held
-    loose_swell : (n, 3) m2, gradient of the fluid's volume where nothing is held; excess : m3, of the fluid's volume
+    residual : (n, 3) N, internal minus outer forces; prescribed : (n, 3) m, steps of what is held, 0 elsewhere
+    loose_swell : (n, 3) m2, gradient of the fluid's volume, 0 at what is held
+    excess : m3, of the fluid's volume over that which it must have
     """
 
     solve: Callable[[np.ndarray], np.ndarray]
