@@ -11,7 +11,7 @@ from ..errors import TactileError
 from ..sensors import COUNT_MAX, divider, typical_rest
 from .flags import Flag
 from .recording import Recording
-from .repair import END, SHORT, fill, find_glitches, is_time_series
+from .repair import END, SHORT, faded_ends, fill, find_glitches, is_time_series
 from .signal_kind import FULL_SCALES, RAW_LEVEL, full_scale
 
 DEAD_FRAMES = 100  # a channel with 0.7-1.5 counts of noise does not stand still for 1 s
@@ -107,13 +107,14 @@ def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
     found = np.zeros(len(still), bool)
     for first, last in runs(still):
         found[first:last] = last - first >= FROZEN
-    return found if found.any() and _noisy(electrodes[~still]) else np.zeros(len(still), bool)
+    return found if found.any() and noise_turns(electrodes[~still]) >= TURNS else np.zeros(len(still), bool)
 
 
-def _noisy(electrodes: np.ndarray) -> bool:
-    """Return true if no row of electrodes (T, e) equals the one before, and readings rise and fall as noise does."""
+def noise_turns(electrodes: np.ndarray) -> float:
+    """Return the share of rows at which an electrode's readings turn, from rising to falling or back: the median over
+    electrodes (T, e), in any unit, no row equal to the one before; 0 of fewer than three."""
     moves = np.diff(electrodes, axis=0)
-    return len(moves) > 1 and bool(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0)) >= TURNS)
+    return float(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0))) if len(moves) > 1 else 0.0
 
 
 def mended(
@@ -129,6 +130,14 @@ def mended(
             flags = flags | np.where(again, Flag.REPAIRED, 0).astype(np.uint16)
             flags |= np.where(long, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
             unreadable |= again[:, None]
+            faded = faded_ends(readings)
+            if faded.any():
+                flags |= np.where(faded, Flag.DEAD_CHANNEL, 0).astype(np.uint16)
+                unreadable |= faded[:, None]
+                warnings.append(
+                    f"{faded.sum()} rows at the ends fade to half of their neighbours, all electrodes alike: averaged "
+                    "with zeros beyond the ends? Not believed; average with the ends repeated, or not at all"
+                )
         glitches = _glitches(recording, fill(readings, unreadable), warnings)
     flags = np.where(glitches.any(axis=1), flags | np.uint16(Flag.REPAIRED), flags)
     bad = glitches | unreadable
@@ -142,7 +151,7 @@ def mended(
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
     """Mark rows (T,) of electrodes (T, e) equal to the row before; also return true if noise makes them faults."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
-    return same, bool(same.mean() <= MOST_STALE) and _noisy(electrodes[~same])
+    return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 
 
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:

@@ -11,6 +11,7 @@ from ..errors import TactileError
 from ..sensors import contacts_of
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import FALLS, Fluid
+from .averaged import averaged
 from .doubt import LAW, Doubt, Reason, without
 from .electrode_faults import dead, mended, saturated, strange_rest
 from .flags import Flag
@@ -63,6 +64,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     slope = (at_end - at_start) / recording.duration if recording.duration > 0 else np.zeros(len(at_start))
     window = options.smooth or (RECTIFIED if kind == "rectified" else SIGNED)
     change = _changes(readings, rest, window)
+    flags |= averaged(recording, readings, change, warnings)
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
     flags |= np.uint16(polarity.doubt)
     warnings += polarity.warnings

@@ -16,6 +16,7 @@ LEVEL = 10.0  # counts that the level may have moved during any glitch, whatever
 STEEPER = 3.0  # times the jump must exceed the calmer neighbouring step: a steep press is steep on both sides (assumed)
 ALONE = 3  # electrodes that jump together in a stuck run; a real contact moves most of the 19 (assumed)
 ROUNDS = 12  # glitches within glitches are peeled off one by one; a backstop
+TOGETHER = 0.02  # share by which electrodes that fade together may differ; in a contact they differ more (assumed)
 MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothing is repaired (assumed)
 
 
@@ -176,6 +177,26 @@ def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, in
         kept = (steps[start] * steps[end] < 0) & _is_flat_jump(ends, around)
         pairs += zip(start[kept].tolist(), end[kept].tolist(), around[kept].tolist(), strict=True)
     return sorted(pairs)
+
+
+def faded_ends(readings: np.ndarray) -> np.ndarray:
+    """Mark rows (T,) bool at either end of raw readings (T, e) counts that were averaged with zeros from beyond it:
+    from about half of what follows they rise evenly, all electrodes alike (``numpy.convolve(..., "same")``)."""
+    found = np.zeros(len(readings), bool)
+    found[: _faded(readings)] = True
+    found[len(readings) - _faded(readings[::-1]) :] = True
+    return found
+
+
+def _faded(readings: np.ndarray) -> int:
+    """Return how many first rows of readings (T, e) counts fade."""
+    if len(readings) < 3 or not (readings[1] > readings[0]).all() or not readings[0].all():
+        return 0
+    rows = round(float(np.median(readings[0] / (readings[1] - readings[0]))))  # that the first average holds
+    if rows < 3 or 2 * rows > len(readings):
+        return 0
+    share = readings[: rows - 1] / readings[0] / (1 + np.arange(rows - 1) / rows)[:, None]  # the last may be whole
+    return rows if np.abs(share - 1).max() < TOGETHER else 0
 
 
 def smooth(values: np.ndarray, frames: int) -> np.ndarray:

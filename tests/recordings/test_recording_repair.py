@@ -189,3 +189,33 @@ def test_rectified_recordings_are_smoothed_others_when_told(slide_csv):
     np.testing.assert_array_equal(said.electrodes, plain.electrodes)
     folded = prepare(recording, PrepareOptions(kind="rectified", tare="none"))
     assert folded.report["smoothed_frames"] == 3
+
+
+def averaged(columns, rows, mode="edge"):
+    """Average columns (T, e) over an odd number of rows round each; mode : of ``numpy.pad``, beyond the ends."""
+    padded = np.pad(columns, ((rows // 2, rows // 2), (0, 0)), mode=mode)
+    return np.stack([np.convolve(column, np.ones(rows) / rows, "valid") for column in padded.T], axis=1)
+
+
+@pytest.mark.parametrize("decimals", [0, 6])
+@pytest.mark.parametrize("rows", [21, 51])
+def test_a_moving_average_is_told_and_flagged_where_it_moves(rows, decimals, press, tmp_path):
+    def prepared(electrodes):
+        np.savez(tmp_path / "touch.npz", electrodes=electrodes, time=press.time)
+        return prepare(read(tmp_path / "touch.npz"))
+
+    assert prepared(press.electrodes).warnings == ()
+    found = prepared(averaged(press.electrodes, rows).round(decimals))
+    assert "lack the noise" in " ".join(found.warnings)
+    beyond = (found.flags & Flag.OUT_OF_RANGE) > 0
+    edges = np.flatnonzero(np.diff(press.contact.astype(int)))
+    assert beyond[edges].all() and not beyond[:100].any() and not beyond[-50:].any()
+
+
+@pytest.mark.parametrize("rows", [5, 51])
+def test_ends_averaged_with_zeros_are_no_touch(rows, press, tmp_path):
+    np.savez(tmp_path / "touch.npz", electrodes=averaged(press.electrodes, rows, "constant"), time=press.time)
+    found = prepare(read(tmp_path / "touch.npz"))
+    assert "averaged with zeros" in " ".join(found.warnings)
+    ends = np.r_[: rows // 2, len(press.time) - rows // 2 : len(press.time)]
+    assert (found.flags[ends] & Flag.DEAD_CHANNEL).all() and np.abs(found.change[ends]).max() < 10

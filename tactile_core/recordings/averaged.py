@@ -1,0 +1,48 @@
+"""Find recordings that hold moving averages of the readings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .electrode_faults import TURNS, noise_turns, repeats
+from .flags import Flag
+from .polarity import TOUCHING
+from .recording import BLOCK, Recording
+from .rest_level import Framewise
+
+# Share of turns by noise below which readings are averaged. Rounded to counts, half of 142 real recordings turn in .149
+# and more of the samples, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06.
+LEAST_TURNS = TURNS / 2
+AT = 100.0  # Hz at which turns are counted: rows interpolated to a higher rate are no averages
+HALF = 0.25  # s to either side, within which averages of 50 rows mix readings
+MOVES = 0.5  # share of a change by which it moves within them, to be doubted (assumed)
+COARSE = 2.0  # counts between readings from which noise is lost in their steps, so that nothing is known
+
+
+def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warnings: list[str]) -> np.ndarray:
+    """Return flags (T,) of a recording that holds moving averages, where it moves within them; extends warnings.
+    readings : (T, e) counts; change : (T, e) counts, against rest"""
+    flags = np.zeros(len(readings), np.uint16)
+    if recording.simulated or not np.isfinite(recording.time).all() or not _lacks_noise(readings, recording.rate):
+        return flags
+    warnings.append(
+        "readings lack the noise of a finger: averaged over many rows, or simulated without noise. Where they move "
+        "within half a second, forces may be too low or too late, and are flagged: give readings as they were recorded"
+    )
+    half = max(1, round(HALF * recording.rate))
+    for start in range(0, len(readings), BLOCK):
+        rows = np.arange(start, min(start + BLOCK, len(readings)))
+        before, after = np.maximum(rows - half, 0), np.minimum(rows + half, len(readings) - 1)
+        moved = np.linalg.norm(change[after] - change[before], axis=1)
+        moving = moved > np.maximum(TOUCHING, MOVES * np.linalg.norm(change[rows], axis=1))
+        flags[rows[moving]] = np.uint16(Flag.OUT_OF_RANGE)
+    return flags
+
+
+def _lacks_noise(readings: np.ndarray, rate: float) -> bool:
+    """Return true if readings (T, e) counts at this rate, Hz, rise and fall without a finger's noise."""
+    whole = np.rint(readings[: BLOCK * max(1, round(rate / AT)) : max(1, round(rate / AT))])
+    whole = whole[~repeats(whole)[0]]
+    steps = np.abs(np.diff(whole, axis=0))
+    fine = bool((steps > 0).any()) and np.percentile(steps[steps > 0], 5) < COARSE
+    return fine and noise_turns(whole) < LEAST_TURNS
