@@ -89,8 +89,7 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
     """Return points (n, 3) m of the surface through nodes ``axes`` (3, rows, columns) m at (row, column) places (2, n).
 
     axes : contiguous; places : real-valued, node (i, j) at (i, j)
-    closed : true if the last column joins the first; places beyond an end that is not joined count as the end
-    """
+    closed : true if the last column joins the first; places beyond an end that is not joined count as the end"""
     return _points_on_grid(axes, np.ascontiguousarray(places, float), closed)
 
 
@@ -114,8 +113,7 @@ def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tupl
 
 
 def catmull_rom(t: np.ndarray | float) -> np.ndarray:
-    """Return the weights (4, ...) of the nodes -1, 0, 1, 2 at places t (...) between 0 and 1: cubic, once
-    differentiable."""
+    """Return the weights (4, ...) of nodes -1, 0, 1, 2 at places t (...), 0 to 1: cubic, once differentiable."""
     square = t * t
     cube = square * t  # numpy's general power takes ten times as long
     return np.array([

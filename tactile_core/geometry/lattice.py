@@ -73,8 +73,7 @@ class Lattice:
 
 def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
     """Return the triangles (n, 3) int32 of a grid, two per cell, nodes counted row by row; outward if the cross product
-    of the steps to the next row and to the next column is. closed : true if the last column joins the first
-    """
+    of the steps to the next row and to the next column is. closed : true if the last column joins the first"""
     row = np.arange(rows - 1)[:, None]
     column = np.arange(columns if closed else columns - 1)[None, :]
     right = (column + 1) % columns

@@ -80,8 +80,7 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
     """Return the shape error, m rms, and relative force error that 95 of 100 contacts stay below at a depth.
     tier : ``fast``, ``full`` or ``reference``; share : the depth, divided by the sensor's thickness; 0 has no error
     The fast tier's errors are against the full tier, whose own errors add to them. Deeper than the deepest measured
-    bin, that bin's errors are returned; NaN for a sensor whose errors nobody has measured.
-    """
+    bin, that bin's errors are returned; NaN for a sensor whose errors nobody has measured."""
     if share <= 0:
         return 0.0, 0.0
     bins = measured()["tiers"][tier].get(sensor, _UNKNOWN)["bins"]
@@ -98,8 +97,7 @@ def unsure_side(contact: Contact, normals: np.ndarray, radius: float) -> float:
     contact moves by more than 10 um; 0 without contact.
 
     contact : of the fast tier; normals : (n, 3), outward, of the resting surface, all nodes
-    radius : m, of the indenter where it is sharpest
-    """
+    radius : m, of the indenter where it is sharpest"""
     if not len(contact.nodes):
         return 0.0
     size, force = np.linalg.norm(contact.nodal_force, axis=1), float(np.linalg.norm(contact.force))

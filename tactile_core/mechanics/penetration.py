@@ -74,8 +74,7 @@ def check_follows(
     where : begins the error's text; grid : (rows, columns, 3) m, the nodes; closed : true if its last column joins the
         first
     normals : (k, 3), outward, of the indenter at the nodes that carry force
-    behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back
-    """
+    behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back"""
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
         raise _let_through(where, found)

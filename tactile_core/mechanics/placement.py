@@ -66,8 +66,7 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
     """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch; negative
-    where the resting surface rises. ``_FARTHEST`` if the indenter has slid off the sensor.
-    """
+    where the resting surface rises. ``_FARTHEST`` if the indenter has slid off the sensor."""
     if same_line(pose, slid):
         return 0.0
     try:
@@ -105,8 +104,7 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
     """Find first touch of an indenter that comes from outside along the direction of ``pose``, which may stand anywhere
     on that line.
-    Raises TactileError if it passes the sensor by.
-    """
+    Raises TactileError if it passes the sensor by."""
     before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
     return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
 
@@ -115,8 +113,7 @@ def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) 
     """Find where the line on which an indenter's foremost point moves meets a surface, on the side met first.
     axes : (3, rows, columns) m, x, y, z of the surface's nodes; closed : true if its last column joins the first
     Returns the place (1, 2), row and column with fractions, and the point (1, 3) m; None if no node lies within 1 mm of
-    the line.
-    """
+    the line."""
     foremost = pose.support(indenter, pose.direction)
     along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
     near = beside < _BESIDE
@@ -236,8 +233,7 @@ class Placement:
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
     """Find the pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z) of a
-    gel. The indenter's tilt is from the surface normal there.
-    """
+    gel. The indenter's tilt is from the surface normal there."""
     point, outward = sensors.surface_point(sensor, place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
     return first_touch(sensors.sensor_surface(sensor), indenter, pose)
@@ -264,6 +260,5 @@ def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
 
 
 def depth_at(share: float, sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """Return the depth, m, that is ``share`` of the thickness under an indenter whose ``pose`` is at first touch; at
-    most 2.4 mm."""
+    """Return the depth, m, at most 2.4 mm, that is ``share`` of the thickness under an indenter at first touch."""
     return min(share * thickness_under(sensor, indenter, pose), _DEEPEST)

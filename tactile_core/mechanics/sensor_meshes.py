@@ -28,8 +28,7 @@ def vtk_order() -> np.ndarray:
     """Return the node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
     VTK counts corners, edges (of the bottom, of the top, then the upright ones), faces -x +x -y +y -z +z and the
     middle; bottom corners before top ones: Schroeder, Martin, Lorensen, The Visualization Toolkit,
-    vtkTriQuadraticHexahedron.
-    """
+    vtkTriQuadraticHexahedron."""
     square = [(0, 0), (2, 0), (2, 2), (0, 2)]
     sides = [(1, 0), (2, 1), (1, 2), (0, 1)]
     places = [(a, b, c) for c in (0, 2) for a, b in square]
@@ -85,8 +84,7 @@ def write_vtu(
     the outside exerts on each node (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and that
     stress's ``von_mises`` Pa, see ``stress.at_nodes``; cells have ``von_mises``, mean over the cell's volume, and
     ``pressure`` Pa at the cell's middle, compression positive.
-    Raises what ``write_ply`` raises, and FloatingPointError for a state that is turned inside out.
-    """
+    Raises what ``write_ply`` raises, and FloatingPointError for a state that is turned inside out."""
     point_data: Data = {"clamped": mesh.clamped.astype(np.uint8)}
     cell_data: Data = {}
     if solid is not None and state is not None:
@@ -221,8 +219,7 @@ def write_surface(
     """Write a sensor's surface moved by ``displacement`` (n, 3) m, in the format that the ending of ``path`` says, with
     that displacement and ``columns``, (n,) or (n, 3) by name.
     PLY and STL hold the deformed places; VTU the resting ones and the displacement beside them, as VTK's own tools
-    expect it. STL has no room for columns. Raises what the writers raise.
-    """
+    expect it. STL has no room for columns. Raises what the writers raise."""
     check_suffix(path)
     lattice = sensor_surface(sensor)
     columns = {"displacement": displacement, **columns}

@@ -102,8 +102,7 @@ def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Plac
 def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
     """Radius, m, of the ball whose paraboloid fits a pressed patch best, within ``RADII``; ``USUAL_RADIUS`` if the
     patch has less than 5 nodes.
-    points : (k, 3) m of its nodes, displaced; outward : (3,), normal of the patch
-    """
+    points : (k, 3) m of its nodes, displaced; outward : (3,), normal of the patch"""
     if len(points) < LEAST_NODES:
         return USUAL_RADIUS
     height = outward / np.linalg.norm(outward)

@@ -53,8 +53,7 @@ class Solution(Summary):
     core_nodes : number of inner-skin nodes that press on the core; on_demand : functions behind the costly properties
     load_steps : number since the solution before
     volume : the solid and its state, of the full and the reference tier; None from the fast one
-    between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points); None without
-    """
+    between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points); None without"""
 
     tier: Tier
     converged: bool
@@ -111,7 +110,6 @@ class Solution(Summary):
 
 
 def centre_of_pressure(places: np.ndarray, nodal_force: np.ndarray) -> np.ndarray:
-    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by the size of nodal_force (k, 3) N; NaN where no
-    force is."""
+    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by the size of nodal_force (k, 3) N, NaN for 0."""
     weight = np.linalg.norm(nodal_force, axis=1)
     return weight @ places[:, [0, 2]] / weight.sum() if weight.any() else np.full(2, np.nan)

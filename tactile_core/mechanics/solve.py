@@ -74,8 +74,7 @@ def solve_path(
     sensor, indenter, place, tier, friction : as in ``solve``
     steps : taken one by one in the fast tier; all at once in the others, whose mesh is made for the deepest
     limit : m, the greatest depth (default: 60 % of the thickness there)
-    Raises what ``solve`` raises; solutions already yielded hold.
-    """
+    Raises what ``solve`` raises; solutions already yielded hold."""
     if tier not in TIERS:
         raise TactileError("solve, tier", repr(tier), "fast, full or reference")
     friction = finite_number(friction, "solve, friction", "a coefficient of zero or more", 0.0)

@@ -16,8 +16,7 @@ from .indenter import NEAREST
 class Outline(NamedTuple):
     """A two-dimensional signed distance at n places: ``value`` (n,) m, positive outside, and ``slope`` (n, 2), its
     gradient.
-    radius : (n,) m, of curvature of the line of equal distance through each place; infinite where it is straight
-    """
+    radius : (n,) m, of curvature of the line of equal distance through each place; infinite where it is straight"""
 
     value: np.ndarray
     slope: np.ndarray
@@ -38,8 +37,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
     """Return the signed distance (n,) m from a rounded prism, and its gradient (n, 3): two components across, one
     along.
     outline : of the prism, at the places across; along : (n,) m, the places along its axis, from its middle
-    half_span : m, half the prism's length before it is inflated by ``edge`` m
-    """
+    half_span : m, half the prism's length before it is inflated by ``edge`` m"""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     found, far = corner - edge, corner

@@ -111,8 +111,7 @@ class Pose:
         return Pose(self.apex + depth * self.direction, self.axes, self.push)
 
     def slid(self, along: float, across: float) -> Pose:
-        """Return the pose after sliding by ``along``, m, along the indenter's own x and ``across``, m, along its own
-        y."""
+        """Return the pose after sliding by ``along`` and ``across``, m, along the indenter's own x and y."""
         return Pose(self.apex + self.axes[:, 0] * along + self.axes[:, 1] * across, self.axes, self.push)
 
     def to_own(self, points: np.ndarray) -> np.ndarray:
@@ -152,8 +151,7 @@ def pose_on(
     """Return the pose in which the indenter just touches ``point`` (3,) m of a surface, unit normal ``outward`` (3,).
 
     tilt : rad, between the indenter's axis, along which it moves, and that normal
-    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
-    """
+    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z"""
     along, side = tangents(outward)
     axis = np.cos(tilt) * outward + np.sin(tilt) * (np.cos(tilt_heading) * along + np.sin(tilt_heading) * side)
     first = along - axis * (along @ axis)

@@ -15,8 +15,7 @@ from .scene_form import SceneForm, Size
 class LyingCylinder(Cylinder):
     """A cylinder along the own x that touches with its side. Lengths in m; ``edge`` is the radius of its rounded rims.
 
-    An edge as large as the cylinder's radius makes the ends half balls.
-    """
+    An edge as large as the cylinder's radius makes the ends half balls."""
 
     length: float = 20e-3
     axis: ClassVar[int] = 0

@@ -14,8 +14,7 @@ _TOGETHER = 20_000  # points looked up at a time without numba
 
 class NearTriangles:
     """Search index of triangles (m, 3, 3), any unit: cut into pieces no longer than ``cell``, sorted into cubes of that
-    side; it is raised for many long triangles. middles : (k, 3), of the pieces
-    """
+    side; it is raised for many long triangles. middles : (k, 3), of the pieces"""
 
     def __init__(self, triangles: np.ndarray, cell: float) -> None:
         cell = max(cell, float(_sides(triangles).max(axis=1).sum()) / _LONGEST)

@@ -50,8 +50,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
     content : of the file; where : the file, for its suffix and for messages; scale : m per unit of the file
     up : the file's axis, one of ``UPS``, that points out of the sensor
     Raises TactileError unless it is closed, wound outward, and has the size of an indenter. Whether it crosses itself
-    shows when its grid is built.
-    """
+    shows when its grid is built."""
     vertices, faces = _parsed(content, pathlib.Path(where))
     mesh = closed_mesh(vertices @ _turn(up).T, faces, where, scale)
     low = mesh.vertices[mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + _LOWEST_MM]
@@ -63,8 +62,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
     """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), not moved; those that coincide are united.
 
-    where : names the mesh in messages; scale : m per unit of the vertices. Raises TactileError as ``solid`` does.
-    """
+    where : names the mesh in messages; scale : m per unit of the vertices. Raises TactileError as ``solid`` does."""
     import trimesh
 
     check_size(where, np.ptp(vertices, axis=0).max(), scale)

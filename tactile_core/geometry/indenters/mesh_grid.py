@@ -55,8 +55,7 @@ def build(mesh: Any, where: str | os.PathLike, spacing: float) -> SplineGrid | T
 
     where : names the mesh in messages; spacing : m, between nodes; a grid of more than MAX_NODES nodes has it in the
         body's lowest 5 mm (``REACH``), which may touch, and is coarser above
-    Raises TactileError where the lowest part alone has too many, and for a mesh that overlaps itself.
-    """
+    Raises TactileError where the lowest part alone has too many, and for a mesh that overlaps itself."""
     extent = np.ptp(mesh.bounds, axis=0) * 1e-3
     if np.prod(_shape(extent, spacing)) <= MAX_NODES:
         return _grid(mesh, where, spacing, extent)
@@ -108,8 +107,7 @@ def error_of(
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (a trimesh, mm).
 
     Measured at 500 random places up to 0.3 mm inside and outside the surface, over those triangles that reach below the
-    height ``top``, m.
-    """
+    height ``top``, m."""
     random = np.random.default_rng(0)
     area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
     face = random.choice(len(mesh.faces), _CHECKED, p=area / area.sum())
@@ -139,8 +137,7 @@ def signed(triangles: np.ndarray, origin: np.ndarray, spacing: float, within: np
     (m, 3, 3) mm.
     within : bool (shape), true for nodes inside
     It is exact up to _NEAR spacings from the surface; farther off a grid four times coarser is interpolated by a cubic
-    spline. What this costs in accuracy is measured when an indenter is made (``error_of``).
-    """
+    spline. What this costs in accuracy is measured when an indenter is made (``error_of``)."""
     near = NearTriangles(triangles, 2 * spacing)
     bound = _NEAR * spacing
     coarse = _coarse(near, origin, spacing, within)

@@ -35,8 +35,7 @@ _LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
 def as_indenter(body: Any) -> Indenter:
     """Return ``body`` if it is an indenter, or make one of it if it is a ``trimesh.Trimesh`` in metres.
 
-    Raises what ``MeshIndenter.from_trimesh`` does, for anything else too.
-    """
+    Raises what ``MeshIndenter.from_trimesh`` does, for anything else too."""
     presses = hasattr(body, "curvature") and not isinstance(body, type)
     return body if presses else MeshIndenter.from_trimesh(body)
 

@@ -19,8 +19,7 @@ class Size:
 
     field : its name in scenes, which ends in its unit, ``_mm`` or ``_deg``; count : how many numbers it takes
     default : its value, in that unit, where a scene leaves it out; None: it must be given
-    slider : name of the size in Blender's Add menu that sets it; empty: a new object has the default
-    """
+    slider : name of the size in Blender's Add menu that sets it; empty: a new object has the default"""
 
     field: str
     default: float | None = None
@@ -50,8 +49,8 @@ class SceneForm:
     icon: str = ""
 
     def build(self, values: Mapping[str, Any]) -> Indenter:
-        """Build the shape from a scene's values, mm or degrees, by ``Size.field``. Raises TactileError for sizes that
-        no body can have."""
+        """Build the shape from a scene's values, mm or degrees, by ``Size.field``. Raises TactileError: no such
+        body."""
         return self.shape(**{argument: size.in_si(values[size.field]) for argument, size in self.sizes.items()})
 
 

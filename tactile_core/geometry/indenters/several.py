@@ -19,8 +19,7 @@ class Several(Indenter):
 
     Its distance is exact outside. Inside, where parts overlap, the true depth is at least the one returned.
 
-    parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0
-    """
+    parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0"""
 
     parts: tuple[tuple[Indenter, Pose], ...]
 

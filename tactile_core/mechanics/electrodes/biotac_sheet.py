@@ -42,8 +42,7 @@ class BiotacSheet:
     wet : (k,) the sheet's nodes, by number in the inner skin's lattice
     sensing : (k,) the same nodes' indices among ``sensing_points.sensing_nodes``
     film : (k,) m, thickness at rest; outward : (k, 3), unit, from the core to the skin
-    unresolved : (e + 4,) ohm that the grid leaves out at each electrode, in a film of 1 m and 1 S/m
-    """
+    unresolved : (e + 4,) ohm that the grid leaves out at each electrode, in a film of 1 m and 1 S/m"""
 
     fluid: FluidFilm
     sheet: ThinSheet
@@ -54,8 +53,8 @@ class BiotacSheet:
     unresolved: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the film's thickness (k,) m, at least ``fluid.thinnest``, for a displacement (n_inner, 3) m of the
-        whole inner skin."""
+        """Return the film's thickness (k,) m, at least ``fluid.thinnest``, by the inner skin's displacement (n, 3)
+        m."""
         moved = np.einsum("ki,ki->k", displacement[self.wet], self.outward)
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
@@ -84,8 +83,7 @@ def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
     """Make the sheet of a sensor's resting finger; a solve takes 10 ms.
 
     The film ends on a core that carries the electrodes, so that films over electrodes are the published gaps: the
-    public mesh's core stands 0.25 mm over the electrodes of the trunk and 0.6 mm under those of the tip.
-    """
+    public mesh's core stands 0.25 mm over the electrodes of the trunk and 0.6 mm under those of the tip."""
     skin, mesh, thinnest = sensors.skin_of(sensor), skin_mesh(sensor), film_floor(sensor)
     inner = skin.skin_surface("inner")
     outward, film = above_core(sensor)
@@ -158,8 +156,7 @@ _PAD = -2e-3  # m, y below which dents lie
 
 
 class ReducedSheet:
-    """Resistances of ``sheet`` where potentials are sums of r fields (n - 1, r), at all nodes but the first, which is
-    0."""
+    """Resistances of ``sheet`` where potentials are sums of r fields (n - 1, r); the first of n nodes is at 0."""
 
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields

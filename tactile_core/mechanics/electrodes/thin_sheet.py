@@ -15,8 +15,7 @@ class ThinSheet:
     """A conducting sheet on a triangulated surface, of a thickness that changes from solve to solve.
 
     nodes : (n, 3) m; faces : (m, 3) int, one connected piece; centers : (k, 3) m, of the electrodes; radius : m, theirs
-    refine : how often each triangle is cut into four; films stay given at the n nodes before that
-    """
+    refine : how often each triangle is cut into four; films stay given at the n nodes before that"""
 
     def __init__(
         self, nodes: np.ndarray, faces: np.ndarray, centers: np.ndarray, radius: float, refine: int = 0
@@ -37,8 +36,7 @@ class ThinSheet:
         """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant per column.
         film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
         Each current leaves at the first node, which is at 0 V: only sums of columns for currents that add up to zero
-        have a meaning.
-        """
+        have a meaning."""
         from ..solids.sparse_cholesky import factor
 
         answer = factor(self.matrix(film, conductivity)[1:, 1:].tocsc())(self.patches[1:])

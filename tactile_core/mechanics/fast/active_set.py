@@ -46,8 +46,7 @@ class Work:
 class Pressing:
     """Solution of a contact's complementarity problem, see ``complement``.
     pressing : (k,) N, 0 or more; active : (k,) bool, nodes that touch; step : m, by which the indenter goes deeper
-    factor : (j, j), Cholesky factor of the matrix among the active nodes
-    """
+    factor : (j, j), Cholesky factor of the matrix among the active nodes"""
 
     pressing: np.ndarray
     active: np.ndarray
@@ -70,8 +69,7 @@ def complement(
         ``force``, N; None: ``step`` is 0
     factors : Cholesky factors of this matrix by active set, used and added to; None to keep none
     Raises UnsolvedError where the matrix is not positive definite, no node can carry the force, or exchanges do not
-    end.
-    """
+    end."""
     fewest, patience = len(gap) + 1, _PATIENCE
     pressing, step = np.zeros(len(gap)), 0.0
     for _ in range(_MOST_EXCHANGES):

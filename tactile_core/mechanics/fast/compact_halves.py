@@ -40,8 +40,7 @@ class Basis(NamedTuple):
     touched : how many are axes of touched nodes; rows : how many are those or loads
     unknown : (n,) int, for each unknown its axis 3 i + k of the i-th kept node, or its load's number
     step : (n,) float32; the quantisation step of an entry is the product of its row's and its column's
-    segments : stretches of unknowns that are transformed together
-    """
+    segments : stretches of unknowns that are transformed together"""
 
     touched: int
     rows: int
@@ -60,8 +59,7 @@ def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> 
 
 def unpack(path: Path, made_from: str) -> tuple[Half, Half] | None:
     """Read the even and the odd half from a shipped file; None if there is none, or it is of another solid.
-    made_from : name of the solid's cache entry (``compliance.cache_entry``), which the file states
-    """
+    made_from : name of the solid's cache entry (``compliance.cache_entry``), which the file states"""
     if not path.is_file():
         return None
     import h5py

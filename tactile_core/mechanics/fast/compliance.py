@@ -95,8 +95,7 @@ def compliance_of(sensor: str) -> Compliance:
 class Solid(NamedTuple):
     """Solid from which a compliance is computed.
     name : of the sensor; lattice : its surface; touchable : (m,), the lattice's nodes that may carry contact force
-    mesh : of the volume
-    """
+    mesh : of the volume"""
 
     name: str
     lattice: Lattice
@@ -115,8 +114,7 @@ def solid_of(sensor: str) -> Solid:
 class Stored(NamedTuple):
     """Cache entry of a sensor's matrices: ``folder``, and ``bytes`` on disk, 0 before they are built.
 
-    surface, touchable, volume : number of the surface's nodes, of the touchable ones, of the solid's
-    """
+    surface, touchable, volume : number of the surface's nodes, of the touchable ones, of the solid's"""
 
     folder: pathlib.Path
     bytes: int
@@ -143,8 +141,7 @@ def _touchable_skin(sensor: str) -> np.ndarray:
 
 
 def cache_entry(solid: Solid) -> pathlib.Path:
-    """Return the folder of a solid's matrices in the cache, named by a hash of all that decides them; it may not
-    exist."""
+    """Return the folder, there or not, of a solid's matrices in the cache, named by a hash of all that decides them."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     sensing = sensing_points_of(name, mesh)

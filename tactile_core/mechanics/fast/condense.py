@@ -53,8 +53,7 @@ def condense(
     """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
     touched : (r,) indices, among ``keep``, of those that forces act on, sorted
     loads : (3 n_nodes, w) sparse, unit loads on any nodes, one a column
-    Raises ValueError for a solid that is not mirror symmetric in z, or is held nowhere.
-    """
+    Raises ValueError for a solid that is not mirror symmetric in z, or is held nowhere."""
     tree = _Elimination(mesh, material, keep, loads, parity)
     dofs, stiffness = tree.group(np.arange(len(tree.cells)))
     from scipy.linalg import lapack

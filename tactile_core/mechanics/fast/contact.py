@@ -48,8 +48,7 @@ class ContactProblem:
 
     Nodes are followed only where the indenter can reach them, ``reach`` m in from ``pose``, which is at depth 0.
     friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
-    work : what contacts may cost, None for as much as they take; a solve raises ExhaustedError where it is used up
-    """
+    work : what contacts may cost, None for as much as they take; a solve raises ExhaustedError where it is used up"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0,

@@ -30,8 +30,7 @@ class Contact:
     converged : false if the solve ended early: do not use it; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
     penetration : m, the largest depth of a node in the indenter or of the inner skin in the core
-    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction
-    """
+    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction"""
 
     compliance: Compliance = dataclasses.field(repr=False)
     pose: Pose
@@ -126,8 +125,7 @@ class Candidates:
     nodes : (k,) touchable indices; displacement : (k, 3) m, first guess
     probe : (k, 3) m, offset beside a node in a crease at which its face's distance is measured, else 0
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
-    looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known
-    """
+    looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known"""
 
     nodes: np.ndarray
     displacement: np.ndarray
@@ -191,8 +189,7 @@ def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.
 def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
     """Return displacements (n, 3) m, along the motion, that bring points (n, 3) m to the front of an indenter at
     ``pose``.
-    far : m, how deep points may lie in the indenter. Points that lie in front of the indenter already stay.
-    """
+    far : m, how deep points may lie in the indenter. Points that lie in front of the indenter already stay."""
     own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
     ahead = pose.own_direction
     for _ in range(_TRACE_STEPS):
@@ -207,8 +204,7 @@ def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> n
 
 def first_contact(indenter: Indenter, first: np.ndarray, last: np.ndarray) -> np.ndarray:
     """Return the places (n, 3) m where nodes that move straight from ``first`` to ``last``, (n, 3) m, first meet an
-    indenter, all in its frame: ``last`` for nodes that do not meet it, ``first`` for those that begin inside it.
-    """
+    indenter, all in its frame: ``last`` for nodes that do not meet it, ``first`` for those that begin inside it."""
     way = last - first
     share, on_way = np.zeros(len(first)), np.arange(len(first))
     start, ahead, gone, length = first, way, share.copy(), np.maximum(lengths(way), 1e-12)  # of those on their way

@@ -38,8 +38,7 @@ class ContactStiffness:
         of each of its rows among the block's 3 k + c degrees of freedom.
 
         The three rows of a node follow each other; rows of points that are not active are zero. The next call changes
-        the stiffness in place. Raises UnsolvedError where the compliance is not positive definite.
-        """
+        the stiffness in place. Raises UnsolvedError where the compliance is not positive definite."""
         wanted = np.concatenate([np.repeat(active[: block.k], 3), active[block.k :]])
         if not len(wanted):
             self._forget()  # no row is one of the block's

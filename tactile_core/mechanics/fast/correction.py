@@ -180,8 +180,7 @@ def frame(compliance: Compliance, contact: Contact) -> PatchFrame:
 def features(compliance: Compliance, contact: Contact, at: PatchFrame) -> np.ndarray:
     """Compute the features (f,) of a fast contact, without units: lengths over the thickness, stresses over E.
 
-    at : the contact's ``frame``. All are continuous in the nodal forces, so that a force can be searched for.
-    """
+    at : the contact's ``frame``. All are continuous in the nodal forces, so that a force can be searched for."""
     material, thickness = sensors.describe(compliance.name).material, sensors.thickness(compliance.name)
     nodes = compliance.touchable[contact.nodes]
     load = np.linalg.norm(contact.nodal_force, axis=1)
@@ -206,8 +205,7 @@ MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1
 
 
 def grid_places() -> np.ndarray:
-    """Return the places (LINES, LINES, 2) of the fields' grid, along the finger and across it from the patch's centre,
-    in patch radii."""
+    """Return places (LINES, LINES, 2) of the fields' grid, along and across the finger from the patch, in its radii."""
     line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
     return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 
@@ -241,8 +239,7 @@ class Corrected:
 
 
 def force_factor(compliance: Compliance, contact: Contact) -> float:
-    """Return the factor by which to multiply a fast contact's forces; 1 without contact, or where no correction
-    ships."""
+    """Return the factor by which to multiply a fast contact's forces; 1 without contact or shipped correction."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:
         return 1.0

@@ -41,8 +41,7 @@ class Points(NamedTuple):
     force : (k, 3) N, on the nodes; core : (c,) N, of the points that press on the core
     active : (k + c,) bool, which touch; slips : (k,) bool
     normal, lean : (k, 3), unit, of the indenter, and along friction (0 where nodes stick): f = p (normal + mu lean)
-    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, offset of nodes from the spots of the indenter where they stick
-    """
+    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, offset of nodes from the spots of the indenter where they stick"""
 
     force: np.ndarray
     core: np.ndarray
@@ -71,8 +70,7 @@ class Slipping(NamedTuple):
     against : (s,) m/N, slip along friction over its limit: how far a node moves across friction under 1 N
     curved : (q,), positions in ``at`` of those whose normals turn; bend : (q, 3, 3) 1/m, second derivatives of the
         distance there; turning : (q, 3, 3) N/m, change of their forces with their motion, at the same normal forces
-    friction : Coulomb's coefficient
-    """
+    friction : Coulomb's coefficient"""
 
     at: np.ndarray
     normal: np.ndarray

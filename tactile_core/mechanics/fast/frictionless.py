@@ -105,8 +105,7 @@ class Frictionless:
 
     rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
     probe, faced : (k, 3) m and (k,) bool, see ``Candidates``
-    most_curved : most tangent directions in the Newton step; more of them cost more time than they save
-    """
+    most_curved : most tangent directions in the Newton step; more of them cost more time than they save"""
 
     most_curved = 20
 

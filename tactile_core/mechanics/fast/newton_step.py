@@ -20,8 +20,7 @@ class Change(NamedTuple):
     """Change of forces in a Newton step in r columns: with the indenter at rest and, if it may move, per metre of that.
     forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, without the turn of normals
     moved : (q, 3, r) m, motion of the nodes ``Slipping.curved``, relative to the indenter
-    turns : (s, r) N, change of friction across itself
-    """
+    turns : (s, r) N, change of friction across itself"""
 
     forces: np.ndarray
     bearing: np.ndarray

@@ -32,8 +32,7 @@ class FastContact:
     """A contact of the linear model with its correction. Forces N, by the indenter on the sensor.
     linear : contact before the correction; corrected : corrected shape, and factor of force
     force : (3,), corrected; axial_force : its part along the motion; pressure : Pa, corrected rise of the fluid's
-    depth : m, from first touch at the place that the indenter has slid to
-    """
+    depth : m, from first touch at the place that the indenter has slid to"""
 
     linear: Contact
     corrected: Corrected
@@ -67,16 +66,14 @@ class CorrectedPress:
         """Solve the contact at a depth, m, along the motion from ``pose`` (None: the press's own); the result may not
         have converged (``linear.converged``).
         touches : true if ``pose`` is known to be at first touch, which is looked for otherwise
-        Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does.
-        """
+        Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does."""
         there = pose or self.pose
         fall = self._surface_drop(there, touches=touches)
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
         """Solve the contact whose corrected force along the motion is force N, to a thousandth; None if that lies
-        beyond the limit, or the search does not find it. pose : None for the press's own; touches : as in
-        ``at_depth``"""
+        beyond the limit, or is not found. pose : None for the press's own; touches : as in ``at_depth``"""
         there = pose or self.pose
         fall, self._on_the_way = self._surface_drop(there, touches=touches), None
         try:

@@ -23,8 +23,7 @@ ON_PLANE = 1e-9  # m, z of nodes on the mirror plane but for rounding
 class SensingPoints(NamedTuple):
     """Linear map from nodal displacements to changes of w gaps, and the gaps at rest.
 
-    rows, columns, weights : (k,), entries of the map's sparse matrix (3 n_nodes, w); gap : (w,) m, at rest
-    """
+    rows, columns, weights : (k,), entries of the map's sparse matrix (3 n_nodes, w); gap : (w,) m, at rest"""
 
     rows: np.ndarray
     columns: np.ndarray

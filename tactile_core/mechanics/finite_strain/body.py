@@ -106,8 +106,7 @@ def graded_body(
     """Make a sensor's body, fine where the indenter, ``depth`` m beyond its ``pose`` at first touch, overlaps the
     resting surface.
     spacing : of the fine part's nodes, over the tier's own. The reference tier's cells are half as large as the full
-    tier's.
-    """
+    tier's."""
     place = _footprint(sensor, indenter, pose, depth)
     footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
     fine = graded(sensor, footprint)

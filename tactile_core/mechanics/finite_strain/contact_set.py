@@ -27,8 +27,7 @@ class ContactSet:
     pressing : (k,) N, normal forces of the k active nodes, positive where they press; rubbing : (k, 3) N, friction on
         them, in the sensor's frame
     normals : (k, 3), out of the obstacle at those nodes; friction : Coulomb's coefficient; grip : N/m, the springs'
-    imbalance : largest change of a node's friction in the last ``follow``, over the largest normal force
-    """
+    imbalance : largest change of a node's friction in the last ``follow``, over the largest normal force"""
 
     candidates: np.ndarray
     active: np.ndarray

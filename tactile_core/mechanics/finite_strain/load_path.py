@@ -69,8 +69,7 @@ class LoadPath:
         """Solve the next step, see ``solve_path``; guess : m, about the depth at which a given force is found.
         Where no contact is found, tries in turn: a finer mesh, from the start (full tier); then, in a contact without
         friction, friction that fades to 0; then short steps from the start, and penalty points at every edge (full
-        tier).
-        """
+        tier)."""
         before = self.last
         try:
             found = self._to(step, guess)
@@ -126,8 +125,7 @@ class LoadPath:
         return self.problem.move(pose, before, self.step)
 
     def _at_force(self, pose: Pose, force: float, guess: float) -> ContactState:
-        """Find the contact at a force, N, along the motion, near the depth ``guess``, m, under ``pose`` at first
-        touch."""
+        """Find the contact at a force, N, along the motion from ``pose``, near the depth ``guess``, m."""
 
         def move(depth: float, before: ContactState) -> ContactState:
             """Solve the contact at a depth, m, along the pose's direction, going on from the one before."""

@@ -86,8 +86,7 @@ class FiniteStrainContact:
         """Solve the contact at ``depth`` m, reached from ``start`` (None: from rest) in load steps of at most ``step``
         m.
         A depth no greater than the start's returns the start. A step that fails is halved. Raises NoEquilibriumError,
-        which names the part of the way reached, if a sixteenth of a step fails, or more than 8 have failed.
-        """
+        which names the part of the way reached, if a sixteenth of a step fails, or more than 8 have failed."""
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
             return dataclasses.replace(touch, steps=0)
@@ -96,8 +95,7 @@ class FiniteStrainContact:
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel; a
-        turn travels on an arm of 5 mm. Raises as ``press`` does.
-        """
+        turn travels on an arm of 5 mm. Raises as ``press`` does."""
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
         touch = self._follow(start, pose, step / max(way, turned, 1e-12))
@@ -107,8 +105,7 @@ class FiniteStrainContact:
         """Solve a contact without friction at another pose, in load steps of ``step`` m, by continuation from one with
         friction, which fades to 0 at that pose.
         Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without
-        friction.
-        """
+        friction."""
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
             for friction in _FADING[1:]:

@@ -37,8 +37,7 @@ class Push:
     """Forces on k penalty points that an obstacle has reached.
     nodes : (k, 9) int, of the mesh, and weights : (k, 9): each point is its nodes' weighted mean
     force : (k, 3) N, of the obstacle on the points; stiffness : (k, 3, 3) N/m, minus the force's derivative by the
-        point
-    """
+        point"""
 
     nodes: np.ndarray
     weights: np.ndarray
@@ -83,8 +82,7 @@ class PenaltyPoints:
     def push(self, obstacle: Obstacle, at: np.ndarray, stiffness: float) -> Push:
         """Return the push of an obstacle on the points more than 20 um inside it.
 
-        at : (n, 3) m, the mesh's nodes now; stiffness : N/m, of each point's spring
-        """
+        at : (n, 3) m, the mesh's nodes now; stiffness : N/m, of each point's spring"""
         points = self._points(at)
         distance, normal = obstacle.distance(points)
         inside = np.flatnonzero(distance < -SLACK)

@@ -20,8 +20,7 @@ class ContactState:
     outer, inner : contact of the surface with the indenter, and of the inner skin with the core
     push : of the indenter on the penalty points; guarded : true if they are switched on
     fluid : Pa, rise of the fluid's pressure
-    iterations : Newton iterations of the last load step; steps : load steps since the start, failed ones counted
-    """
+    iterations : Newton iterations of the last load step; steps : load steps since the start, failed ones counted"""
 
     depth: float
     pose: Pose
@@ -45,8 +44,7 @@ class Tolerance:
     """Criteria that end an iteration: gaps below ``gap``, and an imbalance below ``balance`` or a step below ``step``.
 
     gap : m; balance : residual over the largest internal nodal force, or the fluid's excess volume over its volume
-    step : m; after so small a step the balance is good, by quadratic convergence
-    """
+    step : m; after so small a step the balance is good, by quadratic convergence"""
 
     gap: float
     balance: float

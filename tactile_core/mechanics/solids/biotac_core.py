@@ -24,8 +24,7 @@ class Core:
         """Return the gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
 
         The gap is (r - R) / |grad (r - R)|, exact to first order, as is the normal where the gap is closed.
-        Beyond the table's ends the last radius is held.
-        """
+        Beyond the table's ends the last radius is held."""
         x, y, z = points.T
         axis_y, core = self._skin.axis_y, self._skin.descriptor.core
         x = np.clip(x, *core.contact_x)
@@ -80,8 +79,7 @@ def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
 def above_core(sensor: str) -> tuple[np.ndarray, np.ndarray]:
     """Return unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin, distances (n,)
     m.
-    On the sides too, where ``Core`` has no table.
-    """
+    On the sides too, where ``Core`` has no table."""
     import scipy.spatial
 
     skin = skin_of(sensor)

@@ -10,8 +10,7 @@ import numpy as np
 class BlockPattern:
     """Sums cell matrices into one block per pair of neighbouring nodes, and makes sparse matrices of the blocks.
 
-    rows, columns : (n_blocks,), the two nodes of each block; diagonal : (n_nodes,), each node's block with itself
-    """
+    rows, columns : (n_blocks,), the two nodes of each block; diagonal : (n_nodes,), each node's block with itself"""
 
     def __init__(self, cells: np.ndarray, clamped: np.ndarray) -> None:
         """Take cells : (n_cells, k) nodes, every node belongs to one; clamped : (n,) bool, nodes that never move."""

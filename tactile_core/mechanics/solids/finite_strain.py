@@ -41,8 +41,7 @@ class NeoHookean:
     def from_material(cls, material: Material, *, split: bool = False) -> NeoHookean:
         """Return mu = E / (2 (1 + nu)) and kappa = E / (3 (1 - 2 nu)), linear elasticity at small strain.
 
-        split : true to let a part of kappa, 4 mu (``SHARE``), act at the Gauss points, see ``at_points``
-        """
+        split : true to let a part of kappa, 4 mu (``SHARE``), act at the Gauss points, see ``at_points``"""
         shear = material.youngs / (2 * (1 + material.poisson))
         at_points = SHARE * shear if split else 0.0
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)) - at_points, at_points)
@@ -120,8 +119,7 @@ class FiniteStrainSolid:
     """Residual and tangent of a mesh of one material; see the module for the energy.
 
     material : the law, or linear constants to make it of (``NeoHookean.from_material``, not split)
-    pattern : of the mesh's cells; None: made at first use. Raises ValueError for cells that are turned inside out
-    """
+    pattern : of the mesh's cells; None: made at first use. Raises ValueError for cells that are turned inside out"""
 
     def __init__(self, mesh: HexMesh, material: Material | NeoHookean, pattern: BlockPattern | None = None) -> None:
         self.mesh = mesh

@@ -42,8 +42,7 @@ class GradedMesh:
     """A graded solid, its matrix's sparsity pattern and solver, and its lines.
     rows (i,), columns (j,) : places of the mesh's lines of nodes, in real-valued rows and columns of the lattice
     to_rows (rows, i), to_columns (columns, j) : matrices from values on the mesh's lines to values on the lattice's; a
-        skin's last column is its first, and has none
-    """
+        skin's last column is its first, and has none"""
 
     mesh: HexMesh
     pattern: BlockPattern
@@ -63,8 +62,8 @@ class GradedMesh:
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Interpolate flags (n_surface,) bool at the mesh's surface nodes linearly to the lattice's (n,) bool, true
-        above 1/2."""
+        """Interpolate flags (n_surface,) at the mesh's surface nodes linearly to the lattice's (n,) bool, true over
+        1/2."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 

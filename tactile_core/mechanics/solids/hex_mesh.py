@@ -22,8 +22,7 @@ class HexMesh:
     clamped : (n,) bool, nodes that do not move
     surface : (n_surface,) int, nodes of the side that is touched, in the order of its grid (a ``skin_solid``'s poles
         last): of an ungraded mesh the sensor's surface lattice
-    inner : (n_inner,) int, likewise for the inner skin (empty for the gel)
-    """
+    inner : (n_inner,) int, likewise for the inner skin (empty for the gel)"""
 
     nodes: np.ndarray
     cells: np.ndarray

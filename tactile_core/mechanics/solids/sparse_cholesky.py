@@ -71,8 +71,7 @@ class PatternFactor:
         """Return a function that solves ``matrix @ x = b`` for b (n, k); valid until the next call.
 
         upper : the matrix's upper triangle, sorted, all of the diagonal in it. Raises NotPositiveDefiniteError as
-        ``factor`` does.
-        """
+        ``factor`` does."""
         if self._pardiso is None:
             import scipy.sparse
 
@@ -137,8 +136,7 @@ class DampedFactor:
     Where the solid is unstable (a node about to slide off a ridge) Newton's iteration then follows it to the next
     equilibrium, which does not depend on the damping.
 
-    damping : added to each node's own stiffness, over ``stiffness``, N/m, that of a typical node
-    """
+    damping : added to each node's own stiffness, over ``stiffness``, N/m, that of a typical node"""
 
     def __init__(self, solid: FiniteStrainSolid, factor: PatternFactor) -> None:
         self._pattern, self._factor, self.damping = solid.pattern, factor, 0.0
@@ -153,8 +151,7 @@ class DampedFactor:
         """Return a function from forces (n, 3) N to displacements (n, 3) m, which are zero where held (n, 3) bool.
 
         blocks : (n_blocks, 3, 3) N/m, of the tangent on the solid's pattern; the damping is added to them in place.
-        Raises NotPositiveDefiniteError where even much damping is too little.
-        """
+        Raises NotPositiveDefiniteError where even much damping is too little."""
         free, pattern = self._pattern.free, self._pattern
         for _ in range(_TRIES):
             blocks[pattern.diagonal] += self.damping * self.stiffness * np.eye(3)
@@ -191,8 +188,7 @@ class LinearSystem(NamedTuple):
     solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
     residual : (n, 3) N, internal minus outer forces; prescribed : (n, 3) m, steps of what is held, 0 elsewhere
     loose_swell : (n, 3) m2, gradient of the fluid's volume, 0 at what is held
-    excess : m3, of the fluid's volume over that which it must have
-    """
+    excess : m3, of the fluid's volume over that which it must have"""
 
     solve: Callable[[np.ndarray], np.ndarray]
     matrix: Any
