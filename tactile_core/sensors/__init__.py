@@ -49,7 +49,8 @@ def electrode_count(sensor: str) -> int:
 
 
 def electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Electrode positions (19, 3) m, shared frame; (24, 3) of a BioTac SP. Raises TactileError for a bad table."""
+    """Electrode positions (19, 3) m, E1 first, shared frame; (24, 3) of a BioTac SP. Raises TactileError: a bad
+    table."""
     places = from_maker(1e-3 * places_of(sensor).sensing, sensor)
     skin_of(sensor).check_inside(places)
     return places
@@ -92,7 +93,8 @@ def rest_normals(sensor: str) -> np.ndarray:
 
 
 def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a resting surface's point (3,) m and outward unit normal (3,) at (x, z) m of the common plane."""
+    """Return a resting surface's point (3,) m and outward unit normal (3,) at ``x``, ``z``, m, of the plane that a gel
+    covers and a pad unrolls onto."""
     return shape_of(sensor).dome_point(x, z) if is_gel(sensor) else roll_up(np.array([x, z]), sensor)
 
 

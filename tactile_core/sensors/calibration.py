@@ -130,7 +130,7 @@ class Response:
                 raise TactileError("response, centre", found, "more than 0: light brightens its own colour")
 
     def matrices(self, camera: Camera) -> np.ndarray:
-        """Return the matrix (H, W, 3, 3) of each pixel."""
+        """Return the matrix (H, W, 3, 3) of each pixel of ``camera``, channel by LED."""
         centre, right, down = (np.asarray(matrix) for matrix in (self.centre, self.along_right, self.along_down))
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 
@@ -144,13 +144,12 @@ class Response:
 class Fit:
     """Data and errors of a calibration's fit.
 
-    photographs : names of the files; the folder is the user's
-    ball_diameter : m
+    note : how it was fitted, free text; photographs : names of the files; the folder is the user's
+    ball_diameter : m, of the ball that they show
     errors : on those photographs, by the names of ``tactile calibrate --test``
     standard_errors : by parameter, in its unit of measurement in the file
     not_identified : parameters that the photographs do not determine; held near the start values by a prior of how
-        units differ
-    """
+        units differ"""
 
     note: str
     photographs: tuple[str, ...]
@@ -164,7 +163,7 @@ class Fit:
 class Calibration:
     """Calibration of one unit. Raises TactileError for a number out of its range.
 
-    unit : its name, free text
+    unit : its name, free text; fit : where the numbers are from
     leds : red, green, blue
     response : the camera's response to each LED's light
     ambient : (3, 21) or (3, 36), a row per LED: its light scattered in gel and acrylic, in units of its radiance on a
@@ -240,8 +239,8 @@ class Calibration:
         return self.coating.transmission * self.object_reflectance
 
     def with_through(self, through: float) -> Calibration:
-        """Return the unit with this ``through``: by the object's reflectance and, where even a white object gives less,
-        by a larger transmission of the coating."""
+        """Return the unit with another ``through``, 0 to 1: by the object's reflectance and, where even a white object
+        gives less, by a larger transmission of the coating."""
         most = max(self.coating.transmission, through)
         coating = dataclasses.replace(self.coating, transmission=most)
         return dataclasses.replace(self, coating=coating, object_reflectance=through / most if most else 0.0)
@@ -261,7 +260,8 @@ class Calibration:
         return self.response.times(self.facing)
 
     def with_gain(self, gain: Response) -> Calibration:
-        """Return the unit with LEDs of this ``gain``; each LED's own channel responds 1 in the middle."""
+        """Return the unit with another ``gain``: the LEDs' radiances are set so that each one's own channel responds by
+        1 level per level in the picture's middle. Raises TactileError for an albedo of 0."""
         if not min(self.coating.albedo) > 0:
             raise TactileError("coating, albedo", "0", "more than 0, or no LED's light is seen")
         own = np.diag(gain.centre)
@@ -272,7 +272,7 @@ class Calibration:
         return dataclasses.replace(self, leds=(red, green, blue), response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
-        """Return the same view at another width and height in pixels. Raises TactileError for another aspect ratio."""
+        """Return the unit with the same view at another width and height in pixels, see ``Camera.at_size``."""
         return dataclasses.replace(self, camera=self.camera.at_size(width, height))
 
 

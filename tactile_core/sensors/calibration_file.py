@@ -51,7 +51,8 @@ def load_calibration(
 
 
 def calibration_of(given: Calibration | str | os.PathLike | None, where: str) -> Calibration:
-    """Return a calibration, that of a file, or for None the shipped one. Raises TactileError naming ``where``."""
+    """Return ``given`` if it is a calibration, that of the file it names, or for None the DIGIT's that ships. Raises
+    TactileError, which names ``where``, for anything else, and as ``load_calibration`` does."""
     if isinstance(given, str | os.PathLike | None):
         return load_calibration(given)
     if not isinstance(given, Calibration):

@@ -36,7 +36,7 @@ class Camera:
     centre_x, centre_z : m, the place on the gel, shared frame, in the middle of the picture
     apparent_height : m, height of the pinhole above the plane of height zero
     right_z, down_x : +1 or -1, the direction of z to the right and of x down the picture
-    sensor : whose gel it looks at"""
+    sensor : name of the sensor whose gel it looks at"""
 
     width: int = number("px")
     height: int = number("px")
@@ -77,7 +77,7 @@ class Camera:
 
     @property
     def surface(self) -> Lattice:
-        """The resting surface of the gel that it looks at."""
+        """Resting surface of the gel that the camera looks at."""
         return shape_of(self.sensor).surface()
 
     @property
@@ -123,7 +123,8 @@ class Camera:
         return self.centre_z + self.right_z * self.right
 
     def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Project gel points at x, z and height, m, to fractional (row, column); whole numbers are pixel centres."""
+        """Project gel points at x, z and height (toward the camera), m, to fractional (row, column); whole numbers are
+        pixel centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5

@@ -54,7 +54,8 @@ def names() -> tuple[str, ...]:
 def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
     """Return the sensor that is read and the gel whose nodes a file's keys name; None where they do not name two
     sensors.
-    what : the file's content, in words. Raises TactileError for an unknown sensor, and for two of the same kind."""
+    keys : the file's attributes, ``<name>_nodes_sha256`` for each sensor; where, what, advice : for errors, the file,
+    its content in words, what to do. Raises TactileError for an unknown sensor, and for two of the same kind."""
     of = sorted(key.removesuffix(NODES) for key in keys if key.endswith(NODES))
     if len(of) != 2:
         return None

@@ -23,12 +23,14 @@ RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19), not rounded, at impedances growth (..., 19) times those at counts rest (19,)."""
+    """Return the counts (..., 19), not rounded, at impedances ``growth`` (..., 19) times those that read ``rest`` (19,)
+    counts."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
 def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19) at impedances of the films alone growth (..., 19) times those at rest (19,)."""
+    """Return the counts (..., 19), not rounded, where the films' impedances alone are ``growth`` (..., 19) times those
+    that read ``rest`` (19,) counts; contacts' resistances stay."""
     return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 
@@ -39,7 +41,8 @@ def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) 
 
 
 def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert change (..., 19) counts of a unit at rest counts ``of`` (19,) to that of one at ``rest`` (19,)."""
+    """Convert change (..., 19) counts of a unit that rests at ``of`` (19,) counts to that of a unit at ``rest`` (19,):
+    the inverse of ``typical``."""
     return _converted(change, of, rest)
 
 

@@ -65,13 +65,14 @@ def typical_rest(name: str) -> np.ndarray | None:
 
 @functools.cache
 def contacts_of(name: str) -> np.ndarray | None:
-    """Load changes (P, e) float64 counts of simulated contacts, or None. Raises TactileError without electrodes."""
+    """Load changes (P, e) float64 counts of simulated contacts; None if the descriptor names no table of them. Raises
+    TactileError for a sensor without electrodes, or a bad table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contacts)
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the fluid's rise (P,) float64 Pa in ``contacts_of``'s contacts, or None. TactileError without electrodes."""
+    """Load the rise (P,) float64 Pa of the fluid's pressure in ``contacts_of``'s contacts; None and errors as there."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 

@@ -122,7 +122,8 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """Rolling of the pad onto the common plane. radius : m, of its cross-section; origin_x : m, x that rolling keeps"""
+    """Rolling of the pad onto the common plane. radius : m, of the pad's cross-section
+    origin_x : m, the x of the pad that keeps its x when unrolled"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")
@@ -130,7 +131,8 @@ class Unrolling:
 
 @dataclasses.dataclass(frozen=True)
 class Fluid:
-    """A finger of skin, fluid and core with electrodes, as the BioTac. title : its name in words"""
+    """A finger of skin, fluid and core with electrodes, as the BioTac. title : its name in words
+    sources : where its numbers are from, in words; folder : its descriptor's"""
 
     title: str
     sources: tuple[str, ...]

@@ -15,8 +15,8 @@ ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex t
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The outline on the plane, m, from x = tip_x to base_x and |z| up to half_width. tip : half circle (round) or
-    square; corner_radius : of square ends"""
+    """The gel's outline on the plane, m, from x = tip_x to base_x and |z| up to half_width.
+    tip : "round", a half circle, or "square"; corner_radius : of the base's corners, and of a square tip's"""
 
     half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
     tip_x: float = number("mm")
@@ -71,7 +71,8 @@ class GelLattice:
 
 @dataclasses.dataclass(frozen=True)
 class CameraMount:
-    """Place of the camera. height_zero_y : m, of zero height; calibration : a unit's file, empty where there is none"""
+    """Place of the camera. height_zero_y : m, y of the plane from which pictures' heights count
+    calibration : name of a unit's file beside the descriptor, empty where there is none"""
 
     height_zero_y: float = number("mm")
     calibration: str = file_beside(or_none=True)
@@ -79,7 +80,8 @@ class CameraMount:
 
 @dataclasses.dataclass(frozen=True)
 class GelSensor:
-    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat"""
+    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat
+    sources : where its numbers are from, in words; folder : its descriptor's"""
 
     title: str
     sources: tuple[str, ...]

@@ -39,7 +39,7 @@ def read_radii(path: Path) -> np.ndarray:
 
 
 def read_heights(path: Path) -> np.ndarray:
-    """Read a gel's heights (n, 4): x, z, top and bottom, mm; nan off the gel."""
+    """Read a gel's heights (n, 4): x, z, top and bottom, mm; NaN off the gel. Raises TactileError for another table."""
     return _table(path, _HEIGHTS)
 
 

@@ -50,20 +50,22 @@ def number(
     may_miss: bool = False,
     length: int | None = None,
 ) -> Any:
-    """Declare a number, or a list of numbers: its unit in the file, and its open interval (above, below) in that unit.
-    default : in Python; may_miss : true if a file may leave it out; length : of lists whose type has none"""
+    """Declare a dataclass's field, a number or a list of numbers: its unit in the file (a name's ending, "" without),
+    and its open interval (above, below) in that unit.
+    default : in Python, SI; may_miss : true if a file may leave it out; length : of lists whose type has none"""
     meta = {"unit": unit, "above": above, "below": below, "may_miss": may_miss, "length": length}
     return dataclasses.field(default=default, metadata=meta)
 
 
 def file_beside(*, or_none: bool = False) -> Any:
-    """Declare the name of a file beside the one that is read; or_none : it may be left out, and then is empty"""
+    """Declare a field with the name of a file beside the one that is read.
+    or_none : true if it may be left out, and then is empty"""
     meta = {"beside": True, "may_miss": or_none}
     return dataclasses.field(metadata=meta, default="" if or_none else dataclasses.MISSING)
 
 
 def one_of(words: tuple[str, ...]) -> Any:
-    """Declare a text that is one of these words."""
+    """Declare a field whose text is one of these words."""
     return dataclasses.field(metadata={"words": words})
 
 
@@ -76,7 +78,8 @@ class Material:
 
 
 def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, advice: str = "") -> _T:
-    """Return ``made(content)`` for a file's content, decimals as written. Raises TactileError with the field."""
+    """Return ``made(content)`` for a file's content, a dict with decimals as written (``Decimal``).
+    expected, advice : what the file should be and what to do, for errors. Raises TactileError naming file and field."""
     try:
         content = tomllib.loads(read_toml_text(file), parse_float=Decimal)
     except OSError as error:
@@ -90,7 +93,9 @@ def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, a
 
 
 def read_table(form: type[_T], content: Any, where: str = "", **others: Any) -> _T:
-    """Convert the table at `where` of a file, and `others`, to a dataclass in SI units. Raises TactileError."""
+    """Convert ``content``, a table of a file, to the dataclass ``form`` in SI units.
+    where : the table's name, for errors, "" for the whole file; others : values of fields that are not in the file
+    Raises TactileError for a field that is unknown, missing or out of range."""
     if not isinstance(content, dict):
         raise TactileError(where, repr(content), "a table")
     types = typing.get_type_hints(form)

@@ -74,8 +74,8 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
 
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nearest places on a surface to points (n, 3): face index (n,), barycentric weights (n, 3), place (n, 3) m.
-    Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
+    """Find the nearest places on a surface to points (n, 3) m: face index (n,), barycentric weights and places (n, 3)
+    m. Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
     faces, weights, places = [], [], []
     a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
     for point in points:

@@ -53,7 +53,7 @@ def _spec_of(form: SceneForm) -> type[SizedSpec]:
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):
     """A closed triangle mesh (STL, PLY, OBJ, OFF) in the scene's folder or below it.
     unit_mm : mm per unit of the file; up : the file's axis that points out of the sensor
-    spacing_mm : of the grid that holds its distance"""
+    spacing_mm : of the grid that holds its distance; file : name in that folder, / between folders"""
 
     name: str
     file: str
@@ -104,7 +104,8 @@ IndenterSpec = Single | SeveralSpec
 
 
 def with_files_of(folder: pathlib.Path, spec: IndenterSpec) -> IndenterSpec:
-    """Return the spec with mesh files of the scene's folder. Raises TactileError for one missing or outside of it."""
+    """Return the spec with its mesh files, named within the scene's ``folder``, as full paths. Raises TactileError for
+    one that is missing or outside of the folder."""
     if isinstance(spec, SeveralSpec):
         parts = [msgspec.structs.replace(part, body=with_files_of(folder, part.body)) for part in spec.parts]
         return msgspec.structs.replace(spec, parts=parts)

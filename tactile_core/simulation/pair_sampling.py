@@ -29,13 +29,13 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly slipping, wholly slipp
 def press_rows(
     scene: Scene, seed: int, press: int, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
-    """Return the contacts of a press, each as ``pair_row`` has it: force grows by the scene's ratio until a sensor
-    reaches its greatest depth, or no contact is found.
-
+    """Return the contacts of a press, each as ``pair_row`` has it, with the press's number, place, slide and indenter:
+    force grows by the scene's ratio until a sensor reaches its greatest depth, or no contact is found.
     The first force is log-uniform within one ratio, so that forces are log-uniform over many presses. A press that
     slides ends with the slide, at constant force along the same path on both sensors. A scene with ``depth_steps``
     pairs contacts of equal depth instead of equal force.
-    pair : the sensors, source and target; keep : both solutions' fields to add"""
+    seed, press : numbers that decide the draw; pair : the sensors, source and target
+    keep : words of ``KEEPABLE``, both solutions' fields to add"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)
@@ -117,7 +117,8 @@ def paired(scene: Scene) -> PairSpec:
 
 
 def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET) -> Placement:
-    """Draw the place and tilt of a press: uniform over the gel inside its rim, tilt in a uniform direction."""
+    """Draw the place and tilt of a press: uniform over the target's gel inside its rim, tilt uniform in the cone of
+    ``spec`` round the normal, in a uniform direction."""
     shape = sensors.shape_of(target)
     while True:
         x = random.uniform(shape.tip_x, shape.base_x)
@@ -131,7 +132,8 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 def pair_row(
     biotac: Solution, digit: Solution, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Return arrays stored of a paired contact, see ``pairs_writer.units``; keep : both solutions' fields to add."""
+    """Return arrays stored of a contact of both sensors of ``pair``, see ``pairs_writer.units``.
+    biotac, digit : solutions of source and target; keep : words of ``KEEPABLE``, both solutions' fields to add"""
     source, target = pair
     both = (source, biotac), (target, digit)
     return {
@@ -153,6 +155,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if the contact, source nodes touched (n,) bool, extends beyond what unrolls onto the gel."""
+    """Return true if the contact, source nodes touched (n,) bool, extends beyond what unrolls onto the target's gel."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

@@ -52,7 +52,6 @@ KEEPABLE = {"traction": "Pa"}  # what a file may hold beside, of each sensor's s
 @dataclass(frozen=True)
 class Pairs:
     """Paired contacts, C of them. Displacements are the file's integers; times their scale they are metres.
-
     Fields are named after the pair that ships; for another ``pair`` they hold its source and target, and signals have
     as many columns as the source has electrodes.
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
@@ -61,8 +60,8 @@ class Pairs:
     pressure : (C,) float32 Pa, rise of the fluid's
     depth_biotac, depth_digit : (C,) float32 m       press : (C,) int32
     contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
-    slide : (C, 2) float32 m
-    indenter : (C,) int16                            attributes : of the file, as text
+    slide : (C, 2) float32 m, as a ``Step``'s; force is on the source, depth from first touch, press the press's number
+    indenter : (C,) int16, in ``indenter_names``      attributes : of the file, as text
     sha256 : of the content, whatever the HDF5 layout"""
 
     displacement_biotac: np.ndarray
@@ -96,7 +95,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Split:
-    """Indices (int) of the contacts to train, for validation and to test; no press is in two of them."""
+    """Indices (int), ascending, of the contacts to train on, to validate on and to test on; no press is in two."""
 
     train: np.ndarray
     validation: np.ndarray
@@ -220,8 +219,8 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts into 80 % training, 10 % validation, 10 % test by press (C,), which keeps similar ones together.
-    Raises TactileError, which names ``where``, for under five presses."""
+    """Split contacts into 80 % training, 10 % validation, 10 % test by press (C,), the number of each one's press, as
+    contacts of a press are alike; seed : of the draw. Raises TactileError, naming ``where``, for under five presses."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"
@@ -233,5 +232,5 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 
 def quantise(displacement: np.ndarray) -> np.ndarray:
-    """Convert displacement (...) m to int16 steps of ``SCALE`` m."""
+    """Convert displacement (...) m, up to 3.2 mm, to int16 steps of ``SCALE`` m."""
     return np.round(displacement / SCALE).astype(np.int16)

@@ -32,7 +32,7 @@ _TILTS_DEG = tuple(range(0, 46, 5))
 
 
 def card(path: str | os.PathLike, source: str = SOURCE, target: str = TARGET) -> dict:
-    """Return counts, hash and histograms of a file of pairs, without its name."""
+    """Return counts, hash and histograms of a file of pairs, without its name; source, target : its sensors"""
     import h5py
 
     with h5py.File(path) as file:
@@ -101,7 +101,8 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks in order into an HDF5 file of the first ``count`` contacts. Raises TactileError where that fails."""
+    """Join blocks, array packs ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts. Raises
+    TactileError where that fails."""
     about = {
         "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
         "indenters": json.dumps(made.indenters),

@@ -13,8 +13,8 @@ _MM = 1e-3
 
 
 def random_body(random: np.random.Generator) -> Indenter:
-    """Draw a ball, block, wedge, cylinder, ring or a group of balls, rotated about the axis along which it is
-    pressed."""
+    """Draw a ball, block, wedge, standing or lying cylinder, ring, or group of two or three balls; all but balls are
+    turned at random about the axis along which bodies are pressed."""
     shape = _SHAPES[random.choice(len(_SHAPES), p=_SHARES)]
     return shape(random) if shape in (_ball, _balls) else _turned(random, shape(random))
 

@@ -65,7 +65,7 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Content of a scene file."""
+    """Content of a scene file; pairs, recording : None where it has no such table"""
 
     format: str
     name: str
@@ -76,7 +76,8 @@ class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
-    """Load the scene of a ``scene.toml`` or its folder, and its text. Raises TactileError naming file and field."""
+    """Load the scene of a ``scene.toml`` or its folder, meshes named by full paths, and the file's text. Raises
+    TactileError naming file and field."""
     file = pathlib.Path(path)
     file = file / "scene.toml" if file.is_dir() else file
     try:
@@ -95,7 +96,8 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
 
 
 def check(file: str | os.PathLike, scene: Scene) -> None:
-    """Raise TactileError for what the fields' types do not check: finite numbers, names, growing times."""
+    """Raise TactileError for what the fields' types do not check: format, finite numbers, different names, depths that
+    grow, an indenter that exists, growing times. file : names the scene in messages"""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))
@@ -137,7 +139,7 @@ def _numbers(value):  # noqa: ANN001, ANN202 (any nesting of dict, list and numb
 
 
 def to_toml(scene: Scene) -> str:
-    """Write a scene as TOML text, with every field, also defaults."""
+    """Format a scene as TOML text, with every field, also defaults."""
     document = msgspec.to_builtins(scene)
     lines = [f"{key} = {_value(document[key])}" for key in ("format", "name", "description")]
     for spec in document["indenters"]:

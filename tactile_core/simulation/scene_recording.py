@@ -33,8 +33,8 @@ _FIELDS = ("displacement", "traction")  # of a sensor
 
 
 def outputs() -> dict[str, Sensor]:
-    """Return the optional outputs of a file (always there: time, force and, with a gel, the contact's centre) with the
-    sensor of each."""
+    """Return the optional outputs of a recording, by the words that ``keep`` names them with, and the sensor that each
+    needs. Always there are time, force and, where a gel is solved, the contact's centre."""
     fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
     return {"electrodes": ELECTRODES_OF, **fields}
 
@@ -65,11 +65,11 @@ def simulate_recording(
 ) -> int:
     """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes; return the number
     of frames that press.
-
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
     scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
-    progress : called with (frames done, frames)
-    keep : words of ``outputs()``; a sensor that none of them needs is not solved. tiers : of each, fast by default
+    seed : of the electrodes' rest, drift and noise; progress : called with (frames done, frames)
+    keep : words of ``outputs()``; a sensor that none of them needs is not solved
+    tiers : of mechanics, by sensor; fast for others
     loaded : a scene and its text in place of the file's, whose name then only serves messages
     Raises TactileError for a scene without a recording, forces beyond the linear model's range, and tractions of
     another tier than the fast one."""
@@ -117,12 +117,12 @@ def simulate_recording(
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
-    """Return the sensors that outputs (keep, their words) need."""
+    """Return the sensors that the outputs ``keep``, words of ``outputs()``, need, the BioTac first."""
     return tuple(dict.fromkeys(sensor for word, sensor in outputs().items() if word in keep))
 
 
 def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
-    """Return the scene's [recording]; raises TactileError where it has none."""
+    """Return the scene's [recording]; raises TactileError where it has none, naming the scene's ``path``."""
     if scene.recording is None:
         advice = "See scenes/press_roll_slide/scene.toml"
         raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
@@ -138,7 +138,8 @@ def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
 
 
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Sequence[Sensor] = ()) -> None:
-    """Raise TactileError for a point beside one of the gels; without gels, beside what the DIGIT covers."""
+    """Raise TactileError for a pressing point (force above 0) that lies beside one of the gels; without gels, beside
+    the DIGIT's. scene_path : names the scene in the message"""
     for (number, point), gel in itertools.product(enumerate(spec.points, 1), gels or (TARGET,)):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3, sensor=gel):
             shape = sensors.shape_of(gel)
@@ -206,7 +207,7 @@ def _pressure(frames: list[_Frame]) -> np.ndarray:
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
-    """Convert the fluid's pressure, Pa, to PDC (...,) int16 counts, 0..4095."""
+    """Convert the fluid's pressure (...,), Pa above the surrounding air's, to PDC (...,) int16 counts, 0..4095."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 

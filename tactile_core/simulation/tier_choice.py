@@ -21,8 +21,8 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier for a bound. error : um rms that 95 of 100 contacts stay below; ms : CPU time of a contact
-    share : depth that is reached, divided by the thickness"""
+    """Tier chosen for a sensor. error : of shape, um rms, that 95 of 100 contacts stay below
+    ms : CPU time of a contact; share : greatest depth that is reached, divided by the thickness"""
 
     tier: Tier
     error: float
@@ -38,7 +38,8 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return each tier's largest error, um, up to a share of the thickness (fast adds full's); ms per contact.
+    """Return each tier's name, its largest error of shape, um, up to a depth that is ``share`` of the thickness (fast
+    adds full's, against which it was measured), and ms per contact.
     Raises TactileError for a sensor without measured errors."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
@@ -56,7 +57,8 @@ def _up_to(tier: str, sensor: str, share: float) -> float:
 
 
 def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
-    """Choose the cheapest tier within a bound, um, for presses up to a share of the thickness; fast without a bound.
+    """Choose the cheapest tier whose error of shape is within ``bound``, um, for presses up to a depth that is
+    ``share`` of the thickness; None for the bound: the fast tier.
     Raises TactileError where none is within it."""
     rows = tier_errors(sensor, share)
     what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
@@ -65,7 +67,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """Choose a tier for each sensor used in a scene's [recording]. Raises TactileError for a bound, um, none meets."""
+    """Choose a tier as ``choose`` does for each of the sensors ``used``, at the depths of a scene's [recording]."""
     from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)
@@ -76,7 +78,8 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """Return a scene's depth over the thickness by the fast tier, or the largest tabulated one where unknown."""
+    """Return the greatest depth of a recording over the thickness, by the fast tier; 0.6, the most that contacts reach,
+    where a force is beyond the tier or its matrices are not built."""
     if not stored(sensor).bytes:
         return DEPTH_LIMIT
     share = 0.0
