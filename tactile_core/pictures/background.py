@@ -42,7 +42,8 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Mean and largest difference, levels, of a picture at rest (H, W, 3) from the one a radiance (H, W, 3) gives."""
+    """Return ``mean_levels`` and ``largest_levels`` by which a picture at rest (H, W, 3) differs from the one that a
+    radiance (H, W, 3) gives."""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
@@ -100,7 +101,8 @@ def terms(most: int) -> Iterator[tuple[int, int]]:
 
 
 def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
-    """Read an image file as a picture (H, W, 3) uint8; raises TactileError for another file, or another size."""
+    """Read an image file as a picture (H, W, 3) uint8, red, green, blue; raises TactileError for another file, or
+    another size than that of ``camera``'s pictures (None for any)."""
     from PIL import Image
 
     expected = f"an image file of 8 bits a colour ({', '.join(FORMATS)})"

@@ -19,8 +19,8 @@ SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, abou
 @dataclasses.dataclass(frozen=True)
 class Gather:
     """Resolution at which the gel's own light is gathered.
-    step : pixels between places; azimuths : directions around each
-    growth : each step outward as a share of the distance, at least one place; bounces : 1 or more"""
+    step : pixels between places; azimuths : number of directions around each
+    growth : each step outward as a share of the distance so far, at least one place; bounces : of light, 1 or more"""
 
     step: int
     azimuths: int
@@ -32,7 +32,7 @@ class Gather:
 class Preset:
     """Settings of a Mitsuba render.
 
-    points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
+    says : it in words; points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
     bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
     paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths per pixel; 0 for our own integrator
 

@@ -46,6 +46,7 @@ class Renderer:
         red give ``picture[..., ::-1]``); None for the calibration's
     rest : (H, W) heights of the undeformed gel, m; None for the calibration's, whose dome is then applied to heights
     seed : seed of ``reference``'s random samples; the other presets draw none
+    surroundings : lamps and bodies beside the unit's own, which Mitsuba with LLVM alone draws
     Raises TactileError for an unknown preset, arrays of another shape, values that are not finite, and a gel that
     reaches an LED or the camera; ModuleNotFoundError without the extra [render], which all presets but ``fast`` need.
 
@@ -192,7 +193,7 @@ class Renderer:
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
     def correction(self) -> dict[str, float]:
-        """Mean and largest difference, levels, between the picture at rest and the one modelled from the lights."""
+        """Return ``mean_levels`` and ``largest_levels``, by which the picture at rest differs from the modelled one."""
         return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
@@ -238,7 +239,8 @@ def _given_background(picture: np.ndarray, shape: tuple[int, int, int]) -> np.nd
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Return values as float32. Raises TactileError, with ``name``, for another ``shape`` or values not finite."""
+    """Return values (...) as float32. Raises TactileError, which names them ``name``, for another ``shape`` or values
+    that are not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")

@@ -154,7 +154,8 @@ def fit_unit(
     reflectance: float | None = None,
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
-    """Fit a unit, as ``fit.calibrate``, and evaluate each press by a fit to the other thirds of the presses.
+    """Fit a unit, as ``fit.calibrate``, and evaluate each press by a fit to the other thirds of the presses; return the
+    fit, and the evaluations, empty for a single press.
     ball_diameter : m; start : calibration that the fit starts from; unit : name; quick : without Mitsuba
     reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
     Raises TactileError for photographs in another orientation, and as ``fit.calibrate`` does."""

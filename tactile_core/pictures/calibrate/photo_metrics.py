@@ -13,8 +13,9 @@ _C1, _C2 = (0.01 * PEAK) ** 2, (0.03 * PEAK) ** 2
 
 
 def metrics(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray, region: np.ndarray) -> dict:
-    """Compute roi_l1, roi_psnr, roi_ssim, frame_l1, lobe_iou of a picture (H, W, 3) against a photograph (H, W, 3).
-    region : (H, W) bool; background : (H, W, 3). lobe_iou is NaN where neither of the two has a lobe."""
+    """Compute metrics by name of a picture (H, W, 3) against a photograph (H, W, 3), levels: in a region, the mean
+    absolute difference roi_l1, roi_psnr (dB), structural similarity roi_ssim, overlap of shadows lobe_iou; frame_l1.
+    region : (H, W) bool; background : (H, W, 3), untouched gel. lobe_iou is NaN where neither of the two has a lobe."""
     picture, photograph = picture.astype(float), photograph.astype(float)
     error = picture - photograph
     return {

@@ -104,7 +104,8 @@ class Sight:
 def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
-    """Fit the ball whose picture is nearest the photograph; returns it and the mean squared residual, levels squared.
+    """Fit the ball whose picture is nearest the photograph of ``sight``; return the ball and the mean squared residual,
+    levels squared.
     bench : draws balls in working pixels; radius : m, the ball's, or where its search starts with ``free_radius``
     lit : true fits the object's light through the coating as well (``missing_light``), false takes the unit's"""
     problem = _PressProblem(bench, sight, radius, lit)

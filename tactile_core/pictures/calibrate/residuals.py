@@ -90,7 +90,7 @@ class _Lights:
 
 class UnitResiduals:
     """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
-    start : the calibration that the priors are centred on, in working pixels
+    start : the calibration that the priors are centred on, in working pixels; sights : a photograph's data each
     radius : m, of balls for which none is given
     free : (22,) bool, which of the unit's numbers may change; pictures : class that draws them"""
 

@@ -77,7 +77,7 @@ def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[f
 
 
 def plugin_names(unit: Calibration) -> list[str]:
-    """Return the plugins of the coating and of each LED."""
+    """Return the names of Mitsuba's plugins of the coating and of each LED."""
     return [unit.coating.bsdf, *(lamp["type"] for lamp in lamps(unit).values())]
 
 
@@ -108,9 +108,9 @@ def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
 
 
 def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
-    """Return four black walls around gel and LEDs, from the gel's height up, as matrices (4, 4); they keep outside
-    light away. What the housing reflects near an LED is part of that LED's fitted radius, which is several times a
-    chip's."""
+    """Return four black walls around gel and LEDs, from height zero up, as Mitsuba's plugins by name, "to_world" a
+    matrix (4, 4); they keep outside light away. What the housing reflects near an LED is part of that LED's fitted
+    radius, which is several times a chip's."""
     lowest, highest = mesh.bounds()
     for led in unit.leds:
         place, reach = np.array(to_scene(led.position)), led.radius * MM + WALL_GAP

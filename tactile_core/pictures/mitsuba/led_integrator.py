@@ -32,8 +32,8 @@ class EmitterLight(NamedTuple):
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[EmitterLight]:
-    """Compute the light of each of the emitters at surface interactions ``hit``, from some points on the emitter.
-    scene : the occluders; phase : 0..1, rotates the points, in shares of their distance
+    """Compute the light of each of the emitters at surface interactions ``hit``, from ``points`` points on the emitter.
+    mi : Mitsuba's module; scene : the occluders; phase : 0..1, rotates the points, in shares of their distance
     lobe : cosine of the half vector beyond which light near the mirror's direction is left out; None for none"""
     import drjit as dr
 

@@ -48,7 +48,7 @@ class Tracer(abc.ABC):
 
 
 def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
-    """Make a scene of ``height`` (H, W) m in the variant ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
+    """Make a tracer of a gel's ``mesh`` at ``height`` (H, W) m in the variant ``"llvm_ad_rgb"`` or ``"scalar_rgb"``."""
     return (_LlvmTracer if variant == LLVM else _ScalarTracer)(mesh, height, variant)
 
 
