@@ -74,11 +74,10 @@ def main(arguments: list[str] | None = None) -> int:
 def stage_measured(
     stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
 ) -> Iterator[Method]:
-    """Measure every method of a stage; those that cannot run here are noted in ``missing``.
+    """Measure every method of a stage, with ``quick`` on less; those that cannot run here are noted in ``missing``.
 
     file : where the first method of pictures and chain leaves the others' truth
-    only : words that name a stage, or a stage and a method; none for all
-    """
+    only : words that name a stage, or a stage and a method; none for all"""
     names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
     wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
     if wanted and stage in LEAVE_TRUTH:
@@ -97,13 +96,14 @@ def stage_measured(
 
 
 def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """Measure one method, to be called in a process of its own; None for one that only writes the others' truth."""
+    """Measure one method of a stage, to be called in a process of its own; None for one that only writes the others'
+    truth to ``file``. quick : on less data"""
     measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
     return measure(name, quick, file) if stage in LEAVE_TRUTH else measure(name, quick)
 
 
 def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
-    """Measure every method of every requested stage."""
+    """Measure every method of every stage that the command line's options ask for; missing : as ``stage_measured``'s"""
     methods = []
     with tempfile.TemporaryDirectory() as scratch:
         for stage in STAGES:

@@ -72,7 +72,7 @@ def tracked() -> list[str]:
 
 
 def fetch(platform: str, python: str, folder: Path) -> list[Path]:
-    """Download the wheels into a folder; pip says what is missing."""
+    """Download the wheels for a Blender's platform and Python into a folder; return them. pip says what is missing."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
                "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
     for name in PLATFORMS[platform]:
@@ -89,8 +89,8 @@ def requirements(python: str, platform: str) -> list[str]:
 
 
 def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool) -> str:
-    """The manifest with the platform, Blender versions and wheels of one zip, before its first table. platform : None
-    for a zip without wheels; debian : for the Blender of Debian, of any version"""
+    """Return the text of blender_manifest.toml with the platform, Blender versions and wheels of one zip added.
+    platform : None for a zip without wheels; debian : true for a distribution's Blender, of any version"""
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     if platform is None:
         return text
@@ -103,7 +103,7 @@ def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool
 
 
 def build(out: Path, platform: str | None, python: str, wheels: list[Path], debian: bool = False) -> Path:
-    """Write the zip as one piece; returns its path. Arguments as for ``manifest``"""
+    """Write the zip into the folder ``out`` as one piece; return its path. Other arguments as for ``manifest``"""
     text = manifest(platform, python, wheels, debian)
     version = re.search(r'(?m)^version = "(.+)"$', text).group(1)
     tag = f"-{platform}-py{python}{'-debian' * debian}" if platform else ""

@@ -37,7 +37,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def check(folder: Path, venv: Path) -> int:
-    """Export into a folder and run every check in the environment; returns 1 if one fails."""
+    """Export into a folder and run every check in the virtual environment ``venv``; return 1 if one fails, else 0."""
     python = install(venv)
     tactile = [sys.executable, "-m", "tactile_core"]
     call(*tactile, "batch", RECORDING, "--keep", "latent,image", "--workers", "1", "--out", folder / "job")
@@ -102,7 +102,7 @@ def can_find(python: Path, module: str) -> bool:
 
 
 def run(*command: object) -> int:
-    """Run a command; returns 1 if it fails."""
+    """Run a command; return 1 if it fails, else 0."""
     print("+", *command, flush=True)
     return int(subprocess.call([str(word) for word in command]) != 0)
 

@@ -99,7 +99,8 @@ def check_python(version: tuple[int, int]) -> None:
 
 
 def run_demo(folder: Path) -> int:
-    """Convert the shipped recording into out/demo and name the files."""
+    """Convert the shipped recording into out/demo by the environment in ``folder``, name the files; return the
+    status."""
     python = install(folder, extras=())
     out = ROOT / "out" / "demo"
     command = ["-m", "tactile_core", "convert", str(DEMO_RECORDING), "--out", str(out), "--overwrite"]
@@ -129,8 +130,8 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
 
 
 def run_all(python: Path, commands: Iterable[list[str]], variables: dict[str, str]) -> int:
-    """Run commands, modules of Python's, each whatever the others report; returns the status of the first that
-    fails."""
+    """Run commands, modules of Python's, each whatever the others report; return the first status that is not 0, or 0.
+    variables : the environment's"""
     failed = []
     for command in commands:
         say(" ".join(command))
@@ -180,7 +181,7 @@ def run_in_binary(binary: Path, pytest_arguments: list[str]) -> int:
 
 
 def call_with_limit(command: list[str], variables: dict[str, str]) -> int:
-    """Run a Blender; the status 124 when it did not end in time."""
+    """Run a Blender with environment variables, at most ``BLENDER_SECONDS``; return its status, 124 for too long."""
     try:
         return subprocess.call(command, cwd=str(ROOT), env=variables, timeout=BLENDER_SECONDS)
     except subprocess.TimeoutExpired:
@@ -325,7 +326,7 @@ def python_version() -> str:
 
 
 def relative(path: Path) -> str:
-    """Return a path as short as the reader's working folder allows."""
+    """Return a path as text, from the checkout's folder where it lies in it."""
     try:
         return str(path.relative_to(ROOT))
     except ValueError:

@@ -73,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]:
-    """Rows of real recordings: grips of the PHAC set, or slides."""
+    """Measure real recordings: grips of the PHAC set where the folder holds them, else slides."""
     folder = Path(options.recordings)
     if grips.find(folder):
         return grips.rows(folder, network, read_pairs(options.test_set))
@@ -82,7 +82,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
 
 
 def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
-    """Rows of simulated contacts."""
+    """Measure simulated contacts, and renew the model card if one is named. options : the command line's"""
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))

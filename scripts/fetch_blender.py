@@ -81,7 +81,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def fetch(tree: Path, suite: str) -> None:
-    """Make the Debian tree, unless it is there."""
+    """Make the Debian tree of a ``suite`` with Blender in the folder ``tree``, unless it is there."""
     if (tree / "usr" / "bin" / "blender").exists():
         return
     tools = tree.parent / "debootstrap"
@@ -110,7 +110,7 @@ def wrapper(tree: Path) -> Path:
 
 
 def photograph(binary: Path) -> None:
-    """Photograph the window at each stage, out/screenshots/<stage>.png."""
+    """Photograph the window at each of ``STAGES``, out/screenshots/<stage>.png; binary : runs the tree's Blender"""
     out = ROOT / "out" / "screenshots"
     out.mkdir(parents=True, exist_ok=True)
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]

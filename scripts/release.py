@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def agreed_version(root: Path) -> str:
-    """Return the version that all places name. Raises ReleaseError where two differ."""
+    """Return the version that all files of ``VERSIONS`` name. Raises ReleaseError where two differ."""
     found = {}
     for name, pattern in VERSIONS.items():
         match = re.search(pattern, (root / name).read_text(encoding="utf-8"))

@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measured(name: str, quick: bool) -> Iterator[Row]:
-    """Rows of a check; one that breaks off ends with a row that says so, and the others go on."""
+    """Yield the rows of the check ``name``; where it breaks off, a last row that says so, instead of an error."""
     try:
         yield from CHECKS[name][0](quick)
     except Exception:  # whatever it was, the other checks are still worth their rows
@@ -70,7 +70,8 @@ def measured(name: str, quick: bool) -> Iterator[Row]:
 
 
 def write(report: Path, parts: dict[str, list[Row]]) -> None:
-    """Renew the two tables of a report, and its rows beside it. Raises ValueError for a page without the tables."""
+    """Renew the two tables of the page ``report``, and the rows as CSV beside it; parts : heading -> its rows. Raises
+    ValueError for a page without the tables."""
     rows = [row for part in parts.values() for row in part]
     checks = [*_CHECKS, *(_check(heading, part) for heading, part in parts.items())]
     renew_tables(report, {_TIERS[0]: _tier_table(rows), _CHECKS[0]: checks})

@@ -38,7 +38,8 @@ SETS = {  # what is added -> the outputs asked for, each beside those before it
 
 
 class Part(NamedTuple):
-    """Measured cost. start : s before the first frame; ms : per frame; mb : peak resident; kb : on disk, per frame"""
+    """Measured cost. start : CPU s before the first frame; ms : CPU, mb : peak resident, kb : on disk, per frame but
+    mb"""
 
     start: float
     ms: float
@@ -81,7 +82,7 @@ def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
 
 
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
-    """Measure the cost of `tactile simulate --keep`; force : N, of the ball on its way"""
+    """Measure the cost of `tactile simulate --keep`; folder : scratch; keep : the outputs; force : N, of the ball"""
     costs, sizes = [], []
     scene, out = folder / "scene", folder / "out.h5"
     scene.mkdir(exist_ok=True)
@@ -94,7 +95,7 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Measure `tactile convert` by what it keeps, and `tactile render` by the fast preset."""
+    """Measure `tactile convert` by what it keeps, and `tactile render` by the fast preset; folder : for scratch"""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}
@@ -110,7 +111,7 @@ def conversions(folder: Path) -> dict[str, Part]:
 
 
 def full_tier() -> dict[str, dict[str, float]]:
-    """Time of a contact of the full tier at a force, ms, by sensor, without friction and with the default one."""
+    """Measure the full tier's CPU ms a contact at a force, by sensor: "smooth", and "rough" with friction 0.78."""
     ways = {"smooth": 0.0, "rough": FRICTION}
     return {
         sensor: {way: contact_ms(sensor, friction) for way, friction in ways.items()} for sensor in ("biotac", "digit")

@@ -170,7 +170,7 @@ def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
 
 
 def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
-    """Yield the height map's and the fast picture's times."""
+    """Yield name, times and error in words of height maps, then of fast pictures, of the contacts' gels."""
     renderer = Renderer(preset="fast")
     mapper = gel_mapper(renderer.camera)
     heights: Times = []
@@ -197,7 +197,7 @@ def gel_steps(count: int) -> Times:
 
 
 def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
-    """Poses (4, 4) on the DIGIT: first touch, depths to the contact's own, and slides from there toward the base."""
+    """List 11 poses (4, 4) on the DIGIT: first touch, five depths to the contact's own, five slides toward the base."""
     pose = pose_at("digit", contact.indenter, contact.place)
     deepest = contact.depth * thickness_under("digit", contact.indenter, pose)
     half = STEPS // 2

@@ -55,25 +55,25 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def own_unit(data: Path) -> Photographs:
-    """The 14 photographs of the unit that ships."""
+    """Read the 14 photographs of the unit that ships, in the folder of ``data``."""
     return read_photographs(data / "digit_real" / "presses")
 
 
 def deeper(data: Path, known: Photographs) -> Photographs:
-    """Two presses of another day, deeper and of another ball, beside the first day's untouched gel."""
+    """Read two presses of another day, deeper and of another ball, beside the untouched gel of ``known`` ones."""
     files = sorted((data / "digit_real" / "deeper").glob("*.png"))
     found = (press_of(file.name, read_photograph(file), known.background) for file in files)
     return dataclasses.replace(known, presses=tuple(press for press in found if press is not None))
 
 
 def other_unit(data: Path) -> Photographs:
-    """Ten photographs of Taxim's unit, with its untouched gel."""
+    """Read ten photographs of Taxim's unit, with its untouched gel."""
     folder = data / "digit_other_unit"
     return read_photographs(folder, folder / "untouched.jpg")
 
 
 def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
-    """Split photographs into ``count`` parts; yield a fit to all but one part, and that part, for each."""
+    """Split photographs into ``count`` parts; for each, yield a fit, from ``start``, to all others, and that part."""
     names = [press.name for press in photographs.presses]
     for fold in range(count):
         apart = names[fold::count]

@@ -72,7 +72,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
-    """Yield all rows, on ``count`` fields; errors are of the faster variant, and once between the variants."""
+    """Yield all rows, on ``count`` fields; errors are of the faster variant, and once between the variants.
+    quick : a reference of fewer passes, times of one field, one size"""
     heights = fields(unit, count)
     variants = working_variants()
     best = variants[0]
@@ -93,7 +94,8 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
-    """``count`` height maps (H, W) m of random contacts in the picture, up to ``DEEPEST`` deep, by the fast tier."""
+    """Make ``count`` height maps (H, W) m of random contacts in the picture, to ``DEEPEST`` at most, by the fast
+    tier."""
     camera, found = unit.camera, []
     for contact in random_contacts(40 * count, seed):
         row, column = camera.to_pixel(contact.place.x, contact.place.z)
@@ -110,7 +112,7 @@ def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
 
 
 def working_variants() -> list[str]:
-    """The variants that work here, the faster one first."""
+    """List Mitsuba's variants that work here, the faster one first."""
     found = []
     for variant in (LLVM, SCALAR):
         try:
@@ -163,7 +165,7 @@ def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
-    """Root mean square of all numbers of pictures, or of their differences from others of the same shapes."""
+    """Return the root mean square of all numbers of pictures, or of their differences from others of equal shapes."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
 
@@ -177,8 +179,8 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """Row of the preset ``name``'s CPU ms per frame on one thread: median over heights (H, W) m of the least of
-    a few calls, as other programs only lengthen it."""
+    """Measure the preset ``name``'s CPU ms per frame on one thread: median over heights (H, W) m of the least of a few
+    calls, as other programs only lengthen it; quick : of one height map"""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
     slow = name == REFERENCE.name

@@ -71,7 +71,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
-    """The data file: by tier and sensor, ms and errors in bins of depth; and the reference tier's contacts."""
+    """Return the data file, by tier and sensor ms and errors in bins of depth, and the reference tier's contacts, as of
+    ``keep``, by sensor. work : folder of solved contacts; quick : a few contacts, no reference tier"""
     found, truth = {tier: {"says": says} for tier, says in SAYS.items()}, {}
     for sensor in SENSORS:
         entries, truth[sensor] = measure(sensor, work, quick)
@@ -83,7 +84,7 @@ def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
 
 
 def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], list[dict]]:
-    """Measure every tier of one sensor; also returns the contacts that the reference tier solved."""
+    """Measure every tier of one sensor; also return the contacts that the reference tier solved. See ``table``."""
     full = FULL[sensor]
     contacts = list(random_contacts(QUICK if quick else full, SEED))
     kept = {tier: [keep(work, sensor, tier, i, contact) for i, contact in enumerate(contacts[:count])]
@@ -130,7 +131,7 @@ def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
 
 
 def validated(sensor: Sensor) -> Iterator[Miss]:
-    """Yield the errors of the full tier's presses in the validation's report."""
+    """Yield the errors of the full tier's presses in the validation's report, docs/mechanics.csv."""
     rows = {row["name"]: row for row in read_table(REPORT)}
     for name, row in rows.items():
         depth = re.fullmatch(rf"{sensor}_full_([\d.]+)mm(\S*)_shape_rms", name)
@@ -147,7 +148,7 @@ def share_of(full: dict) -> dict:
 
 
 def middle(kept: list[dict]) -> float | None:
-    """Median ms of a contact; None where none was solved."""
+    """Return the median CPU ms of the contacts ``kept``, as of ``keep``; None where none was solved."""
     return float(f"{1e3 * np.median([one['seconds'] for one in kept if one]):.4g}") if any(kept) else None
 
 

@@ -36,7 +36,7 @@ def printed(rows: Iterable[Row]) -> list[Row]:
 
 
 def in_processes(work: Callable[[Any], str], jobs: Sequence[Any], count: int) -> None:
-    """Do jobs in ``count`` processes of one thread each, and print the line that ends each."""
+    """Do jobs by ``work`` in ``count`` processes of one thread each; print the line that it returns for each job."""
     with threads.one_thread(), concurrent.futures.ProcessPoolExecutor(count) as pool:
         for done, line_of in enumerate(pool.map(work, jobs), 1):
             print(f"{done}/{len(jobs)} {line_of}", flush=True)
@@ -79,7 +79,7 @@ def short(value: float | None) -> str:
 
 
 def png_of(figure: Any) -> bytes:
-    """Draw a figure of matplotlib as PNG, without a date; nothing of pyplot's is touched."""
+    """Draw a figure of matplotlib as the bytes of a PNG, without a date; nothing of pyplot's is touched."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     content = io.BytesIO()
@@ -88,7 +88,7 @@ def png_of(figure: Any) -> bytes:
 
 
 def finished(rows: list[Row], json: Path | None) -> int:
-    """Write the rows to a file, if one is given, and name those that miss their target; returns the exit status."""
+    """Write rows to the file ``json``, if given, and name those that miss a target; return 1 if any does, else 0."""
     if json:
         atomic.write_json(json, rows)
     for each in failed(rows):

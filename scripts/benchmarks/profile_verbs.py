@@ -151,7 +151,7 @@ points = [
 
 
 def run(case: Case, folder: Path) -> Cost:
-    """Run one case in a fresh process."""
+    """Run one case in a fresh process; folder : its scratch. Raises AssertionError where the process breaks off."""
     file = folder / "record.json"
     file.unlink(missing_ok=True)
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
@@ -170,7 +170,7 @@ def run(case: Case, folder: Path) -> Cost:
 
 
 def verbs(folder: Path) -> list[Row]:
-    """CPU time and peak memory of each verb."""
+    """Yield CPU time and peak memory of each verb, or its exit status where that is not the case's; folder : scratch"""
     for case in CASES:
         cost = run(case, folder)
         if cost.status != case.status:
@@ -184,7 +184,7 @@ def verbs(folder: Path) -> list[Row]:
 
 
 def write_long(path: Path) -> None:
-    """The shipped recording, again and again, LONG frames in all."""
+    """Write the shipped recording, again and again, LONG frames in all."""
     one = recordings.read(RECORDING)
     rows = np.arange(LONG) % len(one)
     held = {name: getattr(one.truth, name) for name in Truth.__dataclass_fields__}
@@ -195,7 +195,7 @@ def write_long(path: Path) -> None:
 
 
 def long_conversion(folder: Path) -> list[Row]:
-    """Measure `convert` of a long recording with its default outputs, and where its time goes."""
+    """Yield cost of `convert` of a long recording with default outputs, and where its time goes; folder : scratch"""
     write_long(folder / "long.h5")
     cost = run(Case("long", "convert {}/long.h5 --out {}/whole"), folder)
     of = f"{LONG} frames, {cost.wall:.1f} s on the wall, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"

@@ -63,19 +63,19 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def words_of(command: str, out: str) -> list[str]:
-    """The words of one of COMMANDS that writes to the folder ``out``."""
+    """Return the words of one of COMMANDS, its places filled in, that writes to the folder ``out``."""
     frames = f"{out}/demo/{RECORDING.stem}/frames.h5"
     return [word.format(recording=RECORDING, scenes=SCENES, out=out, frames=frames) for word in command.split()]
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """SHA-256 of each file under a folder, by its path there, but of those that hold versions and clocks."""
+    """Return the SHA-256 of each file under a folder, by its path there, but of those that hold versions and clocks."""
     files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name not in HOLD_CLOCKS)
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 
 
 def contacts() -> dict[str, str]:
-    """SHA-256 of the displacement under a ball of 3 mm, by sensor and force."""
+    """Return the SHA-256 of the displacement under a ball of 3 mm radius, by sensor and force."""
     ball, found = tactile.indenters.Sphere(radius=3e-3), {}
     for sensor, place in PLACES.items():
         for force in FORCES:
@@ -85,7 +85,7 @@ def contacts() -> dict[str, str]:
 
 
 def differences(before: dict[str, str], after: dict[str, str]) -> list[str]:
-    """A line for each answer that differs, is gone or is new."""
+    """Return a line for each answer, by name, that differs between before and after, is gone or is new."""
     names = sorted(before.keys() | after.keys())
     words = {name: "gone" if name not in after else "new" if name not in before else "differs" for name in names}
     return [f"{word}: {name}" for name, word in words.items() if before.get(name) != after.get(name)]

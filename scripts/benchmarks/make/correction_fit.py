@@ -66,8 +66,8 @@ class Choice(NamedTuple):
 
 
 def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> Learned:
-    """Fit a correction to known samples and their mirror images, by kernel ridge regression with the three of
-    ``choices``: for_force by all features, by_few, for_fields."""
+    """Fit a correction to known samples and their mirror images, by kernel ridge regression with the three settings of
+    ``choices``: of forces by all features, of forces by the ``ESSENTIAL`` ones, of fields."""
     x = np.concatenate([known.x, known.x * MIRRORED])
     fields = np.concatenate([known.fields, mirrored(known.fields)])
     log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)
@@ -92,7 +92,8 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """Choose by held-out presses, with friction if ``kind``: for forces by all features, by few, and for fields."""
+    """Choose settings by held-out presses, those with friction if ``kind`` is true, else those without: for forces by
+    all features, for forces by the ``ESSENTIAL`` ones, for fields."""
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]

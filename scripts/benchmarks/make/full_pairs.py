@@ -52,7 +52,8 @@ Pair = tuple[np.ndarray, Solution, Solution]  # slide (2,) m, and both sensors' 
 
 
 def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
-    """Draw press ``number``, in ``REGION_X`` if odd. Raises TactileError without a box, a ring and other bodies."""
+    """Draw press ``number`` from ``seed``, in ``REGION_X`` if odd. Raises TactileError without a box, a ring and other
+    bodies in the scene."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()

@@ -39,10 +39,9 @@ _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no 
 class Sample:
     """Contact in the full and the fast tier.
 
-    press : number of its press; friction : Coulomb's coefficient; features (f,); frame; depth m
-    ratio : force of the full tier over that of the fast
-    fast, full : displacement (n, 3) float32 m
-    """
+    press : number of its press; friction : Coulomb's coefficient; features : (f,), and frame : of the fast contact
+    depth : m; ratio : force of the full tier over that of the fast, along the motion
+    fast, full : displacement (n, 3) float32 m of the surface's nodes, in either tier"""
 
     press: int
     friction: float
@@ -55,11 +54,10 @@ class Sample:
 
 
 def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[str, np.ndarray]:
-    """The full tier's contacts of a press at its ``SHARES`` with Coulomb's ``friction``, as far as they converge.
+    """Solve the full tier's contacts of a press at its ``SHARES`` with Coulomb's ``friction``, as far as they converge.
 
     Returns depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
-    iterations (c,), load steps (c,) and seconds (c,).
-    """
+    iterations (c,), load steps (c,) and seconds (c,)."""
     pose = pose_at(sensor, press.indenter, press.place)
     deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
@@ -116,7 +114,8 @@ def _holds(problem: ContactProblem, contact: Contact) -> bool:
 
 
 def residual_on_grid(sensor: str, at: PatchFrame, residual: np.ndarray) -> np.ndarray:
-    """Interpolate a residual (n, 3) at a sensor's nodes to the moving grid (g, 3), in the nodes' frames; 0 beyond."""
+    """Interpolate a residual (n, 3) at a sensor's nodes to the grid (g, 3) of the patch frame ``at``, in the nodes' own
+    axes; 0 beyond the surface."""
     import scipy.interpolate
 
     local = np.einsum("kji,kj->ki", correction.node_frames(sensor), residual)

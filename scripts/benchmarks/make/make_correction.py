@@ -35,7 +35,8 @@ def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction:
 
 
 def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
-    """Solve one press in the full tier, unless its file is there; returns a line to print. job : as for ``file_of``"""
+    """Solve a press in the full tier, unless its file is there; return a line to print. job : ``file_of``'s
+    arguments"""
     _, sensor, seed, number, friction = job
     path = file_of(*job)
     if path.exists():
@@ -49,7 +50,8 @@ def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
 
 
 def wanted_contacts(arguments: argparse.Namespace) -> list[tuple[int, float]]:
-    """List the contacts to solve, (press, friction): all presses without friction, then the first ones with it."""
+    """List what to solve, (press, friction): all presses without friction, then the first ones with it.
+    arguments : the command line's, here and in ``learn_all``"""
     rubbing = [(number, FRICTION) for number in range(min(arguments.rubbing, arguments.presses))]
     return [(number, 0.0) for number in range(arguments.presses)] + rubbing
 

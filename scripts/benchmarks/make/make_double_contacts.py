@@ -32,7 +32,7 @@ STEPS = 4  # of the way in, for friction
 
 
 def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
-    """Draw two balls, their places and their forces, N."""
+    """Draw two balls, and for each its place, at which it is pressed alone, and force, N."""
     while True:
         places = random.uniform([-17e-3, -6e-3], [1e-3, 6e-3], (2, 2))
         forces = np.exp(random.uniform(*np.log(FORCES), 2))
@@ -49,7 +49,7 @@ def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
 
 
 def solved(sensor: str, balls: list[tuple[Sphere, Placement, float]]) -> Solution:
-    """Press both balls into a sensor at once."""
+    """Press both balls into a sensor at once, each as deep as its force takes it at its place alone; fast tier."""
     ends = []
     for ball, place, force in balls:
         pose = pose_at(sensor, ball, place)

@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def draw(figure: Figure, recording: tactile.Recording, touch: tactile.Translation, frame: int) -> None:
-    """Draw the five panels of one frame."""
+    """Draw the five panels of one frame of a recording, and of the touch translated from it."""
     truth = recording.truth
     skin, gel = truth.displacement_biotac[frame], truth.displacement_digit[frame]
     largest = max(np.linalg.norm(each, axis=1).max() for each in (skin, gel))
@@ -73,7 +73,8 @@ def title(figure: Figure, x: float, text: str) -> None:
 
 
 def surface(figure: Figure, box: tuple, lattice: sensors.Lattice, displacement: np.ndarray, largest: float) -> None:
-    """Draw a deformed surface in space, coloured by its nodes' displacement (n, 3) m up to ``largest`` m."""
+    """Draw a deformed surface in space, coloured by its nodes' displacement (n, 3) m up to ``largest`` m.
+    box : of the panel, left, bottom, width, height, 0..1 of the figure"""
     import matplotlib
 
     axes = figure.add_axes(box, projection="3d")

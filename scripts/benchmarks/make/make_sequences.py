@@ -69,8 +69,8 @@ def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def sequence(scene: Scene, motion: str, random: np.random.Generator) -> dict[str, np.ndarray]:
-    """Arrays (40, ...) of one sequence, 6 of its frames at rest; drawn again where a contact fails or touches nothing.
-    motion : one of ``MOTIONS``"""
+    """Draw and solve one sequence; return its arrays (40, ...), see ``described``, 6 frames of them at rest. It is
+    drawn again where a contact fails or touches nothing. motion : one of ``MOTIONS``"""
     while True:
         indenter = scene.indenters[int(random.integers(len(scene.indenters)))].build()
         place, force = draw_place(random, scene.pairs), float(np.exp(random.uniform(*np.log(FORCES))))
@@ -107,11 +107,10 @@ def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) ->
 
 
 def described(contacts: list[Contact]) -> dict[str, np.ndarray]:
-    """Signals and what is judged of the DIGIT, with the frames of rest before and after.
+    """Return the signals and what is judged of a sequence's contacts, with the frames of rest before and after.
 
     signal (40, 19) float16 counts; force (40,) float32 N, its size on the BioTac; center (40, 2) float32 m, of the dent
-    of the gel, NaN without contact; peak (40,) float32 m, its deepest node; patch (40, M / 8) uint8, packed bits
-    """
+    of the gel, NaN without contact; peak (40,) float32 m, its deepest node; patch (40, M / 8) uint8, packed bits"""
     around = (REST, AFTER)
     gels = np.stack([digit.displacement for _, digit in contacts])
     center = accuracy.dent_center(gels, sensors.digit_surface().rest)

@@ -33,12 +33,12 @@ Job = tuple[pathlib.Path, int, int]  # folder, seed, number
 
 
 def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
-    """Path of a press's contacts."""
+    """Return the path of the file of press ``number``'s contacts."""
     return folder / f"press_{seed}_{number:05d}.h5"
 
 
 def solve_one(job: Job) -> str:
-    """Solve one press, unless its file is there; returns a line to print."""
+    """Solve one press, unless its file is there; return a line to print. job : ``file_of``'s arguments"""
     path = file_of(*job)
     if path.exists():
         return f"{path.name}: was there"

@@ -48,12 +48,11 @@ class QuadMesh:
 
 
 def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
-    """A disc bonded at y = 0 with its free side toward -y.
+    """Make the mesh of a disc bonded at y = 0 with its free side toward -y.
 
     radii (n,), heights (m,) : m, of the nodes, from 0; n and m odd
     The second node of a row is moved outward by a tenth of its step: were it in the middle of its cell, a constant
-    pressure would put no force on the node of the axis, contact would lose that node, and the cell would buckle.
-    """
+    pressure would put no force on the node of the axis, contact would lose that node, and the cell would buckle."""
     radii = np.r_[radii[0], 1.1 * radii[1], radii[2:]]
     nodes = np.zeros((len(radii), len(heights), 3))
     nodes[..., 0], nodes[..., 1] = radii[:, None], -heights
@@ -66,7 +65,8 @@ def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
 
 
 def graded(even: float, spacing: float, end: float, growth: float) -> np.ndarray:
-    """Node places (odd count) from 0: ``spacing`` apart up to ``even``, then steps growing by ``growth`` to ``end``."""
+    """Return node places, m (odd count), from 0: some ``spacing`` m apart up to ``even`` m, then in steps that grow by
+    the factor ``growth`` to ``end`` m."""
     inside = np.linspace(0, even, 2 * max(round(even / spacing / 2), 1) + 1)
     steps = [spacing * growth]
     while sum(steps) < end - even:
@@ -121,7 +121,7 @@ class AxisymmetricSolid:
         return f.reshape(*self.weight.shape, 3, 3) + np.eye(3), plane + hoop + plane * hoop
 
     def linearise(self, state: State) -> Linearised:
-        """Residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        """Compute residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
         f, change = self._deformation(state.displacement)
         j = 1 + change
         if not (j > 0).all():
@@ -159,8 +159,8 @@ _TOLERANCE = Tolerance(gap=1e-9, balance=1e-8, step=1e-13)
 def disc_mesh(
     radius: float, thickness: float, reach: float, spacing: float, fine_depth: float, growth: float = 1.1
 ) -> QuadMesh:
-    """A disc of a radius and thickness, m: nodes ``spacing`` m apart out to ``reach`` and down to ``fine_depth``, steps
-    growing by ``growth`` beyond."""
+    """Make a disc of a radius and thickness, m: nodes ``spacing`` m apart out to ``reach`` m and down to ``fine_depth``
+    m, steps growing by the factor ``growth`` beyond."""
     heights = thickness - graded(fine_depth, spacing, thickness, growth)[::-1]
     heights[0] = 0.0
     return disc(graded(reach, spacing, radius, growth), heights)
@@ -176,7 +176,7 @@ def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) ->
 
 
 def contact_radius(contact: FiniteStrainContact, touch: ContactState) -> float:
-    """Radius at rest, m: halfway between the last node that touches and the first that does not."""
+    """Return a contact's radius at rest, m: halfway between the last node that touches and the first that does not."""
     radii = np.sort(contact.solid.mesh.nodes[contact.touchable, 0])
     last = int(np.searchsorted(radii, contact.solid.mesh.nodes[touch.outer.nodes, 0].max()))
     return float(radii[last : last + 2].mean())

@@ -22,14 +22,15 @@ def block(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> HexMesh:
 
 
 def inside(mesh: HexMesh) -> np.ndarray:
-    """Mask (n,) bool of the nodes of a block that do not lie on its sides."""
+    """Mark (n,) bool the nodes of a block that do not lie on its sides."""
     low, high = mesh.nodes.min(0), mesh.nodes.max(0)
     margin = 1e-6 * (high - low)
     return ((mesh.nodes > low + margin) & (mesh.nodes < high - margin)).all(1)
 
 
 def equilibrium(solid: FiniteStrainSolid, start: State, free: np.ndarray, load: np.ndarray | None = None) -> State:
-    """Return the state of forces ``load`` (3 n,) N on ``free`` (n,) nodes. Raises ArithmeticError for none."""
+    """Return the equilibrium under outer forces ``load`` (3 n,) N, None for none; nodes move where free (n,) bool is
+    true, and others stay as in ``start``. Raises ArithmeticError where none is found."""
     state, loose = start.copy(), np.repeat(free, 3)
     size = np.ptp(solid.mesh.nodes, axis=0).max()
     for _ in range(_MAX_ITERATIONS):

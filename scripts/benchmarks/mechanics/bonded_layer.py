@@ -15,12 +15,11 @@ GOLDEN_FORCE = {0.2e-3: 0.4176, 0.6e-3: 2.9513, 1.0e-3: 7.7420, 1.4e-3: 14.787, 
 def quarter_disc(
     radius: float, thickness: float, fine: float, intervals: tuple[int, int], layers: np.ndarray
 ) -> tuple[HexMesh, np.ndarray]:
-    """A quarter of a disc of a radius and thickness, m, and its fixed degrees of freedom (3 n,) bool.
+    """Make a quarter of a disc of a radius and thickness, m; return it and its fixed degrees of freedom (3 n,) bool.
 
     fine : m, side of the even grid in the middle; intervals : node intervals inside and outside of it, both even
     layers : (k,) 0 at the bonded back to 1 at the surface (-y), k odd
-    The grid of the square is bent onto the disc by (u sqrt(1 - v^2 / 2), v sqrt(1 - u^2 / 2)).
-    """
+    The grid of the square is bent onto the disc by (u sqrt(1 - v^2 / 2), v sqrt(1 - u^2 / 2))."""
     inside, outside = intervals
     u = np.concatenate([np.linspace(0, fine / radius, inside + 1), _growing(fine / radius, 1, outside, 1 / inside)])
     a, b = np.meshgrid(u, u, indexing="ij")
@@ -49,14 +48,13 @@ def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
 def exact_layer(
     depth: float, radius: float, thickness: float, youngs: float, poisson: float
 ) -> tuple[float, float, float]:
-    """Contact radius m, depth m and force N of a rigid paraboloid, of a tip's ``radius`` m, pressed to ``depth`` m into
+    """Return contact radius m, depth m and force N of a rigid paraboloid, whose tip has ``radius`` m, at ``depth`` m in
     a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
 
     With p = integral of phi(t) cos(xi t) the pressure's Hankel transform, the dual integral equations become
     pi/2 phi(x) - integral of K(x, t) phi(t) dt = E / (2 (1 - nu^2)) (d - x^2 / R), where phi vanishes at the contact's
     edge. K holds what the layer's compliance lacks to the half space's. Lebedev, Ufliand, PMM 22, 1958; the compliance:
-    Dhaliwal, Int. J. Eng. Sci. 8, 1970. To 1e-10 up to a contact of ten thicknesses.
-    """
+    Dhaliwal, Int. J. Eng. Sci. 8, 1970. To 1e-10 up to a contact of ten thicknesses."""
     import scipy.optimize
 
     equations = _LayerEquations(thickness, youngs, poisson)
@@ -76,7 +74,7 @@ class _LayerEquations:
         self.waves, self.lacking = u / thickness, 10 * weight * (1 - compliance) / thickness
 
     def solve(self, contact: float, radius: float) -> tuple[float, float]:
-        """Depth m and force N at a contact radius ``contact`` m, under a ball of radius m."""
+        """Return depth m and force N at a contact radius ``contact`` m, under a paraboloid of tip ``radius`` m."""
         point, weight = np.polynomial.legendre.leggauss(48)
         t, weight = contact * (point + 1) / 2, contact * weight / 2
         waves = np.cos(np.outer(np.r_[t, contact], self.waves))

@@ -72,7 +72,7 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
 
 def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
     """Solve a contact from rest, without friction; return it, its depth over the thickness, and CPU s. Raises
-    TactileError."""
+    TactileError where ``solve_path`` does."""
     pose = pose_at(sensor, contact.indenter, contact.place)
     share = contact.depth / DEEPEST * DEPTH_LIMIT * _ALMOST
     depth, thick = depth_at(share, sensor, contact.indenter, pose), thickness_under(sensor, contact.indenter, pose)

@@ -24,7 +24,7 @@ _SIDE, _DEPTH = 4.5e-3, 0.6e-3  # m
 
 @functools.cache
 def hollow() -> tuple[HexMesh, FluidCavity]:
-    """3 x 3 x 3 cells without the middle one, clamped at the back, and the cavity that it leaves."""
+    """Make a block of 3 x 3 x 3 cells without the middle one, clamped at the back, and the cavity that this leaves."""
     planes = np.linspace(0, _SIDE, 7)
     full = block(planes, -planes, planes)
     cells = np.delete(full.cells, 13, axis=0)
@@ -48,7 +48,8 @@ def _outward(side: np.ndarray, nodes: np.ndarray, middle: np.ndarray) -> np.ndar
 
 
 def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
-    """A ball on the block, its cavity ``full`` of fluid, ``pumped`` m3 added, or empty; also the cavity's volume."""
+    """Press a ball into the block; return the contact, and the cavity's volume then, m3.
+    full : true for a cavity full of fluid, to which ``pumped`` m3 are added; false for an empty one"""
     mesh, cavity = hollow()
     ball = Sphere(2e-3)
     pose = pose_on(ball, np.array([_SIDE / 2, -_SIDE, _SIDE / 2]), np.array([0, -1.0, 0]))

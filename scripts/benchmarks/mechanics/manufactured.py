@@ -19,7 +19,7 @@ _COMPLEX_STEP = 1e-30  # a derivative without cancellation: Im f(x + i h) / h
 
 
 def deformed(points: np.ndarray) -> np.ndarray:
-    """Deformed points (..., 3) of the unit cube: three shears, which keep volumes, then at most 1 % of swelling."""
+    """Deform points (..., 3) of the unit cube: three shears, which keep volumes, then at most 1 % of swelling."""
     x, y, z = np.moveaxis(points, -1, 0)
     x = x + 0.1 * np.sin(np.pi * y)
     y = y + 0.1 * np.sin(np.pi * z)
@@ -60,7 +60,7 @@ def _rms(weight: np.ndarray, values: np.ndarray) -> float:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the orders of accuracy: of displacement (L2 norm) and of the deformation gradient (H1)."""
+    """Yield the orders of accuracy, of displacement (L2) and deformation gradient (H1); quick : on coarse meshes"""
     counts = (2, 3, 4) if quick else (2, 3, 4, 6, 8)
     for poisson in (0.49,) if quick else (0.3, 0.49):
         found = []

@@ -19,7 +19,7 @@ _MATERIAL = Material(1e6, 0.49)
 
 
 def skewed() -> FiniteStrainSolid:
-    """2 x 2 x 2 cells with straight edges, none a brick: scikit-fem's hexahedra have eight corners."""
+    """Make 2 x 2 x 2 cells with straight edges, none a brick: scikit-fem's hexahedra have eight corners."""
     planes = np.linspace(-1e-3, 1e-3, 5)
     mesh = block(planes, planes[::-1], planes)
     x, y, z = mesh.nodes.T / 1e-3
@@ -154,7 +154,7 @@ def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the ``differences`` from scikit-fem, a row per quantity; none where it is not installed."""
+    """Yield the ``differences`` from scikit-fem, a row each; none where it is missing. quick changes nothing."""
     try:
         found = differences()
     except ImportError:

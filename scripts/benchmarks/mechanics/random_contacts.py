@@ -30,7 +30,8 @@ RIM = 1e-3  # m, places this close to the gel's outline are left out
 
 @dataclasses.dataclass(frozen=True)
 class RandomContact:
-    """Random contact; ``depth`` is a share of the thickness at first touch, so that one draw serves both sensors."""
+    """Random contact. name : of the indenter, in ``INDENTERS``
+    depth : share of the thickness at first touch, so that one draw serves both sensors"""
 
     name: str
     indenter: Indenter
@@ -39,7 +40,8 @@ class RandomContact:
 
 
 def random_contacts(count: int, seed: int = 0) -> Iterator[RandomContact]:
-    """Draw ``count`` contacts, each from its own numbers: places even over the gel, tilts and depths even."""
+    """Draw ``count`` contacts, indenters in turn, each from ``seed`` and its number: places even over the gel but for
+    its rim, axes even in a cone of 30 degrees, depths even up to half of the thickness."""
     names, digit = list(INDENTERS), shape_of("digit")
     for number in range(count):
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))

@@ -23,7 +23,8 @@ TABLE = "| method | ms a frame | MB | error | baseline | measured on |", "|---|-
 def write_report(
     folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: dict[str, list[str]]
 ) -> None:
-    """Write ``benchmark.json``, the tables of ``benchmark.md``, and ``benchmark.png``; more : tables of the page."""
+    """Write ``benchmark.json``, the tables of ``benchmark.md``, and ``benchmark.png``, all in ``folder``.
+    missing : method -> why it could not run; more : other tables of the page, as of ``renew_tables``"""
     about = {"machine": provenance.machine(), "missing": missing, "rows": list(rows)}
     atomic.write_json(folder / "benchmark.json", about)
     lines = {title: [as_line(each) for each in methods if each.stage == stage] for stage, title in TITLES.items()}
@@ -62,7 +63,7 @@ def plot(methods: Sequence[Method]) -> bytes:
 
 
 def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
-    """The methods of a stage that have time and error, a panel each; mechanics has one per sensor."""
+    """Return by panel the methods of a stage that have time and error; mechanics has a panel per sensor."""
     found = [each for each in methods if each.stage == stage and each.ms and each.error]
     if stage != "mechanics":
         return [found]
@@ -92,7 +93,7 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
 
 
 def label(method: Method) -> str:
-    """Label of a method, without what all methods of a panel share."""
+    """Return a method's label in the plot: its name without what all methods of a panel share."""
     name = method.name.split("_", 1)[1] if method.stage == "mechanics" else method.name
     return name.removesuffix("_llvm_ad_rgb").removesuffix("_scalar_rgb").replace("_", " ")
 

@@ -23,7 +23,8 @@ REPEATS = {"fast": 3, "full": 1}
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one tier on one sensor, ``name`` as "digit_fast": median time of random contacts, and their error."""
+    """Measure one tier on one sensor, ``name`` as "digit_fast": median time of random contacts, and their error.
+    quick : of fewer contacts"""
     sensor, tier = name.split("_")
     if tier == "reference":
         return _reference(sensor, quick)

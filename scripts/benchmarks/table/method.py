@@ -35,7 +35,7 @@ class Method:
     more: tuple[Row, ...] = ()
 
     def rows(self) -> list[Row]:
-        """Time, memory and error as rows."""
+        """Return time, memory and error as rows, then ``more``."""
         name = f"{self.stage}_{self.name}"
         found = [row(f"{name}_ms", self.ms, "ms", of="one core, CPU"), row(f"{name}_MB", self.mb, "MB", of="peak")]
         return [*found, row(f"{name}_error", self.error, self.unit, baseline=self.baseline, of=self.of), *self.more]
@@ -54,7 +54,7 @@ def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 
 
 
 def peak_mb() -> float:
-    """Peak memory of this process, MB; on Linux its own high-water mark, as getrusage adds the parent's."""
+    """Return the peak memory of this process, MB; on Linux its own high-water mark, as getrusage adds the parent's."""
     if sys.platform == "linux":
         for text in Path("/proc/self/status").read_text().splitlines():
             if text.startswith("VmHWM:"):

@@ -25,7 +25,8 @@ RADIUS, DEPTH, PITCH = 4.0, 0.5, 0.0295  # mm, mm, mm per pixel
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure the picture's time and memory by one program. Raises ModuleNotFoundError where it is not installed."""
+    """Measure the picture's time and memory by one program of ``NAMES``; quick changes nothing. Raises
+    ModuleNotFoundError where it is not installed."""
     draw = _ours() if name == "ours" else _taxim(name == "taxim_shadows")
     ms, mb = best_ms(draw), peak_mb()
     return Method("peers", name, ms, mb, None, "levels", None, "a ball of 4 mm, 0.5 mm deep, 480 x 640")

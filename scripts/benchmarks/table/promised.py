@@ -39,12 +39,12 @@ class Promise:
     of: str
 
     def covered(self, among: np.ndarray | None = None) -> float:
-        """Share of all C, or of those that ``among`` (C,) bool marks, that stayed below their bounds."""
+        """Return the share of all C, or of those that ``among`` (C,) bool marks, that stayed below their bounds."""
         held = self.found <= self.bound
         return float((held if among is None else held[among]).mean())
 
     def row(self) -> Row:
-        """Coverage, with its target where there are enough contacts."""
+        """Return the row of the coverage, with its target where there are enough contacts."""
         share = self.covered()
         if len(self.found) < FEWEST:
             return row(f"promised_{self.name}_covered", share, "1", of=self.of)
@@ -53,7 +53,7 @@ class Promise:
         }
 
     def lines(self) -> Iterator[str]:
-        """Lines of a table: all, then each group."""
+        """Yield the lines of a Markdown table: all contacts, then each group."""
         names = np.array(self.groups)
         for name in ["all", *dict.fromkeys(self.groups)]:
             here = np.ones(len(names), bool) if name == "all" else names == name
@@ -62,7 +62,7 @@ class Promise:
 
 
 def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
-    """Return the rows of all promises' coverage, and the page's table of it, its lines by heading."""
+    """Return the rows of all promises' coverage, and the page's table of it, its lines by heading; quick : on less"""
     promises = [*of_mechanics(quick), *of_translation(quick)]
     lines = [line for promise in promises for line in promise.lines()]
     return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}

@@ -37,7 +37,8 @@ DRAWS = 200  # of each posterior: a share is known to .035 per contact, to .002 
 
 
 def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)."""
+    """Measure medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)
+    counts, beside the nearest example."""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
     answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, slice(None), bodies)
@@ -59,10 +60,9 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
 
 
 def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Rows of the gel's depth, place and silence for signals read as ``change`` (C, 19) that have lost their sign.
+    """Measure the gel's depth, place and silence for signals read as ``change`` (C, 19) counts that lost their sign.
 
-    Over contacts that press without sliding; baseline of the depth: the true one, which a translation should reach.
-    """
+    Over contacts that press without sliding; baseline of the depth: the true one, which a translation should reach."""
     folded, unsigned = recovered(np.abs(change), np.ones(len(change), bool))
     columns: dict[str, list[np.ndarray]] = {"peak": [], "true": [], "place": [], "silent": []}
     for part in parts(len(change)):
@@ -89,8 +89,8 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
 
 
 def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """Shares of true places in the regions of posteriors for ``change`` (C, 19) counts, and their energy score beside
-    those of single answers."""
+    """Measure the shares of true places in the regions of posteriors for ``change`` (C, 19) counts, and the posteriors'
+    energy score beside that of single answers."""
     true = np.concatenate([_true_place(nets, pairs, part) for part in parts(len(change))])
     posterior = nets.posterior(nets.encode_signal(change))
     drawn = draw_places(posterior, DRAWS, np.random.default_rng(0))
@@ -159,7 +159,8 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
-    """Return errors of gel (B, M, 3) m and force (B,) N on a part of the pairs; ``name`` begins their names."""
+    """Return errors (B,) by name of gel (B, M, 3) m and force (B,) N, its size, on a part of the pairs; ``name`` begins
+    their names, which end in the unit."""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {

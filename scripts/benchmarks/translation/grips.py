@@ -43,23 +43,23 @@ EVERY = 20  # frames between two that are judged: a grip hardly changes
 
 
 def find(folder: Path) -> list[Path]:
-    """Files of the set in a folder, by name; none where it holds others."""
+    """List the files of the set in a folder, by name; none where it holds others."""
     return sorted(folder.glob(PATTERN))
 
 
 def soft_to_choose_by(files: list[Path]) -> list[Path]:
-    """Grips of soft objects in the trials that rest is found in."""
+    """Select the grips of soft objects in the trials that rest is found in."""
     return [path for path in files if _trial(path) in CHOOSING and not path.name.startswith(HARD)]
 
 
 def hard_to_report(files: list[Path]) -> list[Path]:
-    """Grips of hard flat objects in the trials that nothing was chosen by."""
+    """Select the grips of hard flat objects in the trials that nothing was chosen by."""
     return [path for path in files if _trial(path) in REPORTING and path.name.startswith(HARD)]
 
 
 def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
-    """Return rows of a folder's grips, and of the place in simulated contacts. Raises TactileError without the trials
-    that rest is found in, or those that are judged."""
+    """Return rows of a folder's grips, and of the place in ``simulated`` contacts. Raises TactileError without the
+    trials that rest is found in, or those that are judged."""
     files = find(folder)
     soft = soft_to_choose_by(files)
     hard = hard_to_report(files)
@@ -83,7 +83,7 @@ def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
 
 
 def unexplained(several: list[Signals]) -> float:
-    """Share of all recordings' frames with a change that are called unexplained."""
+    """Return the share, of all recordings' frames whose change is a touch's, that are called unexplained."""
     change = np.concatenate([each.typical for each in several])
     shares = residual_shares(change, np.zeros(len(change), bool))
     return float(unlike(shares, change)[lengths(change) >= TOUCHING].mean())

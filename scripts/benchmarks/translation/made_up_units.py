@@ -62,12 +62,12 @@ class Unit:
 
     @property
     def skin(self) -> Compliance:
-        """The compliance of the skin, over a core whose distance is the film's thickness."""
+        """Compliance of the skin, over a core whose distance is the film's thickness."""
         return _skin(self.film)
 
     @property
     def sheet(self) -> BiotacSheet:
-        """The fluid at the typical conductivity."""
+        """Conducting sheet of the unit's film, at the typical conductivity."""
         return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
 
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
@@ -77,11 +77,11 @@ class Unit:
         return CorrectedPress(self.skin, indenter, pose, limit, friction)
 
     def rest(self) -> np.ndarray:
-        """Counts (19,) at rest."""
+        """Return the counts (19,) at rest."""
         return self._counts(np.full(len(REST_COUNTS), 1 / self.film))
 
     def readings(self, contacts: Sequence[Contact]) -> np.ndarray:
-        """Counts (T, 19), not rounded, in contacts of ``press``."""
+        """Return the counts (T, 19), not rounded, in T contacts of ``press``."""
         skin, sheet, typical = self.skin, self.sheet, biotac_sheet()
         moved = ((each.sensing_gaps - skin.watch_gap)[skin.feet :] for each in contacts)
         found = np.stack([sheet.resistances(sheet.films_of(each)) for each in moved])
@@ -166,7 +166,7 @@ TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | 
 
 
 def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
-    """Medians over contacts of units given, found and taken as typical, beside those of equally many typical units.
+    """Measure medians over contacts of units given, found and taken as typical, beside those of as many typical units.
 
     units, presses : how many, and on each; found : by the recording itself, its rest and contacts, as `tactile convert`
         does; stiffness cannot be"""

@@ -46,8 +46,8 @@ def expected(rows: Sequence[Row]) -> list[str]:
 def renew_model_card(
     page: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Sequence[Translator] = ()
 ) -> None:
-    """Renew a card's tables, CSV and picture; apart : networks kept from what the unseen rows measure. Raises
-    ValueError for a page without the tables."""
+    """Renew the card ``page``: its tables, and CSV and picture beside it. rows : all that was measured; apart :
+    networks kept from what the rows of unseen sets measure. Raises ValueError for a page without the tables."""
     conditions = [f"| {what} | {words} |" for what, words in _conditions(translator.card, pairs, apart)]
     renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]

@@ -50,7 +50,7 @@ class Base:
     every: int
 
     def translated(self, electrodes: np.ndarray) -> Translation | None:
-        """Translate it with other electrodes (T, 19); None where it is refused."""
+        """Translate the recording with other electrodes (T, 19) counts; None where it is refused."""
         broken = replace(self.recording, electrodes=electrodes)
         try:
             return translate(broken, sensor=self.sensor, frames=slice(None, None, self.every))
@@ -236,7 +236,7 @@ def wrong(found: Translation, true: Translation) -> np.ndarray:
 
 
 def measured(recordings: list[Base]) -> list[Row]:
-    """Shares of frames, %: of unbroken ones that are guesses, and of broken ones that are wrong and confident."""
+    """Measure shares of frames, %: of unbroken ones that are guesses, of broken ones that are wrong and confident."""
     true = [base.translated(np.asarray(base.recording.electrodes, float)) for base in recordings]
     kept = [(base, found) for base, found in zip(recordings, true, strict=True) if found is not None]
     rows = []
@@ -250,7 +250,8 @@ def measured(recordings: list[Base]) -> list[Row]:
 
 
 def share(base: Base, true: Translation, fault: Fault) -> float:
-    """Share of frames, %, that are wrong and confident where a recording is broken."""
+    """Return the share of frames, %, wrong and confident where a fault breaks a recording; 0 where that is refused.
+    true : the unbroken recording's translation"""
     electrodes = fault(np.array(base.recording.electrodes, float), base.rest, np.random.default_rng(1))
     found = base.translated(np.rint(electrodes))
     return 0.0 if found is None else 100 * float((wrong(found, true) & confident(found)).mean())

@@ -35,7 +35,8 @@ Errors = dict[str, np.ndarray]  # by UNITS, a number per judged frame
 
 
 def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
-    """Medians over frames from 0.1 N on, of all sequences and each motion; every : judge one sequence in ``every``"""
+    """Measure medians over frames from 0.1 N on, of all sequences and of each motion, then with the rest off.
+    file : the test set; every : judge one sequence in ``every``"""
     truth = {name: values[::every] for name, values in read(file).items()}
     number = len(truth["motion"])
     followed, alone = both = measured(network, truth)
@@ -56,7 +57,8 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
 
 
 def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
-    """Errors of all sequences' judged frames, followed and each frame alone; rest_off : counts, of `read_by_a_unit`."""
+    """Return errors of all sequences' judged frames, followed, and each frame alone; rest_off : counts, the most by
+    which the rest is off."""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
     followed, alone = [], []
     for number, signal in enumerate(truth["signal"]):
@@ -81,7 +83,7 @@ def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: fl
 
 
 def judged(found: Translation, truth: Truth) -> Errors:
-    """Errors of the frames of a sequence that press with 0.1 N and more; a contact that is lost is infinitely far."""
+    """Return errors of a sequence's frames that press with over 0.1 N; a contact that is lost is infinitely far."""
     on = truth["force"] > TOUCHED
     surface = sensors.digit_surface()
     patch = np.unpackbits(truth["patch"][on], axis=1, count=len(surface.rest)).astype(bool)

@@ -56,7 +56,7 @@ class Slide:
 def rows(
     folder: str | os.PathLike, translate: Callable[[Recording], Translation], most: int | None = None
 ) -> list[Row]:
-    """Rows of a folder's recordings kept for reporting that have wrench and pose beside them, the first ``most`` or
+    """Measure a folder's recordings kept for reporting that have wrench and pose beside them, the first ``most`` or
     all.
 
     translate : from a recording to its translation
@@ -155,12 +155,13 @@ def metrics(slide: Slide, found: Translation) -> dict[str, tuple[float, float]]:
 
 
 def rank(strength: np.ndarray, slide: Slide) -> float:
-    """Rank correlation of a smooth strength (T,) with the pressure, the part that follows the pose taken off both."""
+    """Return the rank correlation of a smooth strength (T,) with the slide's pressure, the part that follows the arm's
+    place taken off both."""
     return rank_correlation(without_pose(strength, slide.arm), without_pose(slide.pressure, slide.arm))
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Spearman's rank correlation of a and b (T,); NaN where one of them does not change."""
+    """Return Spearman's rank correlation of a and b (T,); NaN where one of them does not change."""
     from scipy.stats import rankdata
 
     a, b = rankdata(a), rankdata(b)
@@ -174,7 +175,8 @@ def without_pose(values: np.ndarray, arm: np.ndarray) -> np.ndarray:
 
 
 def silence(strength: np.ndarray, lost: np.ndarray) -> float:
-    """Median of a smooth strength (T,) where contact is lost, over its 95 % level; NaN where it hardly is."""
+    """Return the median of a smooth strength (T,) where contact is lost (T,) bool, over its 95 % quantile; NaN where at
+    most 30 frames are lost."""
     if lost.sum() <= SILENT_FRAMES:
         return np.nan
     return float(np.median(strength[lost]) / np.percentile(strength, 95))

@@ -38,7 +38,8 @@ GAIN = 0.1  # standard deviation per channel (assumed: docs/sources.md, BioTac r
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure all contacts: metrics with their targets, subsets without targets, and how good expected errors are."""
+    """Measure all contacts: metrics with their targets, subsets without targets, and how good expected errors are.
+    bodies : the gel's surface and the skin's unrolled places (``our_bodies``), here and in this folder's other files"""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
     columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
@@ -83,7 +84,7 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
 def expected_error_rows(
     translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
 ) -> list[Row]:
-    """Rank correlation of expected and true largest error, share below the bound, share flagged as out of range.
+    """Measure rank correlation of expected and true largest error, share below the bound, share flagged out of range.
     rows : (C,) of the pairs; change : (C, 19) counts, their signals as read; name : of the set"""
     nets, silent = translator.nets, translator.silent("digit_m")
     columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))

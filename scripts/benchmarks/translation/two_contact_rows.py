@@ -86,11 +86,10 @@ def _meters(displacement: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> list[Row]:
-    """Rows of double contacts and of single ones, two looked for; baseline: the same networks, one looked for.
+    """Measure double contacts and single ones, two looked for; baseline: the same networks, one looked for.
 
     split: share that is taken for two; gel: rms error over that of no displacement; overlap of what is deeper than
-    half; force: of both, median error
-    """
+    half; force: of both, median error"""
     double = double_contacts(file)
     force = np.concatenate([double.force, lengths(pairs.force)])
     gel = np.concatenate([double.gel, _meters(pairs.displacement_digit, pairs.scale_digit)])
