@@ -67,7 +67,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """Choose a tier as ``choose`` does for each of the sensors ``used``, at the depths of a scene's [recording]."""
+    """Choose a tier within ``bound``, um, by ``choose``, for each of the sensors ``used`` in a scene's [recording]."""
     from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)
