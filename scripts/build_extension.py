@@ -121,7 +121,7 @@ def build(out: Path, platform: str | None, python: str, wheels: list[Path], debi
 
 
 def add(file: zipfile.ZipFile, name: str, content: bytes, how: int) -> None:
-    """Add one member, compressed by ``how``, without the time of day or the builder's file modes."""
+    """Add one member to a zip, compressed by ``how`` (zipfile's constant), without time or the builder's file modes."""
     member = zipfile.ZipInfo(name, EPOCH)
     member.compress_type, member.external_attr = how, 0o644 << 16
     file.writestr(member, content)

@@ -96,7 +96,7 @@ def train(dataset: Path) -> None:
 
 
 def can_find(python: Path, module: str) -> bool:
-    """Return true if the environment has a module."""
+    """Return true if the environment of ``python`` has a module."""
     tried = f"import importlib.util as u, sys; sys.exit(u.find_spec('{module}') is None)"
     return subprocess.call([str(python), "-c", tried], stderr=subprocess.DEVNULL) == 0
 

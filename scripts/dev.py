@@ -192,7 +192,7 @@ def call_with_limit(command: list[str], variables: dict[str, str]) -> int:
 def install(
     folder: Path, extras: tuple[str, ...], numpy: str | None = None, packages: tuple[str, ...] | None = None
 ) -> Path:
-    """Make the virtual environment hold the project with these extras, or packages alone; returns its Python.
+    """Make the virtual environment ``folder`` hold the project with extras, or ``packages`` alone; return its Python.
 
     numpy : its version, None for that of constraints.txt
     A stamp remembers what is installed, so that this costs nothing when nothing has changed. What an earlier call
@@ -224,7 +224,8 @@ def install(
 
 
 def make_venv(folder: Path) -> Path:
-    """Make the environment, or replace it when it is half made, moved, or of another Python; returns its Python."""
+    """Make the environment ``folder``, or replace it when it is half made, moved, or of another Python; return its
+    Python. Raises SetupError where it holds something else, or cannot be made."""
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if folder.is_file() or (folder.is_dir() and folder != ROOT / ".venv" and is_foreign(folder)):
         raise SetupError(f"{folder} holds something else. Name a new or an empty folder")
@@ -251,7 +252,7 @@ def is_foreign(folder: Path) -> bool:
 
 
 def why_unusable(python: Path, have: dict) -> str | None:
-    """Return why an existing environment cannot be used, or None; have : its stamp, of `read_stamp`"""
+    """Return why an existing environment cannot be used, None if it can; python : its own; have : its `read_stamp`"""
     if have and have.get("root") != str(ROOT):
         return "it was made for {}".format(have.get("root"))
     if have.get("state") == "installing":

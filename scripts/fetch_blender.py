@@ -56,7 +56,7 @@ chroot {tree} /usr/bin/env --chdir="$PWD" LIBGL_ALWAYS_SOFTWARE=1 "$@"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Fetch Blender, run the tests in it, photograph it; returns the tests' exit status."""
+    """Fetch Blender, run the tests in it, photograph it; return the tests' exit status, 2 where another step failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--suite", choices=("trixie", "sid"), default="trixie")
     parser.add_argument("--folder", type=Path, help="of the Debian tree (default: out/blender-SUITE)")

@@ -70,7 +70,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
-    """Return a ball's path over the pad, rows (s, x mm, z mm, N): no force in the first frame, then a constant one."""
+    """Return a ball's path over the pad, rows (s, x mm, z mm, N): no force in the first frame, then ``force``, N, in
+    ``contacts`` frames."""
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 
@@ -127,7 +128,7 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
 
 
 def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
-    """Return two rows per part, ms per frame and MB, and a row for each time of a full tier's contact, ms."""
+    """Return two rows per part, ms per frame and MB; and a row for each time, ms, in ``full``, of ``full_tier``."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))

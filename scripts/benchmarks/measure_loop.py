@@ -80,7 +80,7 @@ def quantiles(times: Times) -> list[float]:
 
 
 def as_rows(name: str, times: Times, error: str) -> list[Row]:
-    """Return six rows, the ``quantiles`` of times; error : of the measured contacts, in words"""
+    """Return six rows, the ``quantiles`` of times; name : what took them; error : of the measured contacts, in words"""
     of = f"{len(times)} contacts, one core; error {error}"
     labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
     key = f"loop_{name.replace(', ', '_').replace(' ', '_')}"
@@ -126,7 +126,8 @@ def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContac
 
 
 def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield the times of loading four meshes, and of contacts by formula and as meshes with the difference of force."""
+    """Yield the times of loading four meshes, and of ``count`` contacts of the DIGIT by formula, then as meshes, with
+    the difference of force."""
     import trimesh
 
     made = trimesh.creation

@@ -82,7 +82,7 @@ def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[
 
 
 def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
-    """Yield the metrics' means over photographs, and the worst PSNR; of : the photographs, in words"""
+    """Yield the metrics' means over the photographs ``tried``, and the worst PSNR; of : the photographs, in words"""
     ours, baseline = mean_metrics(tried)
     for name, unit in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("through_psnr", "dB"), ("through_l1", "levels")):
         yield row(name, ours[name], unit, baseline=baseline[name], of=of)

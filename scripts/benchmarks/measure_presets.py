@@ -146,7 +146,7 @@ def converge(
     unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model.
-    heights : (H, W) m of each field"""
+    heights : (H, W) m of each field; variant : of Mitsuba; truth : preset of the full model; seed : of its samples"""
     rest = of_unit(rest_height_map(unit.camera), unit)
     light, levels = MatteLight(unit, truth, variant, rest, seed), spread_in_levels(unit)
     resting, seen = light.direct(rest)

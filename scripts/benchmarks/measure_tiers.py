@@ -123,7 +123,8 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
 
 
 def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
-    """Yield the errors of one tier's contacts against a finer one's, both as of ``keep``, where both found one."""
+    """Yield the errors of one tier's contacts ``found`` against ``true`` ones of a finer tier, both lists as of
+    ``keep``, where both found one."""
     for one, other in zip(found, true, strict=False):
         if one and other:
             pair = one["displacement"], float(one["force"]), other["displacement"], float(other["force"])

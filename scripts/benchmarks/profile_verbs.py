@@ -55,10 +55,9 @@ open(sys.argv[1], "w").write(json.dumps(record))
 
 
 class Case(NamedTuple):
-    """A command line, which libraries of HEAVY it may load, and the exit status it ends with.
-
-    In the words, {} stands for a scratch folder; it holds what cases before have written, touch.csv and scene.toml.
-    """
+    """A command line of ``tactile``, and the exit status it ends with.
+    name : of its rows; loads : libraries of HEAVY that it may load, by spaces
+    words : {} stands for a scratch folder, which holds what cases before have written, touch.csv and scene.toml"""
 
     name: str
     words: str
@@ -121,7 +120,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write_inputs(folder: Path) -> None:
-    """Write touch.csv, the first 100 frames of the shipped recording; scene.toml, one press of 11 frames."""
+    """Write into ``folder`` touch.csv, the shipped recording's first 100 frames, and scene.toml, a press of 11
+    frames."""
     write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.3))
     electrodes = recordings.read(RECORDING).electrodes[:100]
     names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]
@@ -131,7 +131,7 @@ def write_inputs(folder: Path) -> None:
 
 
 def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
-    """Write scene.toml of a 7 mm ball; points : its way, (time s, x mm, z mm, force N)."""
+    """Write scene.toml of a 7 mm ball into ``folder``; points : the ball's way, (time s, x mm, z mm, force N)"""
     lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
     (folder / "scene.toml").write_text(
         f"""format = "tactile-scene-1"

@@ -84,7 +84,7 @@ def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
 
 
 def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
-    """Return a fan of triangles (n, 3) int32 that closes a ring (n,) of nodes at a pole; nodes by number."""
+    """Return a fan of triangles (n, 3) int32 that closes a ring (n,) of nodes at the node ``pole``; nodes by number."""
     return np.stack([np.full(len(ring), pole), ring, np.roll(ring, -1)], -1).astype(np.int32)
 
 

@@ -240,7 +240,7 @@ def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
 
 
 def on_gel(x: float, z: float, margin: float = 0.0, sensor: str = sensors.TARGET) -> bool:
-    """Return true if (x, z) m of the common plane lies on a sensor's gel, at least ``margin`` m inside its outline."""
+    """Return true if the place ``x``, ``z``, m, lies on a sensor's gel, more than ``margin`` m inside its outline."""
     return bool(sensors.shape_of(sensor).outline_distance(np.array(x), np.array(z)) > margin)
 
 

@@ -180,12 +180,11 @@ def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
 
 
 def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) -> None:
-    """Write a solved contact.
+    """Write a solved contact on a sensor, in the format that the ending of ``path`` says.
 
     Of a tier that solves the volume: ``.vtu`` that volume, ``.ply`` and ``.stl`` its surface at its own nodes, with the
     force on each (N) and its von Mises stress (Pa). Of the fast tier the deformed surface, with the touching nodes.
-    Raises what the writers raise.
-    """
+    Raises what the writers raise."""
     check_suffix(path)
     if solution.volume is None:
         contact = solution.contact_patch.astype(np.float32)

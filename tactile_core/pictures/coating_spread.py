@@ -15,7 +15,7 @@ REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
 
 
 class CoatingSpread:
-    """Gaussian filter for pictures of one camera; standard deviation in m, 0 for no filter."""
+    """Gaussian filter for pictures of one camera; deviation : m, its standard deviation on the gel, 0 for no filter"""
 
     def __init__(self, camera: Camera, deviation: float) -> None:
         self.none = deviation == 0

@@ -99,7 +99,7 @@ def cheapest(error: float, variant: str) -> str:
 
 
 def describe_choice(name: str, error: float) -> str:
-    """Describe why the preset ``name`` was chosen for a largest error, grey levels."""
+    """Describe why the preset ``name`` was chosen for a largest ``error``, grey levels."""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 

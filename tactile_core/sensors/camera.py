@@ -86,8 +86,8 @@ class Camera:
         return self.height, self.width
 
     def at_size(self, width: int, height: int) -> Camera:
-        """Return the same view at another size in pixels; raises TactileError for another aspect ratio or fewer than 3
-        pixels. Width and height may differ from an exact share by part of a pixel, which cuts the view."""
+        """Return the same view at another width and height in pixels; raises TactileError for another aspect ratio or
+        fewer than 3. They may differ from an exact share by part of a pixel, which cuts the view."""
         if not -self.height < width * self.height - height * self.width < self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)

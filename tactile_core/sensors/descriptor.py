@@ -79,7 +79,8 @@ def describe(name: str) -> Fluid | GelSensor:
 
 
 def of_kind(name: str, form: type[_S]) -> _S:
-    """Read the descriptor of a sensor of one kind, ``Fluid`` or ``GelSensor``. Raises TactileError for the other."""
+    """Read the descriptor of the sensor ``name``; ``form`` is its class, ``Fluid`` or ``GelSensor``. Raises
+    TactileError for a sensor of the other."""
     found = describe(name)
     if not isinstance(found, form):
         kinds = {form: kind for kind, form in KINDS.items()}

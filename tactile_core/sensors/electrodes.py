@@ -58,7 +58,8 @@ def table_of(name: str) -> Path:
 
 
 def typical_rest(name: str) -> np.ndarray | None:
-    """Return the counts (e,) of a sensor's typical unit at rest, or None. Raises TactileError for a bad table."""
+    """Return the counts (e,) of a sensor's typical unit at rest; None where they, or the table, are not there. Raises
+    TactileError for a bad table."""
     rest = places_of(name).rest_counts if table_of(name).is_file() else np.array([np.nan])
     return rest if np.isfinite(rest).all() else None
 

@@ -73,8 +73,8 @@ class Core:
 
 @dataclasses.dataclass(frozen=True)
 class SkinLattice:
-    """Numbers of node intervals of the skin's surface: along a meridian over tip, trunk and base; round the axis over
-    pad and back."""
+    """Numbers of node intervals of the skin's surface: along a meridian over tip, trunk and base (``*_rows``), round
+    the axis over pad and back (``*_intervals``)."""
 
     tip_rows: int = number(above=1, below=MOST_NODES)
     trunk_rows: int = number(above=1, below=MOST_NODES)

@@ -17,7 +17,7 @@ def converted(counts: np.ndarray) -> np.ndarray:
 
 def readings(change: np.ndarray, time: np.ndarray, seed: int, *, noise: float, drift: float) -> np.ndarray:
     """Return the readings of the 12-bit converter, (T, 19) int16 counts, for change (T, 19) counts at time (T,) s.
-
+    seed : of rest, drift and noise
     noise : counts, standard deviation in each frame (0.7 to ``NOISE`` in real recordings: docs/sources.md)
     drift : counts/s; each electrode drifts evenly at up to this rate (88 counts in an hour: docs/sources.md)
     Changes are those of a unit that rests at ``REST_COUNTS``; they are converted to this unit's rest (divider), rounded

@@ -119,7 +119,8 @@ def _key(each: dataclasses.Field) -> str:
 
 
 def check_names(where: str, content: dict[str, Any], names: tuple[str, ...]) -> None:
-    """Raise TactileError for a field of content that is not among names: missing, unknown or in another unit."""
+    """Raise TactileError unless the fields of ``content``, a table of a file, are ``names``: for one that is missing,
+    unknown or in another unit. where : the table's name, for the message"""
     fields = f"the fields {', '.join(names)}"
     for name in sorted(set(content) - set(names)):
         for right in names:
@@ -139,8 +140,8 @@ def _without_unit(name: str) -> str:
 
 
 def read_value(kind: Any, value: Any, where: str, meta: Mapping[str, Any]) -> Any:
-    """Convert a value of the file to a field's type, kind, in SI units; meta : of its declaration. Raises TactileError
-    for a value of another type."""
+    """Convert a ``value`` of the file to a field's type ``kind``, in SI units. where : the field's name, for errors
+    meta : metadata of its declaration. Raises TactileError for a value of another type or out of range."""
     kind = next((each for each in typing.get_args(kind) if dataclasses.is_dataclass(each)), kind)  # of Dome | None
     if dataclasses.is_dataclass(kind):
         return read_table(typing.cast(type, kind), value, where, **meta.get("given", {}))

@@ -24,7 +24,7 @@ NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A shape given by its sizes; the struct of each ``SceneForm`` has the form's kind and fields."""
+    """A shape given by its sizes; the struct of each ``SceneForm`` has the form's kind and fields. name : the user's"""
 
     name: str
 
@@ -73,8 +73,8 @@ else:
 
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Part of a group: moved along its axes and turned about z; its lower end is ``z_mm`` above the plane of
-    contact."""
+    """Part of a group: a ``body`` moved by x_mm, y_mm along the group's axes and turned by turn_deg about z, from x
+    toward y; its lower end is z_mm above the plane of contact."""
 
     body: Single
     x_mm: float = 0.0
@@ -90,7 +90,7 @@ class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class SeveralSpec(msgspec.Struct, tag="several", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """Several bodies pressed as one; the lowest has z_mm = 0."""
+    """Several bodies, ``parts``, pressed as one; the lowest has z_mm = 0. name : the user's"""
 
     name: str
     parts: Annotated[list[PartSpec], Meta(min_length=1, max_length=64)]

@@ -91,7 +91,8 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """Origin of contacts: scene's text, indenters' names, seed, sensors, words of ``KEEPABLE``."""
+    """Origin of contacts. scene : its text; indenters : their names; pair : source and target; keep : words of
+    ``KEEPABLE``, fields that are in the file beside"""
 
     scene: str
     indenters: list[str]
@@ -101,8 +102,8 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks, array packs ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts. Raises
-    TactileError where that fails."""
+    """Join blocks, array packs ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts, which
+    states where they were ``made``. Raises TactileError where it cannot be written."""
     about = {
         "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
         "indenters": json.dumps(made.indenters),

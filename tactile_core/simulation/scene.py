@@ -24,8 +24,10 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Distribution of paired contacts: places uniform over the gel but for a rim, rim_margin_mm wide, tilts uniform in
-    a cone up to tilt_max_deg off the normal. Force grows from force_min_n, each time by force_ratio, or depth by even
-    steps from depth_min_mm to depth_max_mm."""
+    a cone up to tilt_max_deg off the normal. Force grows from force_min_n, each time by force_ratio, up to
+    depth_max_percent of the thickness; or depth in depth_steps even steps from depth_min_mm to depth_max_mm, if not 0.
+    friction : Coulomb's; slide_share, slide_max_mm : share of presses that end with a slide, and its greatest length
+    random_bodies : share of presses by a body drawn at random"""
 
     force_min_n: Positive = 0.02
     force_ratio: Annotated[float, Meta(ge=1.05, le=100)] = 1.5
@@ -53,7 +55,8 @@ class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A simulated recording: which indenter moves, linearly between points, how it leans, and the electrodes' defects.
-    noise_counts : standard deviation; drift_counts : from the first to the last frame
+    noise_counts : standard deviation; drift_counts : the most, from first to last frame; friction : Coulomb's
+        coefficient
     tilt_deg : between the indenter's axis and the surface normal, its upper end toward +x"""
 
     indenter: str
@@ -65,7 +68,8 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Content of a scene file; pairs, recording : None where it has no such table"""
+    """Content of a scene file. format : ``FORMAT``; indenters : the bodies, by different names
+    pairs, recording : presses to draw, and a motion to record; None where the file has no such table"""
 
     format: str
     name: str
@@ -155,7 +159,9 @@ def to_toml(scene: Scene) -> str:
 
 
 def write_scene(folder: str | os.PathLike, scene: Scene, meshes: dict[str, bytes]) -> pathlib.Path:
-    """Write ``scene.toml`` and mesh files (name -> content) into a folder; returns its path. Raises TactileError."""
+    """Write ``scene.toml`` and the mesh files ``meshes``, name -> content, into a folder; return the path of
+    scene.toml.
+    Raises TactileError where they cannot be written."""
     folder = pathlib.Path(folder)
     with atomic.writing(folder, advice="Make room, or choose another one"):
         folder.mkdir(parents=True, exist_ok=True)

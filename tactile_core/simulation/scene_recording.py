@@ -67,7 +67,8 @@ def simulate_recording(
     of frames that press.
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
     scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
-    seed : of the electrodes' rest, drift and noise; progress : called with (frames done, frames)
+    scene_path : scene.toml or its folder; seed : of the electrodes' rest, drift and noise
+    progress : called with (frames done, frames)
     keep : words of ``outputs()``; a sensor that none of them needs is not solved
     tiers : of mechanics, by sensor; fast for others
     loaded : a scene and its text in place of the file's, whose name then only serves messages
@@ -154,7 +155,8 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Seque
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute time (T,) s, place (T, 2) = (x, z) m and force (T,) N, to a nanonewton, at 100 Hz."""
+    """Compute a recording's time (T,) s, place (T, 2) = (x, z) m and force (T,) N, to a nanonewton, at 100 Hz, linear
+    between the points of ``spec``."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
     time = time / sensors.SAMPLE_RATE

@@ -68,7 +68,7 @@ def draw(figure: Figure, recording: tactile.Recording, touch: tactile.Translatio
 
 
 def title(figure: Figure, x: float, text: str) -> None:
-    """Write the heading of a panel; x : its place, 0..1 of the figure's width"""
+    """Write ``text`` as the heading of a panel; x : its middle, 0..1 of the figure's width"""
     figure.text(x, 0.93, text, ha="center", size=13, weight="bold")
 
 

@@ -33,7 +33,7 @@ Job = tuple[pathlib.Path, int, int]  # folder, seed, number
 
 
 def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
-    """Return the path of the file of press ``number``'s contacts."""
+    """Return the path, in ``folder``, of the file of press ``number``'s contacts; seed : of the presses"""
     return folder / f"press_{seed}_{number:05d}.h5"
 
 

@@ -81,6 +81,7 @@ class _LayerEquations:
         kernel = (waves * self.lacking) @ waves[:-1].T * weight
         loads = self.stiffness * np.column_stack([np.ones(len(t)), t**2])
         flat, bowl = np.linalg.solve(np.pi / 2 * np.eye(len(t)) - kernel[:-1], loads).T
+        # phi = depth * flat - bowl / radius, and the depth is the one at which phi vanishes at the contact's edge
         at_edge = kernel[-1] @ flat + self.stiffness, kernel[-1] @ bowl + self.stiffness * contact**2
         depth = at_edge[1] / at_edge[0] / radius
         return depth, float(2 * np.pi * weight @ (depth * flat - bowl / radius))

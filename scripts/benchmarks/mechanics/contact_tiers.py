@@ -44,7 +44,8 @@ class Miss:
 
 
 def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
-    """Return the error of found (n, 3) m and force N against true (n, 3) m, true_force N; share : depth / thickness"""
+    """Return the error of displacement found (n, 3) m and force N against true (n, 3) m, true_force N.
+    press : its number; share : depth / thickness"""
     error, baseline = (
         float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true))
     )
@@ -121,7 +122,8 @@ class Truth:
 
 
 def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], seed: int) -> None:
-    """Write contacts found, by sensor, each with number, share, displacement (n, 3) m, force N, seconds, to a file."""
+    """Write contacts found, by sensor, each with number, share, displacement (n, 3) m, force N, seconds, to a file.
+    seed : of the random contacts"""
     arrays = {"seed": np.int64(seed)}
     for sensor, contacts in found.items():
         for name in ("number", "share", "force", "seconds"):

@@ -29,7 +29,7 @@ SEED_OF_CONTACTS = 5
 
 
 def measure(name: str, quick: bool, truth: str) -> Method | None:
-    """Draw test contacts by one preset, against the pictures in the file ``truth``.
+    """Draw test contacts by the preset ``name``, against the pictures in the file ``truth``; quick : fewer contacts
 
     The method "truth" writes that file, and returns None. Needs mitsuba."""
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)

@@ -17,12 +17,11 @@ TEST_SET = TRAINING / "test_contacts.h5"
 
 @dataclass(frozen=True)
 class Method:
-    """Method of a stage.
+    """Results of a method of a stage; name : the method's
 
     ms : CPU per frame on one core; mb : peak memory of a process that does this alone, without what measures the error
     error, baseline : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
-    more : further rows
-    """
+    more : further rows"""
 
     stage: str
     name: str

@@ -23,11 +23,10 @@ OF_FIELDS = 7  # seed of the contacts: others than the presets' table was made f
 
 
 def measure(name: str, quick: bool, truth: str) -> Method:
-    """Measure one preset's time, memory and error at 240 x 320.
+    """Measure the preset ``name``'s time, memory and error at 240 x 320.
 
-    truth : where the reference leaves its pictures, changes in grey levels, for the other presets
-    Raises ModuleNotFoundError where mitsuba is missing.
-    """
+    quick : on fewer fields; truth : file in which the reference leaves its pictures, changes in grey levels, for others
+    Raises ModuleNotFoundError where mitsuba is missing."""
     unit = load_calibration()
     heights = fields(unit, QUICK_FIELDS if quick else FIELDS, OF_FIELDS)
     if name == REFERENCE.name:

@@ -116,7 +116,7 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
 
 
 def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw places (count, T, PLACE) of contacts from a posterior."""
+    """Draw ``count`` places (count, T, PLACE) of each of T contacts from a posterior, by the generator ``rng``."""
     edges = np.cumsum(posterior.weight, -1)
     which = (rng.random((count, len(edges), 1)) > edges / edges[:, -1:]).sum(-1)
     frames = np.arange(len(edges))

@@ -71,7 +71,8 @@ class Unit:
         return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
 
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
-        """Return the press of an indenter on this finger, friction given; its forces leave the unit's stiffness out."""
+        """Return the press of an indenter at a place on this finger; its forces leave the unit's stiffness out.
+        friction : Coulomb's coefficient"""
         pose = pose_at(SOURCE, indenter, place)
         limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
         return CorrectedPress(self.skin, indenter, pose, limit, friction)
@@ -118,7 +119,7 @@ class Played:
 
 
 def played(number: int, unit: Unit, presses: int = PRESSES) -> Played:
-    """Press a unit again and again, with rest in between, and record it; number : of the presses, the only seed."""
+    """Press a unit ``presses`` times, with rest in between, and record it; number : of the recording, the only seed"""
     random, (scene, _) = np.random.default_rng([SEED, number, 1]), load_scene(SCENE)
     counts, frames, force, gel = [np.tile(unit.rest(), (AT_FIRST, 1))], [], [], []
     for _ in range(presses):

@@ -41,7 +41,8 @@ Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19
 
 @dataclass(frozen=True)
 class Base:
-    """A recording to break; rest : (19,) counts; sensor : its unit's file, or None; every : step of judged frames"""
+    """A recording to break; name : in rows; rest : (19,) counts; sensor : file of its unit, None without one
+    every : step from one judged frame to the next"""
 
     name: str
     recording: Recording

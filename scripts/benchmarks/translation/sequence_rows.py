@@ -76,7 +76,8 @@ def read(file: Path = FILE) -> Truth:
 
 
 def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: float = 0.0) -> np.ndarray:
-    """Return the true change signal (T, 19) counts as a unit of steady gains reads it, its rest up to rest_off off."""
+    """Return the true change signal (T, 19) counts as a unit of steady gains reads it, its rest off by up to
+    ``rest_off`` counts."""
     gain = 1 + GAIN * random.standard_normal(signal.shape[1])
     found = gain * signal + NOISE * random.standard_normal(signal.shape)
     return (found + random.uniform(-rest_off, rest_off, signal.shape[1])).astype(np.float32)

@@ -30,8 +30,8 @@ class Box(Indenter):
             raise TactileError("box, edge", f"{self.edge * 1e3:g} mm", "less than half of the smallest size")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the exact distance (n,) m of points (n, 3) m, that of a smaller box less the edge radius, and its
-        gradient (n, 3)."""
+        """Return the exact signed distance (n,) m of points (n, 3) m, that of a smaller box less the edge radius, and
+        its gradient (n, 3); see ``Indenter.distance``."""
         return _from_box(contiguous(points), self._middle, self._inner, self.edge)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:

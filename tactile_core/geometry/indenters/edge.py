@@ -36,8 +36,8 @@ class Edge(Indenter):
             raise TactileError("edge, radius", f"{self.radius * 1e3:g} mm", "less than half of length and height")
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the exact distance (n,) m of points (n, 3) m, that of a smaller wedge less the edges' radius, and its
-        gradient (n, 3)."""
+        """Return the exact signed distance (n,) m of points (n, 3) m, that of a smaller wedge less the edges' radius,
+        and its gradient (n, 3); see ``Indenter.distance``."""
         distance, gradient = extrusion.distance(*self._prism(points), self.radius)
         return distance, gradient[:, _OWN]
 

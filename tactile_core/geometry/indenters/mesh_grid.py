@@ -188,11 +188,10 @@ class OverlapError(Exception):
 
 
 def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Mark (shape) bool the nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), one unit.
-
+    """Mark (shape) bool the nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), all in
+    one unit of length. shape : numbers of nodes along x, y, z
     Along each column the crossings must alternate between entering and leaving. Raises OverlapError where they do not;
-    where a column grazes an edge, others beside it are tried first.
-    """
+    where a column grazes an edge, others beside it are tried first."""
     for beside in _BESIDE:
         column, height, entering = _crossings(triangles, origin + spacing * np.array([*beside, 0]), spacing, shape)
         order = np.lexsort((height, column))

@@ -27,7 +27,7 @@ class Size:
     count: int = 1
 
     def in_si(self, value: Any) -> Any:
-        """Convert a scene's number, or tuple of numbers, to metres or radians."""
+        """Convert a scene's ``value``, a number or a tuple of them in the field's unit, to metres or radians."""
         if isinstance(value, tuple):
             return tuple(self.in_si(one) for one in value)
         return float(np.deg2rad(value)) if self.field.endswith("_deg") else value * 1e-3

@@ -33,7 +33,7 @@ class Work:
     left: float = np.inf
 
     def spend(self, unknowns: int, iterations: int) -> None:
-        """Subtract from ``left`` what a solver of that many unknowns has used in its iterations."""
+        """Subtract from ``left`` what a solver has used: the cube of its unknowns for each of its iterations."""
         self.left -= float(unknowns) ** 3 * iterations
 
     def check(self) -> None:

@@ -50,7 +50,8 @@ class Basis(NamedTuple):
 
 
 def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> None:
-    """Transform the rows of values (n, c) into the wavelet basis, in place; back : true for the way out of it."""
+    """Transform the rows of values (n, c) in ``segments`` to the wavelet basis, in place; back : true for the way
+    out"""
     for first, last, axes, clusters in segments:
         of_points = values[first:last].reshape((last - first) // axes, -1)
         for points, turned in reversed(clusters) if back else clusters:

@@ -222,8 +222,8 @@ def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
-    """Join the halves of a solid and add the fluid; yield the name and values of each of ``ARRAYS``, one by one to save
-    memory. Overwrites the halves."""
+    """Join the halves of a solid, of ``condensed``, and add the fluid; yield name and values of each of ``ARRAYS``, one
+    by one to save memory. Overwrites the halves."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
     kept, column, sign = kept_loads(solid)

@@ -122,7 +122,7 @@ class ComplianceBlock:
         return answer[: 3 * self.k].reshape(self.k, 3).astype(float), answer[3 * self.k :].astype(float)
 
     def normal(self, normals: np.ndarray) -> np.ndarray:
-        """Return the compliance (k + c, k + c) m/N of the gaps: along ``normals`` (k, 3), and of the core's gaps."""
+        """Return the compliance (k + c, k + c) m/N of the gaps: k along ``normals`` (k, 3), then c over the core."""
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:

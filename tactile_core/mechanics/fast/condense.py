@@ -201,8 +201,8 @@ class MirrorSymmetry:
         return self._joined(even.T, odd.T, column, sign.astype(np.float32))
 
     def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
-        """Return the motion (3 r, 3 n) float32 under unit forces on the touched nodes, from the halves' even, odd (3 r,
-        3 k)."""
+        """Return the motion (3 r, 3 n) float32 of all n nodes, a row for 1 N along each axis of the r touched ones,
+        from ``Half.answer`` of both halves: even, odd (3 r, 3 k)."""
         return self._joined(even, odd, np.arange(len(even)), np.ones(len(even), np.float32))
 
     def _joined(self, even: np.ndarray, odd: np.ndarray, rows: np.ndarray, sign: np.ndarray) -> np.ndarray:

@@ -79,7 +79,7 @@ class ContactProblem:
         return self._walk(pose, axial_force, start)
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError if the indenter has penetrated between the surface's nodes."""
+        """Raise PenetrationError if the indenter of a solved ``contact`` has penetrated between the surface's nodes."""
         surface, deformed = self.compliance.surface, contact.deformed
         _, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable[contact.nodes]])
         where, grid = f"fast tier, {self.compliance.name}", surface.grid(deformed)

@@ -109,7 +109,7 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
     """Reduce a guessed force and core to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
 
     Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; nodes without one stick from now on.
-    Arguments as in ``Points``; friction : mu"""
+    force, core, active, slips, normal : see ``Points``; friction : mu"""
     k = force.shape[0]
     lean = np.zeros((k, 3))
     for a in range(k):
@@ -153,7 +153,7 @@ def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
 
 @Loop
 def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001, ANN201
-    """Compute ``Slipping``, where the arguments are told, for nodes ``at`` (s,) of ``points`` with a ``motion``."""
+    """Compute ``Slipping`` for nodes ``at`` (s,) of ``points`` with a ``motion``; curved, bend, friction : see there"""
     s = len(at)
     across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
     turning = np.empty((len(curved), 3, 3))
@@ -207,9 +207,9 @@ def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001,
 @Loop
 def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
     """Sort points into touching and slipping ones after a step: see ``Sorted``.
-
-    turned : (k, 3), normals where nodes are now; stuck_again : (k,), times each went from slip to stick; updated
-    """
+    points : after the step, but active, slips, normal and lean of before it; turned : (k, 3), normals where nodes are
+        now
+    stuck_again : (k,) int, how often each node went from slip to stick, counted on in place"""
     force, core, active, slips, normal, lean, gap, core_gap, off = points
     k, c = force.shape[0], core.shape[0]
     new_active, new_slips = np.empty(k + c, np.bool_), np.zeros(k, np.bool_)

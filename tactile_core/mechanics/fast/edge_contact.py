@@ -71,8 +71,8 @@ class EdgeContactProblem(ContactProblem):
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError if the indenter is over 0.1 mm deep between nodes all the same, or has some behind
-        it."""
+        """Raise PenetrationError if in a solved contact the indenter is over 0.1 mm deep between nodes, or has some
+        behind it, in spite of the points."""
         surface, deformed = self.compliance.surface, contact.deformed
         gap, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable])
         normals = normals[np.abs(gap) < _ON_BODY]

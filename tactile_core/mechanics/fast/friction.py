@@ -40,8 +40,8 @@ class Friction:
         self.indenter, self.pose, self.spots, self.friction = indenter, pose, spots, friction
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from a first guess for the contact at its depth, or, if not None, at axial_force, N along the motion.
-
+        """Solve from the first guess ``begin``: the contact where ``pose`` and its shift stand, or, if not None, that
+        at ``axial_force``, N along the motion.
         The result is not ``settled`` where iterations run out or stall. Raises UnsolvedError where a step fails."""
         k = self.block.k
         force, core, shift = np.ascontiguousarray(begin.force), begin.core_force, begin.shift

@@ -128,8 +128,8 @@ class Frictionless:
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from a first guess for the contact at its depth, or, if not None, at axial_force, N along the motion.
-
+        """Solve from the first guess ``begin``: the contact where ``pose`` and its shift stand, or, if not None, that
+        at ``axial_force``, N along the motion.
         The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step
         fails."""
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None

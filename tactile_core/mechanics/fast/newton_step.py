@@ -35,8 +35,7 @@ def change_of(
     """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey friction.
 
     stiffness : see ``ContactStiffness.among``; direction : (3,), in which the indenter moves if it ``deepens``
-    Raises UnsolvedError.
-    """
+    Raises UnsolvedError where no motion of the slipping nodes balances their forces."""
     inverse, rows = stiffness
     known = known_motion(points, motion, slipping, direction, 2 if deepens else 1)
     forces = moving_forces(inverse, rows, known)

@@ -75,8 +75,9 @@ class Body:
         return faces[np.isin(faces, near).all(axis=1)]
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
-        """Return the indenter's largest penetration, m, at the surface's nodes and between them, see
-        ``penetration_between``. Raises PenetrationError where that is too much."""
+        """Return the indenter's largest penetration, m, at the surface's nodes and between them in a solved contact,
+        see ``penetration_between``. Raises PenetrationError where that is too much. touch : the contact, here and
+        below"""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)

@@ -33,6 +33,7 @@ _FAILURES = NoEquilibriumError, PenetrationError  # after which another way is t
 
 class LoadPath:
     """A path of one indenter on one sensor; ``to`` goes on from the step before.
+    body, problem : the mesh in use now, and the contact on it; tier : ``full`` or ``reference``
     pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth that forces are sought at
     depths : m, of the steps to come, guessed for forces; the mesh is made for the deepest
     friction : Coulomb's coefficient"""

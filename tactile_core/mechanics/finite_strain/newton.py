@@ -94,8 +94,8 @@ class FiniteStrainContact:
         return dataclasses.replace(touch, depth=depth)
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve the contact at another pose (a slide, a tilt, a lift), in load steps of at most ``step`` m of travel; a
-        turn travels on an arm of 5 mm. Raises as ``press`` does."""
+        """Solve the contact at another pose (a slide, a tilt, a lift), from the solved ``start``, in load steps of at
+        most ``step`` m of travel; a turn travels on an arm of 5 mm. Raises as ``press`` does."""
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
         touch = self._follow(start, pose, step / max(way, turned, 1e-12))

@@ -17,7 +17,8 @@ class FluidCavity:
     """
 
     def __init__(self, faces: np.ndarray, n_nodes: int) -> None:
-        """Take faces : (n, 9) mesh nodes, node 3 a + b at (xi, eta) = (a, b) - 1, xi, eta and outward right-handed."""
+        """Take faces : (n, 9) mesh nodes, node 3 a + b at (xi, eta) = (a, b) - 1, xi, eta and outward right-handed; and
+        n_nodes : number of all the mesh's nodes"""
         self.faces, self.n_nodes = faces, n_nodes
 
     def volume(self, nodes: np.ndarray) -> float:

@@ -132,10 +132,10 @@ _MOST_BENDING = 0.3  # of a node's own stiffness (assumed)
 
 class DampedFactor:
     """The solver of one solid's tangents, with as much damping as they need to be positive definite.
-
     Where the solid is unstable (a node about to slide off a ridge) Newton's iteration then follows it to the next
     equilibrium, which does not depend on the damping.
 
+    factor : solver for the solid's sparsity pattern
     damping : added to each node's own stiffness, over ``stiffness``, N/m, that of a typical node"""
 
     def __init__(self, solid: FiniteStrainSolid, factor: PatternFactor) -> None:

@@ -68,7 +68,7 @@ class BallPictures(abc.ABC):
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return ``raised_light`` (3, H, W) of seen heights (H, W) m, over each LED's light on a coating facing it."""
+        """Return ``raised_light`` (3, H, W) of seen heights (H, W) m, divided by ``Calibration.facing``."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -76,7 +76,8 @@ class BallPictures(abc.ABC):
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the levels (H, W, 3) that a ball adds through the coating, if as bright as a coating facing LEDs."""
+        """Return the levels (H, W, 3) that a ball adds through the coating, if as bright as a coating facing LEDs.
+        ball : right, down, depth, radius, m"""
         share = contact_share(self._view(self.heights(ball)) - self._view.start)
         return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
 
@@ -97,7 +98,7 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """Return the whole factor by which a fit reduces pictures of width x height px."""
+    """Return the whole factor by which a fit reduces pictures of width x height px: to 120 px or more on either."""
     return whole_factor(width, height, WORKING_WIDTH)
 
 
@@ -115,7 +116,8 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return the function that makes a unit's ``BallPictures`` by a preset; TactileError for Mitsuba's without LLVM."""
+    """Return the function that makes a unit's ``BallPictures`` by the preset of a name. Raises TactileError for one of
+    Mitsuba's where LLVM or Mitsuba is missing."""
     if preset == FAST:
         return FastPictures
     if trouble := missing_mitsuba():

@@ -136,7 +136,8 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the means over presses tried of the metrics and of the baseline's, without NaN; NaN where all are."""
+    """Return the means over presses ``tried`` of the metrics, and of the baseline's, by name, without NaN; NaN where
+    all are."""
     means = []
     for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]
@@ -175,7 +176,7 @@ def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
 
 
 def sheet(tried: list[Evaluation]) -> bytes:
-    """Draw photograph, render and difference (doubled, on grey) of the first LARGEST_SHEET presses. Returns a PNG."""
+    """Draw photograph, render and difference (doubled, on grey) of the first 20 presses ``tried``; return a PNG."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

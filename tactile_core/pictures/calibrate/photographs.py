@@ -122,7 +122,8 @@ def read_photographs(
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:
-    """Select presses of a set, with the whole set's background; raises TactileError for an unknown name."""
+    """Select presses of a set by ``names``, in their order, with the whole set's background; raises TactileError for an
+    unknown name."""
     by_name = {press.name: press for press in photographs.presses}
     for name in names:
         if name not in by_name:
@@ -168,7 +169,7 @@ def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarra
 
 
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Grow a mask (H, W) by a disc of a radius in px."""
+    """Grow a mask's (H, W) true part by a disc of a ``radius``, px."""
     height, width = mask.shape
     padded = np.zeros((height + 2 * radius, width + 2 * radius + 1), np.int32)
     padded[radius : radius + height, radius + 1 : radius + 1 + width] = mask

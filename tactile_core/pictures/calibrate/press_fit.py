@@ -19,8 +19,8 @@ EASIER, HARDER = 0.2, 8.0  # factors of the damping after a step that helped, an
 def minimise(
     problem: Any, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, float]:
-    """Minimise a sum of squares from x; returns x and its cost, after ``most`` steps or when a step gains less than a
-    share ``tolerance``.
+    """Minimise a sum of squares from x, by damped Gauss-Newton steps; return x and its cost, after ``most`` steps, when
+    one gains less than a share ``tolerance``, or when none helps. progress : called with the number of steps done
 
     problem : sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless; ``inside(x)`` the
         nearest valid x; ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last

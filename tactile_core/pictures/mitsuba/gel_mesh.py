@@ -82,7 +82,8 @@ def _extended(values: np.ndarray) -> np.ndarray:
 
 
 def triangle_mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, *, smooth: bool = False) -> Any:
-    """Return a mesh of Mitsuba's of vertices (n, 3) float32 and faces (m, 3) uint32; smooth : give it normals."""
+    """Return a mesh of Mitsuba's, called ``name``, of vertices (n, 3) float32 and faces (m, 3) uint32.
+    mi : Mitsuba's module; smooth : true gives its vertices normals"""
     mesh = mi.Mesh(name, len(vertices), len(faces), has_vertex_normals=smooth)
     values = mi.traverse(mesh)
     values["faces"], values["vertex_positions"] = faces.ravel(), vertices.ravel()

@@ -63,7 +63,8 @@ def _lamp(led: Led) -> dict[str, Any]:
 
 
 def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[float]) -> dict[str, Any]:
-    """Return a lamp as Mitsuba's plugin. position : (right, down, toward the camera) m; radius : m, 0 for a point
+    """Return a lamp as Mitsuba's plugin. position : (right, down, toward the camera) m
+    radius : m, 0 for a point, as is one below 0.01 of the distance
     brightness : (3,) radiance x radius^2, levels m2, in the bands of the red, green and blue LED"""
     if radius < POINTLIKE * np.linalg.norm(position):
         intensity = [value * np.pi * MM**2 for value in brightness]  # of an evenly bright disc
@@ -154,7 +155,7 @@ class Occluder:
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """All lamps and bodies beside a unit's own."""
+    """All lamps beside a unit's own, and ``occluders``, bodies in the light's way."""
 
     lamps: tuple[Lamp, ...] = ()
     occluders: tuple[Occluder, ...] = ()

@@ -152,7 +152,8 @@ def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
     """Return the radiance (H, W, 3) float32 that the gel's own light adds to the pixels.
-    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : the surface that they see"""
+    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : the surface that they see
+    gather : resolution, here and in ``irradiance``"""
     camera, step = unit.camera, gather.step
     spacing = camera.pixel_size[0] * step, camera.pixel_size[1] * step
     first = step // 2

@@ -45,7 +45,7 @@ class Choice:
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """Choose the variant wanted, or for None the faster one that works on this machine. Raises TactileError for an
+    """Choose the variant ``wanted``, or for None the faster one that works on this machine. Raises TactileError for an
     unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
     import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
@@ -62,8 +62,8 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """Return the ``cheapest`` preset for an error, grey levels, by a variant; None: the one that works here, or that
-    without LLVM where Mitsuba is missing."""
+    """Return the ``cheapest`` preset for a largest error, grey levels, by a variant; None: the one that works here, or
+    the one without LLVM where Mitsuba is missing."""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:
@@ -111,7 +111,7 @@ def _too_old(message: str) -> str:
 
 
 def activate(variant: str) -> Any:
-    """Activate a variant of Mitsuba and return the module."""
+    """Activate a variant of Mitsuba, by its name, and return Mitsuba's module."""
     import mitsuba
 
     if mitsuba.variant() != variant:  # 0.1 s

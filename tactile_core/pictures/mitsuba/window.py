@@ -38,7 +38,7 @@ def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.nd
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
-    in_gel = tangent(_SINES / index)
+    in_gel = tangent(_SINES / index)  # slopes of rays in the gel; the next line finds the one that ends at the distance
     slope = np.interp(distance, air * tangent(_SINES) + window_height(camera) * in_gel, in_gel)
     return np.where(slope > 0, distance / np.where(slope > 0, slope, 1), camera.apparent_height)
 
