@@ -42,11 +42,20 @@ class TactileError(Exception):
 def finite_number(
     value: Any, where: str, expected: str, least: float = -math.inf, most: float = math.inf, advice: str = ""
 ) -> float:
-    """Return a value as a float; raises TactileError unless it is a finite number from ``least`` to ``most``."""
+    """Return a value as a float; raises TactileError unless it is a finite number from ``least`` to ``most``. Decimals
+    and fractions are none: numpy's functions fail on those."""
     try:
-        number = math.nan if isinstance(value, str | bytes | bytearray | bool) else float(value)
+        known = isinstance(value, int | float) or hasattr(value, "__array__")
+        number = float(value) if known and not isinstance(value, bool) else math.nan
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and least <= number <= most):
         raise TactileError(where, f"{value!r:.80}", expected, advice)
     return number
+
+
+def file_name(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:
+    """Return the name of a file as text; raises TactileError unless it is text or an ``os.PathLike``."""
+    if not isinstance(value, str | os.PathLike):
+        raise TactileError(where, f"a {type(value).__name__}", expected, advice)
+    return os.fspath(value)

@@ -9,6 +9,8 @@ import pydoc
 import subprocess
 import sys
 import tomllib
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -162,3 +164,33 @@ def test_a_calibration_may_be_named_by_its_file():
 def test_what_is_no_name_of_a_file_is_refused(given):
     with pytest.raises(tactile.TactileError, match=r"read, path: a .*; expected a file's name"):
         tactile.read(given)
+    with pytest.raises(tactile.TactileError, match=r"load_calibration, path: a .*; expected a file's name"):
+        tactile.load_calibration(given if given is not None else 3)
+
+
+@pytest.mark.parametrize(
+    ("argument", "expected"), [("weights", "a folder's name"), ("sensor", "the name of a unit's file")]
+)
+def test_what_is_no_name_of_weights_or_a_unit_is_refused(argument, expected, slide_csv):
+    with pytest.raises(tactile.TactileError, match=f"translate, {argument}: a list; expected {expected}"):
+        tactile.translate(tactile.read(slide_csv()), **{argument: ["a"]})
+
+
+BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
+
+
+@pytest.mark.parametrize(
+    ("made", "message"),
+    [
+        (lambda: tactile.Gel("digit", BALL, friction=50), "Gel, friction: 50; expected Coulomb's .* 0 to 5. Divide"),
+        (lambda: tactile.solve("digit", BALL, PLACE, force=1.0, friction=78), "solve, friction: 78; expected"),
+        (lambda: tactile.Placement(x=Decimal("0.001"), z=0.0), r"Placement, x: Decimal\('0.001'\); expected"),
+        (lambda: tactile.indenters.Sphere(Fraction(3, 1000)), r"sphere, radius: Fraction\(3, 1000\); expected"),
+        (lambda: tactile.indenters.Edge("90", 1e-3), "edge, angle: '90'; expected 0.17 to 2.97 rad"),
+        (lambda: tactile.indenters.Box(3e-3, 1e-4), "box, sizes: 0.003; expected three lengths in m"),
+        (lambda: tactile.Gel(["digit"], BALL), "sensor: .*digit.*; expected biotac"),
+    ],
+)  # fmt: skip
+def test_numbers_and_names_of_another_kind_are_refused(made, message):
+    with pytest.raises(tactile.TactileError, match=message):
+        made()

@@ -21,7 +21,7 @@ from ..mechanics.fast.compliance import Compliance, compliance_of
 from ..mechanics.fast.press import CorrectedPress, FastContact
 from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
-from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, same_line, thickness_under
+from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, friction_of, same_line, thickness_under
 from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.known_body import checked_texture, out_of_body, reflectance_on
 from ..pictures.presets import FAST, NAMES
@@ -74,7 +74,7 @@ class Gel:
         if preset != FAST:
             require("render", "mitsuba")
         self.sensor, self.preset = sensor, preset
-        self.friction = finite_number(friction, "Gel, friction", "a coefficient of zero or more", 0.0)
+        self.friction = friction_of(friction, "Gel, friction")
         self.indenter: Indenter = as_indenter(indenter)
         self.texture = None if texture is None else checked_texture(texture)
         self.surface = sensors.sensor_surface(sensor)

@@ -203,6 +203,14 @@ def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
 
 
 FRICTION = 0.78  # Coulomb's coefficient of the BioTac's skin (docs/sources.md, BioTac skin), taken for both sensors
+MOST_FRICTION = 5.0  # more is a percentage, or sticks as 5 does (assumed)
+
+
+def friction_of(value: float, where: str) -> float:
+    """Return ``value``, a friction's coefficient, as a float; raises TactileError, naming ``where``, for less than 0 or
+    more than 5."""
+    expected = f"Coulomb's coefficient, 0 to {MOST_FRICTION:g}"
+    return finite_number(value, where, expected, 0.0, MOST_FRICTION, "Divide per cent by 100")
 
 
 @dataclasses.dataclass(frozen=True)

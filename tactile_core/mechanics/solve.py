@@ -20,7 +20,7 @@ from .finite_strain.load_path import LoadPath
 from .force_search import MOST_FORCE, UnreachableError, unreachable
 from .node_areas import traction
 from .penetration import RESOLVED_RADIUS, sharpest
-from .placement import DEPTH_LIMIT, FRICTION, Placement, on_gel, pose_at, thickness_under
+from .placement import DEPTH_LIMIT, FRICTION, Placement, friction_of, on_gel, pose_at, thickness_under
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 
 _LIGHTEST = 1e-6  # N, least force: smaller ones are lost in rounding and the lattice's roughness
@@ -77,7 +77,7 @@ def solve_path(
     Raises what ``solve`` raises; solutions already yielded hold."""
     if tier not in TIERS:
         raise TactileError("solve, tier", repr(tier), "fast, full or reference")
-    friction = finite_number(friction, "solve, friction", "a coefficient of zero or more", 0.0)
+    friction = friction_of(friction, "solve, friction")
     indenter = as_indenter(indenter)
     pose = place if isinstance(place, Pose) else _first_touch(sensor, indenter, place)
     thick = thickness_under(sensor, indenter, pose)

@@ -69,9 +69,13 @@ def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: st
     return source, target
 
 
-@functools.cache
 def describe(name: str) -> Fluid | GelSensor:
     """Read the descriptor of a known sensor. Raises TactileError for an unknown name."""
+    return _described(name if isinstance(name, str) else f"{name!r:.80}")
+
+
+@functools.cache
+def _described(name: str) -> Fluid | GelSensor:
     folder = _folders().get(name)
     if folder is None:
         raise TactileError("sensor", repr(name), ", ".join(names()), _advice())

@@ -14,11 +14,11 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import atomic
 from ..files.outside import read_toml_text
-from ..mechanics.placement import FRICTION
+from ..mechanics.placement import FRICTION, MOST_FRICTION
 from .indenter_specs import IndenterSpec, NotNegative, Positive, with_files_of
 
 FORMAT = "tactile-scene-1"
-Friction = Annotated[float, Meta(ge=0, le=5)]  # Coulomb's coefficient
+Friction = Annotated[float, Meta(ge=0, le=MOST_FRICTION)]  # Coulomb's coefficient
 LARGEST = 1e9  # of any number: none that means something comes near, squares of far larger ones are infinite (assumed)
 
 

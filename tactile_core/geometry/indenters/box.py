@@ -24,6 +24,8 @@ class Box(Indenter):
     edge: float
 
     def __post_init__(self) -> None:
+        if np.shape(self.sizes) != (3,):
+            raise TactileError("box, sizes", f"{self.sizes!r:.80}", "three lengths in m, along x, y and z")
         for name, value in zip(("size x", "size y", "size z", "edge"), (*self.sizes, self.edge), strict=True):
             check_length("box", name, value)
         if 2 * self.edge >= min(self.sizes):

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from ...errors import TactileError
+from ...errors import TactileError, finite_number
 from . import extrusion
 from .indenter import NEAREST, SQUARE, Indenter, check_length, sign_of
 from .scene_form import SceneForm, Size
@@ -30,8 +30,7 @@ class Edge(Indenter):
     def __post_init__(self) -> None:
         for name in ("radius", "length", "height"):
             check_length("edge", name, getattr(self, name))
-        if not _ANGLES[0] <= self.angle <= _ANGLES[1]:
-            raise TactileError("edge, angle", f"{np.rad2deg(self.angle):g} degrees", "10 to 170 degrees")
+        finite_number(self.angle, "edge, angle", "0.17 to 2.97 rad, 10 to 170 degrees", *_ANGLES)
         if 2 * self.radius >= min(self.length, self.height):
             raise TactileError("edge, radius", f"{self.radius * 1e3:g} mm", "less than half of length and height")
 
