@@ -260,7 +260,8 @@ def writing(
     expected: str = "a writable folder",
     advice: str = "Make room, or name another --out folder",
 ) -> Iterator[None]:
-    """Turn an OSError of writing ``path``, such as that of a full disk, into a TactileError."""
+    """Turn an OSError of writing ``path``, such as that of a full disk, into a TactileError that says what was
+    `expected`, with `advice`."""
     try:
         yield
     except OSError as error:

@@ -52,7 +52,7 @@ class Loop:
     """A function that is compiled when that pays; other threads may run during the compilation.
 
     waits : false to compile it at its first call, as one whose time the size of its arrays does not bound
-    It must hold no ``**``: compiled code rounds powers otherwise.
+    The function must hold no ``**``: compiled code rounds powers otherwise.
     """
 
     def __init__(self, function: Callable[..., Any], *, waits: bool = True) -> None:
@@ -62,7 +62,7 @@ class Loop:
         self._spent = 0.0  # s, uncompiled
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run it, uncompiled where numba is missing or switched off."""
+        """Run the function, uncompiled where numba is missing or switched off, or compiling does not pay yet."""
         return self._run(*arguments) if available() else self._function(*arguments)
 
     def _first_call(self, *arguments: Any) -> Any:

@@ -24,7 +24,8 @@ MOST_DOTS = 100  # in a TOML key; tomllib's time grows with the square of them (
 
 
 def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
-    """Raise TactileError for a pipe, socket or device, OSError for a missing file or a folder; links are followed."""
+    """Return a file's status. Raises TactileError, which says what was `expected`, for a pipe, socket or device, and
+    OSError for a missing file or a folder; links are followed."""
     return _regular(path, os.stat(path), expected)
 
 

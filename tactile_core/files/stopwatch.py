@@ -8,7 +8,8 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Sums of wall time and of this process's CPU time by stage; a stage may be entered many times."""
+    """Sums by stage of wall time, `seconds`, and of this process's CPU time, `cpu_seconds`; a stage may be entered
+    many times."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}

@@ -37,7 +37,8 @@ class ConversionReport:
     """Collects what is reported of all frames, and what the contact sheet shows; flagged : number of frames by flag"""
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
-        """Start a report on rising frames (T,) of prepared rows, which `made` translates."""
+        """Start a report. rows : the prepared recording; frames : (T,) rising indices of its converted frames
+        tools : networks and drawer; made : the pass that translates and draws these frames"""
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
         self._pressure: list[np.ndarray] = []
@@ -51,7 +52,7 @@ class ConversionReport:
         self._shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def take(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Add the arrays, by the names of frames.h5, of rising frames (n,)."""
+        """Add the next translated frames: their rising indices (n,), and their arrays by the names of frames.h5."""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
         self._pressure.append(arrays["pressure"])
@@ -94,7 +95,7 @@ class ConversionReport:
 
     @property
     def explained(self) -> float | None:
-        """Share of the electrodes' change that the translation explains, mean in contact; None without any."""
+        """Share of the electrodes' change that the translation explains, mean in contact; None without contact."""
         share = np.concatenate(self._explained)
         touching = np.isfinite(share)
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None

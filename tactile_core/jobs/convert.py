@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 class Options:
     """Options of the conversion of a recording.
 
-    frames : part of it, the same for every recording; keep : words of results.KEEPABLE
+    frames : slice of its frames, the same for every recording; keep : words of results.KEEPABLE
     prepare : options of the preparation; overwrite : replace an older result
     sensor : the unit's rest, gains and offsets, from `tactile adapt`"""
 
@@ -89,7 +89,8 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : the result; warnings : sentences; remark : on kept traction against force"""
+    """A finished conversion. folder : the result; warnings : sentences
+    remark : sentence on how far kept traction differs from the force; "" without kept traction"""
 
     folder: Path
     warnings: tuple[str, ...]
@@ -213,7 +214,8 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
 
 
 def weights_entry(translator: Translator) -> dict:
-    """Return the hash of the weights' card, and the error and baseline, um, that the card states."""
+    """Return, for JSON, the hash of the weights' card and, if it states them, the rms error of the gel on contacts kept
+    apart and that of no deformation, um."""
     from ..translation.card import chain_error
 
     found = chain_error(translator.card)

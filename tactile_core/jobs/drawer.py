@@ -26,7 +26,7 @@ class Drawer:
 
     height_map : (T, M, 3) m -> (T, H, W) m
     shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
-    camera : of the gel that is drawn; contacts outside its picture are flagged
+    preset : name of that preset; camera : of the gel that is drawn; contacts outside its picture are flagged
     solve : arrays by the names of frames.h5 -> the same with solved gels; None keeps the networks' gels
     dots : on the gel that is drawn; None for no dots
     target : the gel; found_on : the networks' gel, on which contacts are found before they are solved on another

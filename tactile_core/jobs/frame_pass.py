@@ -38,7 +38,8 @@ class Tools:
 
 
 class FramePass:
-    """Makes all arrays of a recording's frames, part by part, and writes their file; folded : folded height maps"""
+    """Makes all arrays of a recording's frames, part by part, and writes their file.
+    folded : number of height maps so far in which the gel folds over itself"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None

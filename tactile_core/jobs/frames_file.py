@@ -98,14 +98,14 @@ def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]
 
 
 def named(name: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's name for a pair of another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's name for a pair (source, gel), which takes the place of biotac and digit at its end."""
     stem, _, role = name.rpartition("_")
     sensor = dict(zip(PAIR, pair, strict=True)).get(role)
     return f"{stem}_{sensor}" if sensor else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's meaning for a pair of another source than a BioTac, or another gel than a DIGIT's."""
+    """Return a dataset's meaning, which names BioTac and DIGIT, in the words of a pair (source, gel) of sensors."""
     for role, sensor in zip(PAIR, pair, strict=True):
         if role != sensor:
             meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")
@@ -130,7 +130,7 @@ class FramesFile:
     ) -> None:  # fmt: skip
         """Create the file.
 
-        pair : the sensor that was read and the gel; they name datasets
+        keep : words of KEPT; pair : the sensor that was read and the gel; they name datasets
         path : new file; count : T; attributes : of the file itself, beside format and version
         room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's checksum; the file then holds
             pictures, too, and a large array has one chunk per frame"""

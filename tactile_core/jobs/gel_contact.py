@@ -56,7 +56,7 @@ class GelContact(Summary):
 
     @classmethod
     def untouched(cls, count: int, pose: Pose) -> GelContact:
-        """Return the contact of an indenter that touches none of `count` nodes."""
+        """Return the contact of an indenter, at a pose, that touches none of `count` surface nodes; its depth is 0."""
         none, patch = np.zeros((count, 3)), np.zeros(count, bool)
         return cls(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, matrix_of(pose))
 
@@ -70,7 +70,8 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 
 
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Check the pose of an indenter and its force, N, or None. Raises TactileError for an invalid pose or force."""
+    """Return an indenter's pose and force, N, checked. pose : as of `_rigid`; force : None where none is asked for
+    Raises TactileError for an invalid pose or force."""
     if force is not None:
         force = finite_number(force, "Gel, force", "newtons, zero or more, and finite", 0.0)
         if force > MOST_FORCE:

@@ -35,7 +35,7 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 @dataclasses.dataclass(frozen=True)
 class Frames:
     """Frames of an input: displacements of a gel's nodes, or height maps.
-    kind : in words; numbers : (T,) frame numbers
+    kind : of the input, in words; numbers : (T,) frame numbers; of the two arrays below one is None
     displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m"""
 
     kind: str
@@ -75,7 +75,8 @@ def read_frames(
 
 
 def read_displacement(path: str | os.PathLike, gel: str = TARGET) -> Frames:
-    """Read a surface's displacement from ``frames.h5`` or a simulated recording. Raises TactileError for others."""
+    """Read the displacement of a sensor's surface, `gel`, from ``frames.h5`` or a simulated recording. Raises
+    TactileError for other files, and where it was not kept."""
     if not os.path.isfile(path):
         raise TactileError(path, "there is no such file", EXPECTED)
     with open(path, "rb") as file:  # the project's own files for this have no user block

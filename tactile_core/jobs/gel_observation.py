@@ -15,7 +15,8 @@ _MOST_FORCE, _MOST_MOTION = 100.0, 5e-3  # N, m: beyond what a gel bears and mov
 
 
 def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
-    """Return the nodes (rows, columns) nearest to an even grid of markers over the camera's picture, tip first."""
+    """Return the nodes (rows, columns) nearest to an even grid of markers over the camera's picture: rows from the tip
+    along +x, columns along +z."""
     camera = load_calibration().camera
     x = np.linspace(camera.gel_x.min(), camera.gel_x.max(), rows + 2)[1:-1]
     z = np.linspace(camera.gel_z.min(), camera.gel_z.max(), columns + 2)[1:-1]

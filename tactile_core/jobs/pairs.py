@@ -128,8 +128,8 @@ def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
-    """Estimate the blocks for `count` contacts from counts, block -> contacts so far. TactileError where none
-    touches."""
+    """Estimate the blocks for `count` contacts from counts, block -> contacts so far. Raises TactileError, on the
+    scene's file `where`, if many blocks made no contact."""
     have, number = 0, 0
     while have < count and number in counts:
         have += counts[number]

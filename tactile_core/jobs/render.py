@@ -54,7 +54,8 @@ class Options:
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
     frames : part of the input; exr : true writes OpenEXR too; variant : None for the faster one
-    noise : true adds the camera's noise to PNG pictures, the same in every run"""
+    noise : true adds the camera's noise to PNG pictures, the same in every run; overwrite : true replaces a result
+    scene_out : file for the first frame as a Mitsuba scene, None for none"""
 
     preset: str | None = None
     levels: float | None = None
@@ -163,7 +164,7 @@ class Pictures:
             (folder / EXR).mkdir()
 
     def write_rest(self, folder: Path) -> None:
-        """Write the undeformed gel, if OpenEXR is asked for."""
+        """Write the undeformed gel, and the camera's response, if OpenEXR is asked for."""
         if self.exr:
             self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
             self._write_camera(folder / CAMERA)
@@ -212,7 +213,8 @@ def pictures(
 def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
-    """Return a result's origin for JSON: only what the same input reproduces."""
+    """Return a result's origin for JSON: only what the same input reproduces.
+    path, kind : of the input, kind in words; count : of rendered frames; preset : by name"""
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))
     about = PRESETS[preset] if preset != FAST else None

@@ -66,8 +66,8 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
     """Raise TactileError where a result exists (unless `overwrite`), or something that is none.
-    maker : verb of the result by its note; another verb's result is something else, as is a folder with foreign
-        files"""
+    maker : verb of the result by its note, "" for `tactile convert`; another verb's result is something else, as is a
+     folder with foreign files"""
     if not os.path.lexists(folder):
         return
     if not is_result(folder, maker):
@@ -88,7 +88,7 @@ def check_writable(out: Path) -> None:
 
 
 def is_result(folder: Path, maker: str = "") -> bool:
-    """Return true if a folder holds a result of this package, made by `maker`, so that --overwrite may replace it."""
+    """Return true if a folder holds a result of this package, so that --overwrite may replace it; maker : see above"""
     try:
         note = json.loads(read_small(folder / NOTE))
     except (OSError, ValueError, RecursionError, TactileError):

@@ -35,7 +35,8 @@ def reverse(
     overwrite: bool = False,
 ) -> None:
     """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``ARRAYS``.
-    translator : its networks lead from the skin to that gel; progress : called with (frames done, frames in all)
+    translator : its networks lead from the skin to that gel; frames : slice of the input's; overwrite : true replaces
+     `out`; progress : called with (frames done, frames in all)
     Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
     if os.path.lexists(out) and not overwrite:
         raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")

@@ -95,7 +95,8 @@ def name_of(values: dict[str, Value]) -> str:
 
 
 def with_values(scene: Scene, values: dict[str, Value], where: str) -> Scene:
-    """Return the scene with other values. Raises TactileError for an unknown field, or a value out of its range."""
+    """Return the scene with other values, name -> value as in a grid. Raises TactileError, of the file `where`, for an
+    unknown field, or a value out of its range."""
     document = msgspec.to_builtins(scene)
     for name, value in values.items():
         if name in MOTION:

@@ -44,7 +44,8 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 @dataclass(frozen=True)
 class Asked:
     """Options of a data set; layouts : names of ``export.layouts``; place : job's folder -> executor of its tasks
-    say : callback for sentences; bar : (name, unit) -> context of a callback (done, in all)"""
+    say : callback for sentences; bar : (name, unit) -> context of a callback (done, in all); target : the gel
+    preset : of the pictures, None for fast ones; calibration, weights : file and folder, None for those that ship"""
 
     layouts: Sequence[str]
     place: Callable[[Path], runs.Place]
@@ -58,8 +59,8 @@ class Asked:
 
 def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> dict[str, str]:
     """Make the data set `out` of the recordings in a folder; what is there already is kept. Returns what was set aside,
-    and why. named : of the recipe, as the user named it. Raises TactileError for another set's folder, for files of
-    others in `out`, where no recording can be translated, and for a disk that cannot be written."""
+    a recording, file or unit -> the reason. named : the recipe, as the user named it. Raises TactileError for another
+    set's folder, for files of others in `out`, where no recording can be translated, and where a disk refuses."""
     found = collect(recipe, folder, out)
     _check_out(out)
     for line in _counted(recipe, found):

@@ -44,7 +44,8 @@ class Collected:
 
 
 def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
-    """Find a data set's files in a folder, but for links and `out`. Raises TactileError where nothing fits."""
+    """Find a data set's files in a folder, but for linked and hidden folders and `out`. TactileError where none
+    fits."""
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]
@@ -105,7 +106,8 @@ def _split(recipe: Recipe, labels: dict[str, str]) -> str:
 
 
 def beside(folder: Path, name: str, file: File) -> Path:
-    """Return the path of a file beside a recording, existing or not. Raises TactileError for one outside the folder."""
+    """Return the path of a file, existing or not. name : its path from the recording `file`'s folder, with {label}
+    Raises TactileError for one outside the data set's folder, and for a label that the recording lacks."""
     path = file.path.parent / filled(name, file.labels)
     if not path.resolve().is_relative_to(folder.resolve()):
         raise TactileError(path, "outside the data set's folder", "a file inside it")

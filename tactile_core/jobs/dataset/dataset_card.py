@@ -43,7 +43,9 @@ def card_of(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
-    """Return the card as Markdown; rows : survival of labels, None without scikit-learn; layouts : exported, by name"""
+    """Return the card as Markdown. named : the recipe, as the user named it; found : files of the folder
+    source : all translated recordings; rows : survival of labels, None without scikit-learn
+    layouts : names of the exported ones"""
     of = recipe.source
     sections = {
         f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),

@@ -52,7 +52,7 @@ by = ""  # label whose values stay together in train or test
 
 
 def write(out: Path, folder: Path) -> None:
-    """Write the recipe to a new file. Raises TactileError for a folder without recordings."""
+    """Write a recipe for the recordings in a folder to the new file `out`. TactileError for a folder without any."""
     atomic.claim(out)
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "a folder of recordings")

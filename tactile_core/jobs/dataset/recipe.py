@@ -43,7 +43,8 @@ class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Division into train and test, by a label whose values stay together.
-    test : values that are held out; apart : label of frames by which the card's classifiers hold out, `by` if empty"""
+    by : that label; "" puts all into train; test : its values that are held out, empty for one value in five
+    apart : label of frames by which the card's classifiers hold out, `by` if empty"""
 
     by: str = ""
     test: list[str] = []
@@ -69,9 +70,9 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     files : patterns of paths below the folder, at any depth; {label} stands for any text, which becomes the label. The
         first pattern that fits a file counts
-    sensor : that made the recordings, biotac or biotac_sp
+    format : FORMAT; sensor : that made the recordings, biotac or biotac_sp
     tasks : labels to learn; values : columns of numbers of the recordings' files, which become labels too
-    force : file of newtons beside a recording, used where it exists
+    force : file of newtons beside a recording, with {label} in its name, used where it exists; "" for none
     every : translate one frame in ``every``; snapshots : true where frames do not follow each other in time
     notes : first lines of the card"""
 

@@ -55,7 +55,8 @@ def calibrated(
     recipe: Recipe, files: list[File], folder: Path, out: Path, weights: str | None, say: Callable[[str], None]
 ) -> SensorFile | None:
     """Return the unit's calibration, found as the recipe says; None where each recording is treated by itself.
-    out : file that keeps it, reused for the same recordings, rest, weights and recipe; say : called with sentences
+    folder : of the data set; weights : folder of networks, None for those that ship; say : called with sentences
+    out : file that keeps the calibration, reused for the same recordings, rest, weights and recipe
     Raises TactileError for a rest that is missing or differs between files, and where nothing is found."""
     how = recipe.unit
     if how.found == "none":

@@ -24,7 +24,8 @@ ARRAYS = {RAW: ("electrodes",), NUMBERS: ("force", "contact_center", "pressure")
 class Summary:
     """Summary of a recording.
 
-    touched : share of its frames in contact; guesses : share of those; flagged : share of frames by flag
+    touched : share of its frames in contact; guesses : share of those that have low confidence
+    flagged : flag -> share of all frames, without flags that no frame bears
     explained, confidence, force : medians over frames in contact, force in N; NaN without contact
     labels : label -> its text, "" where it changes within the recording
     features : kind -> (n, k) numbers of n examples: the whole recording, by its changes since its first 0.1 s, or each

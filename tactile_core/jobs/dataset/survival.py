@@ -30,7 +30,7 @@ class Row:
     classes: int
 
     def numbers(self) -> dict[str, Any]:
-        """Return the row for a report."""
+        """Return the fields by name, the shares rounded to four digits, for a report."""
         return vars(self) | {"right": round(self.right, 4), "error": round(self.error, 4)}
 
 

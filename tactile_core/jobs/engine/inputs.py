@@ -33,7 +33,8 @@ SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wren
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Recording of a job; name : unique, of its files; path : absolute; sha256, bytes : of its content"""
+    """Recording of a job; name : unique, begins the names of its files; path : absolute, with ``#finger`` for a finger
+    of a hand; sha256, bytes : hash and size of the file's content"""
 
     name: str
     path: str
@@ -130,7 +131,8 @@ def _is_bag(folder: Path) -> bool:
 
 
 def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
-    """Read every file once. Raises TactileError for one that cannot be read; progress : (files done, in all)."""
+    """Return an input for each recording in the files, of which a hand's has one per finger, with the file's hash.
+    progress : called with (files done, in all). Raises TactileError for a file that cannot be read."""
     found: list[Input] = []
     for done, path in enumerate(paths, 1):
         digest, size = content_hash(path)
@@ -149,7 +151,8 @@ def unit_hash(calibration: Path) -> str:
 
 
 def content_hash(path: Path) -> tuple[str, int]:
-    """Hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError."""
+    """Return hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError for
+    what cannot be read or is no regular file."""
     path = Path(split(str(path))[0])
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise TactileError(path, "no regular file", "a recording", "Copy what it gives into a file")
@@ -168,7 +171,8 @@ def check_unchanged(one: Input) -> None:
 
 
 def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
-    """Return a scene, its text, an input for each name, and its meshes' hashes. Raises TactileError for a bad one."""
+    """Return a scene, its text, its meshes' hashes, and, before these, an input for each of names, each of this scene.
+    Raises TactileError for a bad one."""
     from ...simulation.scene import load_scene
 
     scene, text = load_scene(scene_path)
@@ -180,7 +184,8 @@ def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, 
 
 
 def load_scene_of(one: Input, files: tuple[str, ...]) -> tuple[Scene, str]:
-    """Load an input's scene and its text. Raises TactileError where it or a mesh changed since the job was made."""
+    """Load an input's scene and its text. files : hashes of its meshes when the job was made
+    Raises TactileError where the scene or a mesh has changed since then."""
     from ...simulation.scene import load_scene
 
     scene, text = load_scene(one.path)

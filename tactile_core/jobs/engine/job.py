@@ -30,7 +30,8 @@ R = TypeVar("R")
 
 
 class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
-    """A job: `inputs` by `recipe`. weights, calibration : folder and file, None for those that ship"""
+    """A job: `inputs` by `recipe`. weights, calibration : folder and file, None for those that ship
+    format : FORMAT; versions : of this package and its libraries when it was made"""
 
     format: str
     inputs: list[Input]
@@ -48,7 +49,7 @@ class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, d
 
 
 def make(inputs: list[Input], recipe: R, weights: str | None, calibration: str | None = None) -> Job[R]:
-    """Create a new job."""
+    """Return a new job, not yet written; weights, calibration : folder and file, None for those that ship"""
     networks, unit = (None if path is None else os.path.abspath(path) for path in (weights, calibration))
     return Job(FORMAT, inputs, recipe, networks, unit, provenance.versions())
 

@@ -57,7 +57,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
     answer : options of the estimated contact; gel : the networks' gel, or the contact solved on the target
-    source, target : the sensors; every : translate one frame in ``every``"""
+    source, target : the sensors; every : translate one frame in ``every``; sensor : calibration of the source's unit
+    version : of this package, when the job was made, as in the other recipes"""
 
     keep: list[str]
     weights: str
@@ -76,7 +77,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to paired contacts. surfaces, files : sha256 of sensors' nodes and meshes; keep : of ``KEEPABLE``"""
+    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`.
+    surfaces, files : sha256 of sensors' nodes and of meshes; keep : words of ``pairs_file.KEEPABLE``"""
 
     count: Annotated[int, Meta(ge=1)]
     seed: int
@@ -92,7 +94,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to one recording for each input, with values of its own; see ``jobs.simulate``.
     seed : of the first input, each next one has one more; values : one dict per input, name -> value
-    keep : words of ``scene_recording.outputs``"""
+    keep : words of ``scene_recording.outputs``; files : sha256 of the scene's meshes"""
 
     seed: int
     values: list[dict[str, float | str]]

@@ -47,7 +47,7 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder, made if needed, and clear what killed runs left; part : (i, n) or None for all.
+    """Lock the job's folder, made if needed, and clear what killed runs left; part : (i, n), as in `run`, None for all.
     TactileError if it is locked."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):

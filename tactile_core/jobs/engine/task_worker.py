@@ -12,7 +12,7 @@ from typing import TextIO
 
 
 def serve(folder: str, requests: TextIO, replies: TextIO) -> None:
-    """Answer tasks until the requests end."""
+    """Answer requests, lines of JSON with a task each of the job in a folder, by lines of replies, until they end."""
     from . import tasks
 
     for line in requests:

@@ -17,7 +17,7 @@ _one_thread_once = functools.cache(one_thread)
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """First step for input `recording` of the job (shard None), or one of its shards; see ``recipes``."""
+    """First step for the job's input of index `recording` (shard None), or its shard of that number: `recipes`."""
 
     recording: int
     shard: int | None = None

@@ -37,7 +37,8 @@ def write(
     source: finished_job.Finished, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None],
     overwrite: bool | None = None,
 ) -> None:  # fmt: skip
-    """Write recordings of finished jobs as `layout` into the new folder `out`; progress : see `export`"""
+    """Write recordings of finished jobs as `layout` into the new folder `out`; progress : see `export`
+    overwrite : true replaces an older `out`; false and None refuse it, None without advice to use an option"""
     with atomic.writing(out), atomic.new_folder(out, overwrite=overwrite) as partial:
         layouts()[layout].write(source, partial, progress)
         note = {"layout": layout, "job": source.id, "left_out": source.aside, "warnings": source.warnings}

@@ -34,7 +34,7 @@ class LiveSignals:
 
     Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
     polarity; until then it is the given one, or "falls".
-    rate : Hz; options : polarity, and tare, of the first LONGEST s
+    rate : Hz; options : of the preparation; drift, repair and smoothing do not count, tare is of the first LONGEST s
     unit : gains, offsets and rest; its rest counts where the first window is not calm near it
     sensor : whose counts they are
     found : source of the rest, in words, once it is known

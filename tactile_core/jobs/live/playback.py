@@ -29,10 +29,12 @@ FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that 
 
 
 class Growing:
-    """A CSV recording that another program is writing, in any of the text layouts."""
+    """A CSV recording that another program is writing, in any of the text layouts.
+    rows, bad : numbers of rows that came, and of those passed over as bad"""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
-        """Follow a file, or ``path#1``, its finger 1. columns, sensor : as of `read`. Raises TactileError for none."""
+        """Follow a file, or ``path#1``, its finger 1; columns, sensor : as of `recordings.read`. Raises
+        TactileError where there is none."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
@@ -105,7 +107,9 @@ Say = Callable[[str], None]
 
 
 def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequence[Output], say: Say, tell: Say) -> None:
-    """Show frames until the rows or an output end. say : called with lines of progress; tell : with the summary"""
+    """Show a view's frames until the rows or an output end. camera : of a real DIGIT, shown beside, or None
+    outputs : called with each frame and its pictures by name; say : called with lines of progress; tell : with the
+     summary"""
     reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
         for rows, came in source:
@@ -137,7 +141,8 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
 
 def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield new rows of a growing file and their arrival time, s, of time.perf_counter; None while no row comes.
-    idle : s without a row after which it ends; None: never. Raises as `Growing.poll` does."""
+    idle : s without a row after which it ends; None: never. say : called with a line when rows are bad
+    columns, sensor : as of `recordings.read`. Raises as `Growing.poll` does."""
     growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()
@@ -153,7 +158,9 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
 
 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
-    """Yield the rows of a finished recording at their times, one part in memory at a time; speed 0 does not wait."""
+    """Yield the rows of a finished recording at their times, one part in memory at a time.
+    speed : times as fast as recorded, 0 without waiting; say : called with warnings; columns, sensor : as of
+     `recordings.read`"""
     began = time.perf_counter()
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated

@@ -59,7 +59,7 @@ class _Together:
         return place | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Write the lists of episodes, with their statistics, and of tasks."""
+        """Write the lists of episodes, with their statistics, and of tasks; returns entries of info.json."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 

@@ -65,7 +65,7 @@ class _Apart:
         return {}
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Write the lists of episodes, statistics and tasks, and what GR00T asks for."""
+        """Write the lists of episodes, statistics and tasks, and GR00T's own files; returns entries of info.json."""
         meta, whole, drawn = self._folder / "meta", listed(aggregate(stats)), PICTURE in stats[0]
         _write_lines(meta / "episodes.jsonl", episodes)
         found = [{"episode_index": index, "stats": listed(one)} for index, one in enumerate(stats)]
