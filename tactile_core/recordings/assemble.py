@@ -99,10 +99,12 @@ def assemble(
 ) -> Recording:
     """Check the columns and make a Recording of them.
 
-    electrodes : (T, 19) float with NaN at bad cells; stamps : (T,) float as in the file, or None: 100 Hz is assumed
+    layout : in words; electrodes : (T, 19) float with NaN at bad cells; problems : bad places that the reader found
+    stamps : (T,) float as in the file, or None: 100 Hz is assumed
     rows : (T,) int, the file's line or row of each frame, `row_word` for messages; None: frames count from 0
     names : of the electrodes' columns in the file; an empty one is a missing column, a dead channel
-    snapshots : true where frames do not follow each other in time; labels : name -> (T,) texts
+    snapshots : true where frames do not follow each other in time, whose time is NaN; labels : name -> (T,) texts
+    truth, simulated, about, warnings, sensor : as of `Recording`
     channels : pdc, tac, tdc, pac, position, force
     Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad."""
     frames = len(electrodes)

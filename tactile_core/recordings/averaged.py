@@ -20,7 +20,8 @@ COARSE = 2.0  # counts between readings from which noise is lost in their steps,
 
 
 def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of a recording that holds moving averages, where it moves within them; extends warnings.
+    """Return flags (T,) of a recording: OUT_OF_RANGE where it moves within moving averages, if it holds such, else 0.
+    warnings : extended by a sentence on them
     readings : (T, e) counts; change : (T, e) counts, against rest"""
     flags = np.zeros(len(readings), np.uint16)
     if recording.simulated or not np.isfinite(recording.time).all() or not _lacks_noise(readings, recording.rate):

@@ -57,7 +57,7 @@ class Doubt(str):
     facts: dict[str, Any]
 
     def __new__(cls, reason: Reason, **facts: Any) -> Doubt:
-        """Write the sentence."""
+        """Write the reason's sentence, with facts, name -> value, in its braces."""
         made = super().__new__(cls, reason.value.format(**facts))
         made.reason, made.facts = reason, facts
         return made

@@ -121,7 +121,7 @@ def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats (of kind "raw"); return them, flags
-    and a report."""
+    (T,) with REPAIRED and DEAD_CHANNEL added, and a report of numbers and rows. warnings : extended"""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:

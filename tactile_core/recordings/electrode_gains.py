@@ -101,7 +101,9 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Convert signals to the simulated sensor's: (change - offset) / gain; rectified ones without offset."""
+    """Convert signals to those of a unit with the simulated one's gains: (change - offset) / gain, of rectified ones
+    without offset. Raw changes are converted to a typical unit's rest before that and back to this unit's after it.
+    The unit's stiffness is noted, and the law of contacts checked again (`doubt_law`)."""
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     stiffness = 1.0 if sensor.stiffness is None else sensor.stiffness
@@ -134,7 +136,7 @@ def read(path: str | os.PathLike) -> SensorFile:
 
 
 def check(sensor: SensorFile, where: str | os.PathLike) -> None:
-    """Raise TactileError naming the field that is out of range."""
+    """Raise TactileError naming the field that is out of range. where : the file, for messages"""
     if sensor.format != FORMAT:
         raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
     try:

@@ -31,7 +31,8 @@ HEAD, DIRECTORY = 1024, 2**16  # bytes in which the first one's name is; at a zi
 
 
 class Opened(NamedTuple):
-    """Open file. container : csv, json, hdf5, npz, mat or bag; finger : requested, or None; file : its bytes"""
+    """Open file. container : csv, json, hdf5, npz, mat or bag; path : without #finger; finger : requested, or None
+    file : its bytes, unpacked; none of a bag that is a folder"""
 
     container: str
     path: str
@@ -85,7 +86,7 @@ def _end(file: BinaryIO) -> bytes:
 
 
 def container_of(path: str) -> str:
-    """Detect the container: csv, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
+    """Detect the container: csv, json, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
     with opened(path) as found:
         return found.container
 

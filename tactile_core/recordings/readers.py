@@ -127,7 +127,8 @@ def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
-    """Return a recording's sensor, by a CSV file's columns or a bag's messages. Raises TactileError for none."""
+    """Return a recording's sensor, by a CSV file's columns or a bag's messages; of other files, and with a map, the
+    BioTac. Raises TactileError for a file that is no recording."""
     path = os.fspath(path)
     with opened(path) as (container, where, _, file):
         if container == "bag":
@@ -231,8 +232,8 @@ def table_reader(
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """Return the layout that knows most of keys, the file's columns or arrays. Raises TactileError if none does.
-    container : kind of file: csv, json, hdf5, npz or mat"""
+    """Return the layout of whose own names keys, the file's columns or arrays, hold the largest share. Raises
+    TactileError where that is below RECOGNISED. container : kind of file: csv, json, hdf5, npz or mat"""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0], default=(0.0, formats))
     if best < RECOGNISED:

@@ -84,7 +84,7 @@ class Recording(Summary):
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit of measurement
     labels : name -> (T,) object array of str, such as object, material or trial, which no translation reads
-    warnings : sentences for the user
+    warnings : sentences for the user; simulated, truth : true, and true values, of a file that says it is simulated
     not_taken : what the file holds beside it and no recording is made of, in words: topics, arrays, columns, fields
     about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)
     """

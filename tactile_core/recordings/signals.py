@@ -27,7 +27,8 @@ SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/source
 
 @dataclass(frozen=True)
 class Rest:
-    """Rest of a unit, found in other recordings of it. counts, spread : (e,) counts, of E1 on; pdc : counts, or None"""
+    """Rest of a unit, found in other recordings of it. counts : (e,) readings, of E1 on; spread : (e,) counts by which
+    they may be off; pdc : counts, None where unknown"""
 
     counts: tuple[float, ...]
     spread: tuple[float, ...]

@@ -50,6 +50,7 @@ def write_simulated(
 ) -> Path:
     """Write the file whole or not at all, and return its path; None is left out.
     time : (T,) s; electrodes : (T, 19), pdc, tac, tdc : (T,) counts, raw; start_time : unix s, 0 if unknown
+    truth : true values, arrays of T frames; scene : TOML text; seed : that the scene was simulated with
     made_by, note : texts, the program and what a reader must know
     Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
     path, frames = Path(path), len(time)
@@ -104,7 +105,8 @@ def read_simulated(store: Store, layout: str) -> Recording:
 
 
 def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
-    """Read times (T,) s and true values of a simulated recording, with electrodes or without. Raises TactileError."""
+    """Read times (T,) s, after the file's start_time (unix s, 0 if unknown) was added, and true values of a simulated
+    recording, with electrodes or without. Raises TactileError for another file."""
     with open_hdf5(os.fspath(path)) as store:
         if store.attributes.get("format") != FORMAT:
             raise TactileError(path, f"format {store.attributes.get('format')!r}", repr(FORMAT))

@@ -29,7 +29,7 @@ UNDAMAGED = re.compile(r"not supported|[Uu]nsupported|not ros2|not indexed|not i
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic with BioTacs. kind : message type; definitions : candidates for its definition"""
+    """A topic with BioTacs. kind : message type; definitions : candidates for its definition; connections : rosbags'"""
 
     name: str
     kind: str
@@ -39,7 +39,8 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """Open bag; topics : with BioTacs, by name; others : without, in words; middle : ns, of its time span"""
+    """Open bag. ros1 : true of ROS 1, false of ROS 2; reader : rosbags', open; middle : ns, of its time span
+    topics : with BioTacs, by name; others : without, in words"""
 
     path: str
     ros1: bool

@@ -38,7 +38,7 @@ class Finger:
 
 @dataclass(frozen=True)
 class Stream:
-    """The messages of one finger. hand : all fingers of its topic"""
+    """The messages of one finger. hand : all fingers of its topic, of which it has the index `number`"""
 
     topic: Topic
     number: int
@@ -89,7 +89,8 @@ def _topics(bag: Bag, chosen: Chosen) -> tuple[list[Topic], int | None]:
 
 
 def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
-    """Return the path of each recording, as ``bag#0``, or of a bag of several topics ``bag#topic/finger0``."""
+    """Return the path of each recording, as ``bag#0``, or of a bag of several topics ``bag#topic/finger0``.
+    path : as given, kept where it names one recording; chosen : its `split`"""
     found = streams_of(bag, chosen)
     whole = bool(chosen.topic) or len(bag.topics) > 1
     if len(found) == 1 and (not whole or (chosen.topic and chosen.finger is not None)):
@@ -114,7 +115,8 @@ def _hand(bag: Bag, topic: Topic) -> list[Finger]:
 def read_bag(
     bag: Bag, chosen: Chosen, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Yield recordings of `frames` frames, each with the number of first frames that it repeats from the one before.
+    """Yield recordings, each with the number of its first frames, at most `context`, that repeat the one before, and
+    up to `frames` new ones.
     Reads the chosen topic and finger, or the first with signals; a warning names the others. Raises TactileError for
     messages that do not fit their type."""
     first, *others = streams_of(bag, chosen)

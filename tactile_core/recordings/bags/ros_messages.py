@@ -64,7 +64,8 @@ KNOWN: dict[str, list[dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class Definition:
-    """Fields of a message and of those inside it. types : name -> names and kinds of fields, as rosbags parses them"""
+    """Fields of a message, whose type is `root`, and of those inside it.
+    types : name -> names and kinds of fields, as rosbags parses them"""
 
     root: str
     types: dict[str, list[tuple[str, Any]]]

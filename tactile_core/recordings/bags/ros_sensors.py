@@ -19,7 +19,8 @@ PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SensorFields:
-    """Names of a sensor's fields; path : to the sensor or a list of them; slow : pdc, tac, tdc; others : not read"""
+    """Names of a sensor's fields. path : to the sensor or a list of them, from the message; others : not read
+    slow : of pdc, tac, tdc, "" for one that is not there; pac : of its samples, none or more"""
 
     path: tuple[str, ...]
     electrodes: str

@@ -89,7 +89,8 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
     """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``.
-    style : of a column, by finger and number; snapshots : true where frames do not follow each other in time"""
+    finger : number in the order of HAND, from 0; layout : in words; style : of a column, by finger and number
+    snapshots : true where frames do not follow each other in time"""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)

@@ -82,7 +82,7 @@ class Cells:
     """Kinds of a table's columns. words : of columns of texts, by name; plain : true where all hold numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Decide the kinds by the first rows."""
+        """Decide the kinds of the columns called names by the first of rows, lists of cells."""
         self.words: dict[str, Words] = {}
         self._readers: list[Callable[[str], float]] = [_plain_number] * len(names)
         for place, name in enumerate(names):

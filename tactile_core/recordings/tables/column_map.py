@@ -95,7 +95,8 @@ def read(path: str | os.PathLike) -> ColumnMap:
 
 
 def write(path: str | os.PathLike, guessed: list[ColumnMap], held: tuple[str, ...]) -> None:
-    """Write the first guessed map to a new file, the others as comments, with the names of the columns held."""
+    """Write the first guessed map to a new file, the others, of further fingers, as comments.
+    held : names of all columns of the recording, for a comment"""
     named = ", ".join(held[:MOST_NAMED]) + (f" and {len(held) - MOST_NAMED} more" if len(held) > MOST_NAMED else "")
     quoted = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
     columns, *others = guessed

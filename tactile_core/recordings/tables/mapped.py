@@ -169,7 +169,8 @@ def _readings(table: Table, names: Sequence[str]) -> np.ndarray:
 def read_by_map(
     path: str, container: str, file: BinaryIO, columns: ColumnMap, left_out: Callable[[str], bool] | None = None
 ) -> Recording:
-    """Read an open file by a map, without columns `left_out`. Raises TactileError for a missing column or array."""
+    """Read an open file by a map, columns. left_out : true for the name of a column that a long text is read without
+    Raises TactileError for a missing column or array."""
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else read_table(path, file, left_out)
         found, taken = read_mapped(table, columns, container), table.taken

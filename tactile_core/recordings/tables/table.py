@@ -29,7 +29,7 @@ class Table:
     """Parsed table of a text.
 
     header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is line 1
-    exact : (T,) float64 of columns that float32 values would round, such as time stamps
+    problems : bad cells; exact : index of a column that float32 values would round, as time stamps -> (T,) float64
     start : line after which the rows begin
     left_out : columns of the file that were parsed and not kept
     taken : names of the columns that were read so far, or that belong to another recording of the file
@@ -139,7 +139,7 @@ def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
 
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
     """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns.
-    left_out : whether a column of that name is parsed but not held; of a file of more than WHOLE"""
+    left_out : true for the name of a column that is parsed but not held; only of a file of more than WHOLE bytes"""
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"

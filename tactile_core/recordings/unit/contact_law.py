@@ -173,7 +173,8 @@ def flagged(
 ) -> tuple[np.ndarray, Doubt | None]:
     """Return flags (T,) with `LAW_DOUBTED` in the contacts where the recording is doubted, and the doubt, or None.
 
-    typical : (T, e) counts, a typical unit's changes; quiet : (T,) bool; flags : (T,) uint16; pdc : (T,) counts"""
+    typical : (T, e) counts, a typical unit's changes; quiet : (T,) bool; flags : (T,) uint16; pdc : (T,) counts
+    kind : of the recording; other than raw and tared ones are not judged"""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
         return flags, None
     contact = touching(typical) & ~quiet
