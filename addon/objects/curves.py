@@ -44,7 +44,8 @@ def fcurves_of(owner: bpy.types.ID) -> Any:
 def write_curve(
     owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0, lines: int = LINEAR
 ) -> None:
-    """Replace one F-curve, by data path and index, by straight lines, or steps, through values (T,) at frames (T,)."""
+    """Replace one F-curve, by data path and index, by one through values (T,) at frames (T,) of the scene.
+    lines : LINEAR joins them by straight lines, CONSTANT by steps"""
     curves = fcurves_of(owner)
     old = curves.find(path, index=index)
     if old is not None:

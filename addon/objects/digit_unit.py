@@ -30,7 +30,8 @@ class ShownUnit:
 
 
 def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Calibration) -> ShownUnit:
-    """Return the unit as the scene shows it: missing LEDs are dark, other parts ``unit``'s. Raises TactileError."""
+    """Return the unit as the scene shows it: missing LEDs are dark, other missing parts are ``unit``'s. Raises
+    TactileError for an LED above the gel, and for a camera that is shifted or turned other than by 180 degrees."""
     reflectance = gel.evaluated_get(depsgraph).tactile.object_reflectance or unit.object_reflectance
     unit = dataclasses.replace(unit, object_reflectance=reflectance)
     if not digit_body.has_body(gel):

@@ -64,7 +64,8 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
     """Return the spec of an indenter object, and the bytes of its mesh file, None for a shape without one.
 
-    relative : (3, 3), the object's axes in the sensor's. Raises TactileError.
+    relative : (3, 3), the object's axes in the sensor's. Raises TactileError as `check_pose` does, and for a mesh
+    file that cannot be read.
     """
     import msgspec
 

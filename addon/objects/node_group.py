@@ -48,11 +48,12 @@ class NodeGroup(Nodes):
             self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
 
     def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
-        """Add a node that reads a named attribute of the mesh; return its output."""
+        """Add a node that reads a named attribute of the mesh, of a kind, Blender's data type; return its output."""
         return self.output("GeometryNodeInputNamedAttribute", name, data_type=kind)
 
     def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
-        """Add a node that stores ``value`` as a named attribute of a geometry's points; return that geometry."""
+        """Add a node that stores ``value``, a socket or a value of a kind (Blender's data type), as a named attribute
+        of a geometry's points; return that geometry."""
         stored = geometry, None, name, value
         return self.output("GeometryNodeStoreNamedAttribute", *stored, data_type=kind, domain="POINT")
 

@@ -31,7 +31,8 @@ def remove_legend(thing: bpy.types.Object) -> None:
 def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
     """Add a card with a colour bar and a scale bar of 5 mm to a sensor, in place of another; works without the add-on.
 
-    title : what the colours say; ends : what stands at the bar's ends, None where there is no bar
+    style : whose ramp of colours the bar shows; title : what the colours say
+    ends : what stands at the bar's left and right end, None where there is no bar
     """
     remove_legend(thing)
     row = -_EDGE - _LETTERS

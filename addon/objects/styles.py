@@ -31,7 +31,7 @@ def get_ready(thing: bpy.types.Object) -> None:
 
 
 def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
-    """Give a sensor one style in place of another.
+    """Give a sensor a style, a key of STYLES, in place of another.
 
     largest : value at the colours' upper end, object's units or counts; exaggeration : how many times the dent is drawn
     """

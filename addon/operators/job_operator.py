@@ -13,7 +13,8 @@ _STEP = 0.1  # s between polls of the worker
 
 
 class JobOperator(TactileOperator):
-    """Base of operators with a job: ``begin`` starts ``_job``, or leaves it None; ``finish`` takes the result."""
+    """Base of operators with a job: ``begin`` starts ``_job``, or leaves it None; ``finish`` takes the result.
+    stopped : what is reported after Esc"""
 
     stopped: ClassVar[str] = "Stopped; the scene is as it was"
     _job: Job | None = None

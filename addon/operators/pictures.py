@@ -40,11 +40,12 @@ def draw(
     stopped: Callable[[], bool] = lambda: False,
     better: Callable[[np.ndarray], None] = lambda picture: None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m, (width, height) pixels large, by a preset.
+    """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m by a preset; size : (width, height) px, None for the
+    calibration's.
 
     The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Pictures that get better,
-    up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` where
-    stopped() is true.
+    up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` once
+    stopped(), which is asked again and again, returns true.
     """
     return _drawn_of(*shown_state(gel, depsgraph, size), preset, stopped, better)
 

@@ -88,7 +88,8 @@ def _translator(weights: str, source: str | None, answer: Answer, _changed: int)
 
 
 def translator_of(asked: RecordingOptions, path: str) -> Translator:
-    """Return the networks in a folder, else those that ship for a recording. Raises TactileError without networks."""
+    """Return the networks in the folder of the options `asked`, else those that ship for the recording `path`. Raises
+    TactileError without networks."""
     folder = _absolute(asked.weights)
     source = None if folder else readers.sensor_of_first([path])
     answer = Answer(frames_apart=asked.apart, contacts=2 if asked.two else 1)

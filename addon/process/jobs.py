@@ -30,7 +30,8 @@ class Job:
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
-        """Start the worker. folder : of its input and output; listening : whether it waits for ``tell``."""
+        """Start the worker on a job of a kind, one of ``worker.JOBS``. folder : of its input and output; options :
+        what else job.json says; listening : true if it waits for what ``tell`` sends"""
         self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
         self.drawn = 0
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")

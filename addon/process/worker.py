@@ -3,6 +3,7 @@
 Started by ``jobs.Job`` as `python worker.py FOLDER` with ``tactile_core`` on its path. FOLDER/job.json says what to do;
 each line on stdout is a JSON object: {"stage": "..."}, {"done": 3, "total": 10}, {"drawn": true} for a picture that
 can be shown, {"error": "..."} or {"finished": true}. No bpy here.
+A job is a function of FOLDER, job.json's content, and progress, to be called with (done, total).
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ def say(**message: Any) -> None:
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
     """Simulate FOLDER/scene.toml into recording.h5 and result.npz: its truth, and the indenter's place on each frame.
 
-    job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None.
+    job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None;
+    job["seed"] : of the noise; job["placed_on"] : sensor that places refer to; job["first_frame"], job["rate"] : of the
+    scene, frames per second, to name the frame in errors
     With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
     """
     from tactile_core.errors import TactileError

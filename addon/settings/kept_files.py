@@ -20,7 +20,8 @@ _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
 def folder(name: str) -> Path:
-    """Return the folder ``name`` beside the .blend, or Blender's own where that was never saved; it may not exist."""
+    """Return the folder ``name``, CACHE or SIMULATIONS, beside the .blend, or Blender's own where that was never saved;
+    it may not exist. Mesh caches that lie in Blender's own for over _DAYS are removed."""
     if bpy.data.is_saved:
         return Path(bpy.path.abspath(f"//{name}"))
     for old in _own(name).glob("*.pc2"):

@@ -17,7 +17,8 @@ def budget_of(scene: bpy.types.Scene) -> Budget:
 
 
 def preset_of(scene: bpy.types.Scene) -> str:
-    """Return a scene's preset, or the cheapest within its bound on pictures. Raises TactileError."""
+    """Return a scene's preset, or the cheapest within its bound on pictures. Raises TactileError for a text that is no
+    bound, and for a bound that no preset keeps."""
     levels = budget_of(scene).levels
     if levels is None:
         return scene.tactile_render.preset

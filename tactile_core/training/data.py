@@ -39,7 +39,9 @@ class Batch:
 
 class Contacts:
     """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i.
-    electrodes : how many a signal has; rest : (e,) counts of the unit that changes are from
+    frames : role (of PAIR) -> moving frame; generator : of the random numbers that the bases begin with
+    biotac, digit : `SurfaceCodec` of each role; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
+    rest : (e,) counts of the unit that changes are from
     device : where batches go; the contacts themselves stay in the host's memory"""
 
     def __init__(

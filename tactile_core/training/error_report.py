@@ -40,7 +40,8 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks on the test presses, with the training's noise on the signals; rows : (C,) contacts"""
+    """The exported networks, and the test presses, rows (C,), with their signals change (C, 19) counts, noise included.
+    bodies : surfaces of the sensors; seed : of the training, by which noise is drawn"""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
         self.networks, self.contacts, self.bodies, self.seed = networks, contacts, bodies, seed

@@ -66,8 +66,8 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
     """Read a recording with contact places and forces (Narang et al.: contact_loc, force_vec) for the gel's frame.
 
     Places are assumed in SynTouch's frame of the electrodes (docs/sources.md), in m or mm by their size, and are
-    unrolled onto the gel; of forces only the magnitude is used, whatever their frame. Raises TactileError: no labels,
-    places that are not on the skin, too few contacts."""
+    unrolled onto the gel; of forces only the magnitude is used, whatever their frame. seed : of the split into presses
+    Raises TactileError: no labels, places that are not on the skin, too few contacts."""
     recording = read(path)
     position, forces = recording.position, recording.force
     if position is None or forces is None:
@@ -149,8 +149,9 @@ def fine_tune(
 
     out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of.
     weights_folder : the weights to begin with, None for those that ship; progress : see `train.train`
+    seed : of the split and of the order of training; overwrite : true replaces weights in out_folder
     Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that
-    holds weights already, but to overwrite them."""
+    holds weights already, unless `overwrite`."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)

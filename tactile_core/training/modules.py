@@ -18,7 +18,7 @@ from .surface_codec import SurfaceCodec
 
 
 class Plain(nn.ModuleList):
-    """Linear layers with ReLU between them."""
+    """Linear layers with ReLU between them; sizes : number of inputs, then of each layer's outputs"""
 
     def __init__(self, sizes: tuple[int, ...]) -> None:
         super().__init__(nn.Linear(*pair) for pair in zip(sizes[:-1], sizes[1:], strict=True))
@@ -45,7 +45,8 @@ class Block(nn.Module):
 
 
 class Residual(nn.Module):
-    """Residual MLP with a linear skip from input to output (docs/sources.md, Networks)."""
+    """Residual MLP of `blocks` blocks of a width, with a linear skip from input to output (docs/sources.md,
+    Networks)."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
         super().__init__()
@@ -65,8 +66,8 @@ class Residual(nn.Module):
 
 class ContactPosterior(nn.Module):
     """S2MPN or R2MPN: the posterior of a contact given a signal's latent, and the BioTac's latent given both. A mixture
-    of Gaussians over the contact's state (mixture density network, Bishop 1994) and a network from signal and state to
-    the latent of the BioTac's dent: shapes are never averaged over places and depths."""
+    of C Gaussians (`components`) over the contact's state (mixture density network, Bishop 1994) and a network from
+    signal and state to the latent of the BioTac's dent: shapes are never averaged over places and depths."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
         super().__init__()

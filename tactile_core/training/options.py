@@ -23,9 +23,10 @@ class Options:
     latent_* : numbers in a latent; of a mesh's, two are the place of the dent
     wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
+    width, blocks : of the residual MLPs; batch : contacts in a step of training
     components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
-    epochs : stage -> passes over the training contacts; `effort` multiplies all of them. More make simulated contacts
-        better, not real recordings (docs/train.md)
+    *_epochs : of each stage, passes over the training contacts; `effort` multiplies all of them. More make simulated
+     contacts better, not real recordings (docs/train.md)
     parts_steps : batches, times `effort`, of the network that separates two contacts; more hardly lower its error on
         held-out presses
     beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
@@ -116,7 +117,8 @@ class Options:
 
 
 def device_of(name: str) -> torch.device:
-    """Return one of DEVICES. Raises TactileError for another name, and for a GPU that torch does not see."""
+    """Return the torch device of a name in DEVICES. Raises TactileError for another name, and for a GPU that torch does
+    not see."""
     import torch
 
     if name not in DEVICES:

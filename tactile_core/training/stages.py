@@ -1,4 +1,6 @@
-"""The networks together, and the stages they are trained in."""
+"""The networks together, and the stages they are trained in.
+A stage's loss is a function of model, contacts, a batch of them, options, and the generator that posteriors are sampled
+with; it returns the number (a tensor of no axes) that training reduces."""
 
 from __future__ import annotations
 

@@ -127,7 +127,8 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
     """Return errors of displacement found (C, n, 3) m against the true one: moving nodes' rms, largest, core's height
-    (um), and peak (%; NaN where the true one is below PEAK_FROM). name : before each column's"""
+    (um), and peak (%; NaN where the true one is below PEAK_FROM). name : before each column's
+    depth : displacement (C, n, 3) m -> each node's depth (C, n) m, by which core and peak are found"""
     metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     metrics["peak_depth_percent"] = np.where(deep, metrics["peak_depth_percent"], np.nan)

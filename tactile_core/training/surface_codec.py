@@ -66,7 +66,9 @@ class SurfaceCodec:
     place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
     baseline : m, loss of no displacement, mean over training contacts
-    In the methods, rows (B,) are contact indices, D + i for the mirror image of i, SILENT for no contact"""
+    In the methods, rows (B,) are contact indices, D + i for the mirror image of i, SILENT for no contact. Arguments:
+    data (D, n, 3) in the sensor's own frame, rows (R,) of the training contacts, numbers `wide`, `near` of basis
+    fields, generator of the bases' random start, mirrored, true to add the mirror images"""
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,

@@ -56,6 +56,7 @@ def train(
 
     Writes out_folder/weights/<net>.safetensors and card.json (for `networks.load`), log.csv, loss.png; meanwhile
     checkpoint.npz, from which the next call with the same arguments continues.
+    seed : of all that is drawn; options : sizes and lengths, None for the defaults; overwrite : true replaces weights
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
     frame : sensor, half a window's cells -> the frame that moves over its surface
@@ -125,7 +126,7 @@ def check_surfaces(pairs: Pairs, path: str | os.PathLike) -> None:
 def prepared_folder(out: Path, overwrite: bool) -> Iterator[None]:
     """Make the folder `out`, for one training at a time; after an error a new folder that is empty is removed.
 
-    Raises TactileError if it cannot be made, is being written, or already holds weights, but to overwrite them.
+    Raises TactileError if it cannot be made, is being written, or already holds weights, unless `overwrite`.
     (Weights beside a checkpoint are of a training that was killed after it wrote them, and can be continued.)"""
     new = [folder for folder in (out / "weights", out) if not folder.exists()]
     try:
@@ -159,7 +160,8 @@ def deterministic() -> Iterator[None]:
 
 
 def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress: Progress) -> list[list]:
-    """Run the stages that are left; returns the log rows (stage, epoch, train, validation). progress : see `train`"""
+    """Run the stages that are left; returns the log rows (stage, epoch, train, validation).
+    path : the checkpoint, read at first and written now and then; progress : see `train`"""
     identity = {
         "pairs": contacts.pairs.sha256,
         "seed": seed,

@@ -44,7 +44,8 @@ def train_parts(
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
     """Train on the split's training presses; returns tensors as `networks.py` names them.
-    rest : (e,) counts of the unit that changes are from. The same arguments give the same numbers.
+    rest : (e,) counts of the unit that changes are from; sensor : whose electrodes, by name; seed : of what is drawn
+    The same arguments give the same numbers.
     progress : called now and then with the share done (0 to 1) and a line of text"""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)

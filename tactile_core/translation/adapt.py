@@ -186,7 +186,8 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
 
 
 def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
-    """Return a unit of which only the rest is known, from a recording of the untouched finger. Raises TactileError."""
+    """Return a unit of which only the rest is known, from a recording of the untouched finger. Raises as `read_rest`
+    does."""
     name = os.path.basename(path)
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 
@@ -229,8 +230,8 @@ def _contacts(signals: Signals) -> np.ndarray:
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
     """Fit gains and offsets to change (n, 19) counts, the frames in contact of all recordings, by simulated contacts'
-    typical signals; note : how it was fitted, kept in the result. Raises TactileError for less than half a second of
-    frames, and for fewer than FEWEST_CONTACTS different contacts."""
+    typical signals. rectified : true if change has lost its signs; note : how it was fitted, kept in the result
+    Raises TactileError for fewer than FEWEST_FRAMES frames, and for fewer than FEWEST_CONTACTS different contacts."""
     frames = len(change)
     if frames < FEWEST_FRAMES:
         advice = "Use recordings with more contact"

@@ -72,8 +72,8 @@ class Answer:
 def parse_answer(
     kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int, contacts: int = 1
 ) -> Answer:  # fmt: skip
-    """Return the options of a command line; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises TactileError for a
-    shift or a number of samples out of range."""
+    """Return the options of a command line, as of `Answer`; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
+    TactileError for a shift or a number of samples out of range."""
     if not 0 <= samples <= MOST_SAMPLES:
         raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")
     shift = (0.0, 0.0) if mount_shift is None else parse_shift(mount_shift)

@@ -121,7 +121,8 @@ def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return error and baseline, um, of the translation on held-out presses; None for a card without that row."""
+    """Return the rms error of the translated gel on held-out presses, and that of no displacement (the baseline), um;
+    None for a card without that row."""
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):

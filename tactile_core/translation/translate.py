@@ -76,7 +76,8 @@ class PreparedRows:
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
         unit: ElectrodeGains | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a recording for rising frames (T,); raises TactileError like `Preparer`."""
+        """Prepare a recording for rising frames (T,), and for their neighbours where `answer` tracks the contact.
+        options, unit : of the preparation, see `Preparer`, whose TactileErrors it raises"""
         rows, self.count = needed(frames, len(recording)) if answer.follows else frames, len(recording)
         if 2 * len(rows) > self.count:  # a copy would take more than it lets go
             self._rows, self.recording = np.arange(self.count), recording

@@ -53,8 +53,7 @@ DENIED = "PDC shows another pressure than that of the contact: drift, rest under
 
 
 def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: float = 0.0) -> bool:
-    """Return whether a frame is a guess, by its confidence 0..1 and the bits of its flags, or by the error of its
-    shape.
+    """Return true if a frame is a guess, by its confidence 0..1, the bits of its flags, or the error of its shape.
     expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where unknown"""
     doubted = confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS)
     return bool(doubted or (dent > 0 and expected_error > MOST_OF_DENT * dent))
