@@ -96,7 +96,7 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Measure `tactile convert` by what it keeps, and `tactile render` by the fast preset; folder : for scratch"""
+    """Measure, by name, `tactile convert` for each thing kept, and the fast `tactile render`; folder : for scratch"""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}

@@ -146,6 +146,7 @@ def _array(name: str, values: np.ndarray) -> str:
 
 
 def _checked(path: str | os.PathLike, name: str, values: np.ndarray, count: int) -> np.ndarray:
+    """Check ``count`` rows of values (count, ...) to be written; return them, floats but for nodes as float32."""
     values = np.asarray(values)
     if len(values) != count or values.ndim > 2:
         raise TactileError(path, f"{name} of shape {values.shape}", f"{count} rows")

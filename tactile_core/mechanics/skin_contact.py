@@ -180,6 +180,7 @@ def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -
 
 
 def _dent(displacement: np.ndarray) -> _Dent:
+    """Describe the dent of a skin under displacement (n, 3) m. Raises TactileError where nothing presses on the pad."""
     outward = sensors.rest_normals(SENSOR)
     inward = -np.einsum("ni,ni->n", displacement, outward)
     traction = pressing_traction(SENSOR, displacement, inward > MAYBE * max(inward.max(), 0.0))

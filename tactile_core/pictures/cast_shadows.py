@@ -35,6 +35,7 @@ class ShadowCaster:
             found = f"{(led.position[2] + led.radius) * 1e3:.1f} mm high"
             expected = f"well below the camera, {camera.apparent_height * 1e3:.1f} mm"
             raise TactileError(f"led {led.colour}, position", found, expected)
+        # The LED under the map, ``foot``; then the polar grid about it, where pixels lie in it, and it in pixels.
         near = 1 - led.position[2] / camera.apparent_height
         foot = self.foot = tuple(value / near for value in led.position)
         right, down = np.meshgrid(camera.right, camera.down)

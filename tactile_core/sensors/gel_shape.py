@@ -89,6 +89,7 @@ class GelShape:
         return float((self.back_y - on_dome[1]) / -outward[1])
 
     def _half_width_at(self, x: np.ndarray) -> np.ndarray:
+        """Return the outline's half width (...) m at x (...) m, rounded at the ends."""
         corner = self._outline.corner_radius
         if self._outline.tip == ROUND:
             tip = np.sqrt(np.maximum(self.half_width**2 - np.minimum(x - self.arc_x, 0) ** 2, 0))

@@ -29,7 +29,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def rolled_x(sensor: str) -> np.ndarray:
-    """Unrolled x (stations,) m of a skin's stations: ``origin_x``, plus arc length from there along the lowest line."""
+    """Unrolled x (stations,) m of a skin's stations: ``origin_x``, plus the arc length from there to the station along
+    the lowest line, negative toward the tip."""
     skin = skin_of(sensor)
     origin = skin.descriptor.unrolling.origin_x
     line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles))]

@@ -93,6 +93,8 @@ class _Other:
         return order
 
     def _assemble(self, gradient: np.ndarray) -> None:
+        """Compute energy, force, tangent, and coupling, mass and gap of the pressures, by the displacement's gradient
+        (3, 3, cell, point); stress and tangent are derivatives of the energy by complex steps of F."""
         import skfem
 
         shear = _MATERIAL.youngs / (2 * (1 + _MATERIAL.poisson))

@@ -28,8 +28,8 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Promise:
-    """Stated 95 % bounds ``bound`` and measured errors ``found``, both (C,) in ``unit``; groups : (C,) names, one
-    each"""
+    """Stated 95 % bounds ``bound`` and measured errors ``found``, both (C,) in ``unit``.
+    name : of what is bounded; groups : (C,), each contact's group; of : the contacts, in words"""
 
     name: str
     unit: str

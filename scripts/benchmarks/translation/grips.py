@@ -90,6 +90,7 @@ def unexplained(several: list[Signals]) -> float:
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
+    """Judge every finger in the grips' files ``hard``, as it is and with its electrodes in a random order."""
     shuffle = np.random.default_rng(0).permutation(len(electrodes()))
     results, baseline = [], []
     for path in hard:

@@ -75,7 +75,8 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Each touchable node's row (m,) of ``move``, whether it is its image's (m,) bool; all nodes' images (n,)."""
+        """For each touchable node the number (m,) of the one of r whose rows of ``move`` answer for it, and if that is
+        its mirror image, (m,) bool; then every surface node's image (n,)."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE

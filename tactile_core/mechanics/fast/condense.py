@@ -96,6 +96,8 @@ class _Elimination:
     def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: csc_array, parity: int) -> None:
         from scipy import sparse
 
+        # Unknowns: axes of nodes with z >= 0 ("speaks"). ``dof``, ``sign`` (3 n,) give for each node's axis the unknown
+        # that its motion is, times the sign; -1 where it cannot move.
         image = mirror_nodes(mesh.nodes)
         z = mesh.nodes[:, 2]
         plane = image == np.arange(len(z))
@@ -145,6 +147,7 @@ class _Elimination:
         return self._eliminate(cells, parts)
 
     def _eliminate(self, cells: np.ndarray, parts: list) -> tuple[np.ndarray, np.ndarray]:
+        """Sum the parts of a group of cells, and eliminate unknowns that no other cell has (Schur complement)."""
         from scipy.linalg import lapack, solve_triangular
 
         uses = np.zeros(self.free, int)
@@ -206,6 +209,7 @@ class MirrorSymmetry:
         return self._joined(even, odd, np.arange(len(even)), np.ones(len(even), np.float32))
 
     def _joined(self, even: np.ndarray, odd: np.ndarray, rows: np.ndarray, sign: np.ndarray) -> np.ndarray:
+        """Return motions (w, 3 n) by rows (w,) of the halves: even + sign odd at z >= 0; below, even - sign odd."""
         both = np.empty((2, len(self._sign)), np.float32)
         joined = np.empty((len(rows), len(self._place)), np.float32)
         for motion, row, mirrored in zip(joined, rows, sign, strict=True):

@@ -136,6 +136,8 @@ class ContactProblem:
         return contact
 
     def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
+        """Solve in one step: choose the nodes that may touch and where they begin, then go on as ``_rounds``.
+        axial_force : N, None for the pose's depth"""
         before = start or self._nothing(self.pose)
         moved = self._moved(before)
         gap, _ = self._distance(pose, self.near, moved)
@@ -190,6 +192,7 @@ class ContactProblem:
         return dataclasses.replace(contact, converged=False)
 
     def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
+        """Solve for the candidates, without or with friction; None where that fails. Arguments as in ``_rounds``."""
         self.work.check()
         block = self._block
         if block is None or not (

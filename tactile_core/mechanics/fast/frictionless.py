@@ -183,6 +183,7 @@ class Frictionless:
         return now - model.matrix @ solved.pressing
 
     def _complement(self, model, offset, normal, active, axial_force) -> Pressing:  # noqa: ANN001
+        """Solve the linearised problem; for a force, with at most ``_LARGEST_STEP`` of depth in this iteration."""
         matrix = model.matrix
         if axial_force is None:
             return complement(matrix, offset, active, factors=model.factors)
@@ -250,6 +251,7 @@ class Frictionless:
         return force, change[self.block.k :]
 
     def _settled(self, state: Try, gap, normal, step, axial_force) -> bool:  # noqa: ANN001
+        """Return true if gaps are closed, forces press along the normals as they are now, and the force is reached."""
         active = state.active[: len(gap)]
         if not active.any():
             return bool((gap > -GAP_TOLERANCE).all()) and axial_force is None

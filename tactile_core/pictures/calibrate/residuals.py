@@ -119,6 +119,7 @@ class UnitResiduals:
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
+        # Slopes per mm become slopes per m.
         slopes = [tuple(tuple(1e3 * value for value in row) for row in part) for part in (right, down)]
         try:
             gain = Response(centre, *slopes)
