@@ -97,7 +97,7 @@ def _tier_table(rows: list[Row]) -> list[str]:
         cells = [tier]
         for sensor in ("digit", "biotac"):
             name, quick = f"{sensor}_{tier}_0.6mm", tier == "fast"
-            cells += [
+            cells += [  # only the reference tier's time is recorded in s, not ms
                 number(f"{name}_time", "ms" if quick else "s", 1e-3 if tier == "full" else 1.0),
                 number(f"{name}_shape_rms", "um"),
                 number(f"{name}_force_error", "%"),

@@ -126,8 +126,8 @@ def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContac
 
 
 def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield the times of loading four meshes, and of ``count`` contacts of the DIGIT by formula, then as meshes, with
-    the difference of force."""
+    """Yield name, times and remarks of loading four meshes, and of ``count`` contacts of the DIGIT by formula, then as
+    meshes, with the difference of force."""
     import trimesh
 
     made = trimesh.creation

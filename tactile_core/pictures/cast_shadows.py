@@ -107,7 +107,7 @@ class ShadowCaster:
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
         """Return sight (rows, columns) at distances r from the foot, where the mapped field has heights h(r): ((foot -
-        h(r)) / r - horizon) radii, with horizon = max over steps d of (h(r - d) - h(r)) / d.
+        h(r)) / r - horizon) radii, -1 to FREE, with horizon = max over steps d of (h(r - d) - h(r)) / d.
         field : (rows, columns) m, h in the part ``polar`` of the polar grid; reach : columns of the longest shadow"""
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
@@ -127,7 +127,8 @@ class ShadowCaster:
 
 @functools.cache
 def march_steps(reach: int) -> tuple[int, ...]:
-    """Return the steps of a march of ``reach`` columns: 1 at first, then a tenth of the way (long shadows are wide)."""
+    """Return the distances, columns up to ``reach``, at which a march looks: 1 apart at first, then a tenth of the way
+    (long shadows are wide)."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)

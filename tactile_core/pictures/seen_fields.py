@@ -31,7 +31,7 @@ def seen_fields(
     fields = np.moveaxis(surface.grid(values)[surface.window], -1, 0).astype(np.float32)
     along, across = surface.window_axes
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
-    aside = np.zeros((2, *seen.shape), np.float32)
+    aside = np.zeros((2, *seen.shape), np.float32)  # how far the point seen has moved: it rested at x - aside[0], ...
     for _ in range(_STEPS):
         row, column = (x - aside[0] - along.start) / along.step, (z - aside[1] - across.start) / across.step
         at_rest = lookup(row.astype(np.float32), column.astype(np.float32), fields.shape[1:])

@@ -223,7 +223,7 @@ class Calibration:
 
     @property
     def pixel_response(self) -> np.ndarray:
-        """Response (H, W, 3, 3) at each pixel of the camera, channel by LED."""
+        """Response (H, W, 3, 3) at each pixel of the camera, channel by LED: levels shown per level of an LED."""
         return self.response.matrices(self.camera)
 
     @property

@@ -66,7 +66,7 @@ def typical_rest(name: str) -> np.ndarray | None:
 
 @functools.cache
 def contacts_of(name: str) -> np.ndarray | None:
-    """Load changes (P, e) float64 counts of simulated contacts; None if the descriptor names no table of them. Raises
+    """Load changes (contacts, electrodes) float64 counts by simulation; None if the descriptor names no table. Raises
     TactileError for a sensor without electrodes, or a bad table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contacts)

@@ -29,8 +29,8 @@ WHOLE = np.array([[0.0, 1.0, 1.0]])  # ``Learned.trust`` of a correction that is
 
 
 class Known(NamedTuple):
-    """n samples. x : (n, f) features; log_ratio : (n,) of the full tier's force to the fast one's
-    fields : (n, g, 3), per metre of depth; fold : (n,) in which it is held out; rubbing : (n,) bool, with friction"""
+    """n samples. x : (n, f) features; log_ratio : (n,), natural, of the full tier's force to the fast one's
+    fields : (n, g, 3), as ``Learned.field``; fold : (n,) when it is held out; rubbing : (n,) bool, with friction"""
 
     x: np.ndarray
     log_ratio: np.ndarray

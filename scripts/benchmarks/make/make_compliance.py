@@ -103,7 +103,8 @@ def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
 
 
 def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """Cluster points at places (n, 2) m; also return the order (n,) with the largest clusters' details first."""
+    """Cluster points at places (n, 2), row and column; return ``Segment.clusters``, renumbered, and the order (n,) to
+    put points in: largest clusters' details first."""
     clusters: list[tuple[np.ndarray, np.ndarray]] = []
     level = np.zeros(len(places), int)
     linear = np.column_stack([np.ones(len(places)), places])

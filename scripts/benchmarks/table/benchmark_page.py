@@ -41,7 +41,7 @@ def as_line(method: Method) -> str:
 
 
 def short(value: float | None) -> str:
-    """Format a value with three digits, of the four that a row keeps."""
+    """Format a value with three digits, of the four that a row keeps, from 100 on without decimals; "" for None."""
     if value is None:
         return ""
     kept = float(f"{value:.4g}")

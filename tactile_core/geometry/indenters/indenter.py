@@ -83,7 +83,6 @@ _OWN_DOWN = np.array([0.0, 0.0, -1.0])
 @dataclasses.dataclass(frozen=True)
 class Pose:
     """Position and orientation of an indenter: own origin at ``apex`` (3,) m, own axes as columns of ``axes`` (3, 3).
-
     push : unit vector (3,) of the sensor's frame along which the indenter moves; None for its own -z
     Raises TactileError for a number that is nan or infinite.
     """

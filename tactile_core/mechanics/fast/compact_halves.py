@@ -24,10 +24,8 @@ TILE = 256  # rows and columns transposed at a time: they fit in a processor's c
 
 
 class Segment(NamedTuple):
-    """Unknowns ``first`` to ``last`` of a matrix, those of a point side by side, and the clusters of its points.
-
-    axes : unknowns per point; clusters : points (k,) and the transform of their motions (k, k), smallest cluster first
-    """
+    """Unknowns ``first`` to before ``last`` of a matrix, those of a point side by side, and the clusters of its points.
+    axes : unknowns per point; clusters : points (k,) and the transform of their motions (k, k), parts before wholes"""
 
     first: int
     last: int

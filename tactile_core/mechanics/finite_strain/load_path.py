@@ -81,7 +81,7 @@ class LoadPath:
         return found
 
     def _otherwise(self, step: Step, guess: float, failure: TactileError) -> Solution:
-        """Solve the step in the other ways of ``to``; raise the failure, or the finer mesh's, where none finds it."""
+        """Solve the step in ``to``'s other ways from a guess; raise the failure, or the finer mesh's, if none can."""
         if self.tier == "full" and self.spacing == 1:
             self._remake(_FINER)
             try:

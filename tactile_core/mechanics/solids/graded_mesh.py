@@ -78,7 +78,7 @@ class GradedMesh:
         return rows, columns
 
     def _carry(self, values: np.ndarray, to_rows: np.ndarray, to_columns: np.ndarray) -> np.ndarray:
-        """Interpolate values (n_surface, k) by matrices like the class's; a skin's poles count as whole rows."""
+        """Interpolate values (n_surface, k) by to_rows, to_columns as the class has; poles count as whole rows."""
         i, j = to_rows.shape[1], to_columns.shape[1]
         k = values.shape[1]
         if len(values) == i * j:

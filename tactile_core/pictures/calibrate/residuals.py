@@ -160,7 +160,7 @@ class UnitResiduals:
         return np.array([np.square(missed).sum() / np.square(sight.shown).sum() for (missed, _), sight in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
-        """Return the standard errors of the gain and its two slopes, rms over LEDs, at the last cost's presses."""
+        """Return standard errors of the gain and its two slopes, per mm, rms over LEDs, at the last cost's presses."""
         inverse = np.linalg.inv(self._gain_equations()[0])  # (channel, 9, 9)
         squares = MODEL_ERROR**2 * inverse.diagonal(0, 1, 2).mean(0).reshape(3, 3).mean(1)
         return tuple(np.sqrt(squares).tolist())
