@@ -23,8 +23,7 @@ def to_blender(points: np.ndarray, per_metre: float) -> np.ndarray:
 
 
 def to_sensor(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """Convert points or displacements (..., 3), ``per_metre`` Blender units per metre, to float64 m: undoes
-    to_blender."""
+    """Convert points or displacements (..., 3), ``per_metre`` units in a metre, to float64 m: undoes to_blender."""
     x, y, z = np.moveaxis(np.asarray(points, np.float64) / per_metre, -1, 0)
     return np.stack([x, -z, y], -1)
 

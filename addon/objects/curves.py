@@ -65,7 +65,7 @@ def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.
 
 
 def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
-    """Return the keyed values (T,) of one F-curve, none where there is none."""
+    """Return the keyed values (T,) of one F-curve, by data path and index, none where there is none."""
     curve = fcurves_of(owner).find(path, index=index)
     if curve is None:
         return np.zeros(0)

@@ -9,8 +9,7 @@ from . import axes
 
 
 def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes and units, ``per_metre`` per
-    metre."""
+    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes, ``per_metre`` units a metre."""
     right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
     return axes.to_blender(np.stack([x, camera.height_zero_y + toward, z], -1), per_metre)

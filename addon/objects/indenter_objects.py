@@ -1,4 +1,7 @@
-"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them."""
+"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them.
+
+`thing` is an indenter's object; `depsgraph` holds the scene on this frame, keys and modifiers applied.
+"""
 
 from __future__ import annotations
 

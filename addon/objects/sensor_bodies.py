@@ -39,7 +39,7 @@ def add_parts(thing: bpy.types.Object) -> None:
 
 
 def stack(part: dict[str, Any], middle: list[float], border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Build one part, a stack of rings: nodes (n, 3) mm and triangles (m, 3), outward.
+    """Build one part, a stack of rings: nodes (n, 3) mm in its sensor object's axes, triangles (m, 3), outward.
 
     part : a table of ``sensor_bodies.toml``; middle : (2,) mm of its outline
     border : (k, 3) mm, outline of the gel's surface; (0, 3) for other sensors

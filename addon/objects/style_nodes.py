@@ -40,7 +40,7 @@ def group(style: str) -> bpy.types.NodeTree:
 
 
 def input_of(tree: bpy.types.NodeTree, name: str) -> str:
-    """Return the key by which a modifier holds the value of a group's input."""
+    """Return the key by which a modifier holds the value of an input, called name, of a group, tree."""
     return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
 
 
@@ -56,7 +56,7 @@ def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.ty
 
 
 def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
-    """Set the value of a group's input in a modifier."""
+    """Set the value of a group's input, called name, in a modifier."""
     if hasattr(modifier, "properties"):
         setattr(*input_property(modifier, name), value)
     else:
@@ -64,14 +64,14 @@ def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> No
 
 
 def get_input(modifier: bpy.types.NodesModifier, name: str) -> object:
-    """Return the value of a group's input in a modifier."""
+    """Return the value of a group's input, called name, in a modifier."""
     if hasattr(modifier, "properties"):
         return getattr(*input_property(modifier, name))
     return modifier[input_of(modifier.node_group, name)]
 
 
 def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
-    """Return the data path of a group's input, from its modifier on."""
+    """Return the data path of a group's input, called name, from its modifier on."""
     key = input_of(modifier.node_group, name)
     return f".properties.inputs.{key}.value" if hasattr(modifier, "properties") else f'["{key}"]'
 

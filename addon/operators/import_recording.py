@@ -181,8 +181,7 @@ def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.nd
 
 
 def plays(skin: bpy.types.Object, found: recording_data.Translated) -> bool:
-    """Return true if an imported skin's signals and forces are those found; false once another unit or tare is
-    chosen."""
+    """Return true if an imported skin's signals and forces are those found; false once another unit or tare is set."""
     values = found.columns()
     shown = {name: values[name].astype(np.float32).T for name in ("electrodes", "force")}
     return all(np.array_equal(curves.values_of(skin, f'["{name}"]', k), row) for name, rows in shown.items()

@@ -53,7 +53,7 @@ def draw(
 def shown_state(
     gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int] | None = None
 ) -> tuple[digit_unit.ShownUnit, np.ndarray]:
-    """Return what a picture is drawn of: the unit that the scene shows, and the gel's displacement (n, 3) m."""
+    """Return the unit that the scene shows, at a picture's size (see ``draw``), and the gel's displacement (n, 3) m."""
     moved = digit_objects.displacement_of(gel, depsgraph)  # first: it says what else would be a wrong camera
     unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
     return digit_unit.shown_unit(gel, depsgraph, unit), moved

@@ -110,7 +110,7 @@ def fingers(path: str) -> list[str]:
 
 
 def write_columns(path: str, asked: RecordingOptions) -> str:
-    """Write a guessed map of columns where the map's file is missing; return a sentence, "" if nothing was."""
+    """Write a guessed map to asked.columns where that file is missing; return a sentence, "" if nothing was written."""
     file = _absolute(asked.columns)
     if not file or os.path.lexists(file):
         return ""

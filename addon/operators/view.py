@@ -152,7 +152,7 @@ def fit_timeline(context: bpy.types.Context) -> None:
 
 
 def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Sequence[bpy.types.Object] = ()) -> None:
-    """Select the objects, colour solid views by object, and frame them with their neighbours and parts.
+    """Select `things`, the first active, colour solid views by object, and frame them, their parts and those `beside`.
 
     Views that show a style's colours go on. Without a window, select only.
     """

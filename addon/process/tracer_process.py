@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 
 class Tracer:
-    """A worker that draws height maps by one preset, until it is closed; the unit may change between pictures."""
+    """A worker that draws height maps by one preset, until closed; unit, and what is around it, may change between."""
 
     def __init__(self, preset: str) -> None:
         self._folder, self._count, self._unit = JobFolder(), 0, ""

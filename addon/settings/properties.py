@@ -133,8 +133,7 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
 
 
 def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "") -> TactileObject:
-    """Set an object's role, ``per_metre`` Blender units per metre and, for a skin or gel, sensor; return its
-    properties."""
+    """Set an object's role, ``per_metre`` units a metre and, of a skin or gel, its sensor; return its properties."""
     about = thing.tactile
     about.role, about.per_metre, about.sensor, about.format = role, per_metre, sensor, FORMAT
     return about
@@ -163,7 +162,7 @@ def role_of(sensor: str) -> str:
 
 
 def sensor_items(gels_only: bool = False) -> list[tuple[str, str, str]]:
-    """List the sensors with a descriptor, or their gels alone, for a menu, the usual pair first."""
+    """List the sensors with a descriptor, or (gels_only) those with a gel, as a menu's items, the usual pair first."""
     return _items(descriptor.names(), gels_only)
 
 

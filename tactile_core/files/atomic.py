@@ -260,8 +260,7 @@ def writing(
     expected: str = "a writable folder",
     advice: str = "Make room, or name another --out folder",
 ) -> Iterator[None]:
-    """Turn an OSError of writing ``path``, such as that of a full disk, into a TactileError that says what was
-    `expected`, with `advice`."""
+    """Turn an OSError of writing ``path``, as of a full disk, into a TactileError with `expected` and `advice`."""
     try:
         yield
     except OSError as error:

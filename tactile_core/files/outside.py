@@ -110,7 +110,7 @@ def _size(count: int) -> str:
 def damage_reported(
     where: str | os.PathLike, what: str, advice: str = "Copy or export the recording again"
 ) -> Iterator[None]:
-    """Turn any error of a file library into a TactileError on `what`, a word for the file, damaged at `where`."""
+    """Turn any error of a file library into a TactileError, with advice, on `what`, a word for the file `where`."""
     try:
         yield
     except (TactileError, MemoryError):

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Sums by stage of wall time, `seconds`, and of this process's CPU time, `cpu_seconds`; a stage may be entered
-    many times."""
+    """Sums by stage of wall time, `seconds`, and of this process's CPU time, `cpu_seconds`; a stage may come again."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -26,8 +25,7 @@ class Stopwatch:
             self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + time.process_time() - cpu_start
 
     def per_frame(self, count: int) -> dict[str, dict[str, float]]:
-        """Return ms per frame (of `count`) of each stage and of all, by the wall clock and by the CPU, which is
-        steady."""
+        """Return ms per frame (of `count`) of each stage and of all, by the wall clock and by CPU time."""
         return {"ms_a_frame": _per_frame(self.seconds, count), "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count)}
 
 

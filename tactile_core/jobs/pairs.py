@@ -1,6 +1,6 @@
 """Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data. Press i draws all it
 needs from (seed, i), so any number of workers makes the same file, and an interrupted run continues with the missing
-blocks of presses."""
+blocks of presses. `prepare_input`, `make` and `inspect_input` are called as ``engine.recipes`` says."""
 
 from __future__ import annotations
 

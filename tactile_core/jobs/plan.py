@@ -86,8 +86,7 @@ def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[st
 
 
 def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
-    """Plan `tactile pairs` of `count` in the fast tier; a sensor of the pair without measured cost counts 0 and is
-    marked."""
+    """Plan `tactile pairs` of `count` in the fast tier; a sensor without measured cost counts 0 and is marked."""
     parts = []
     for sensor in pair:
         what = f"{title(sensor)} contacts"

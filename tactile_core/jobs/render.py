@@ -133,8 +133,7 @@ def choose_preset(options: Options) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration in pixels of height maps, heights (H, W), or of size (width, height); TactileError if both
-    and they differ."""
+    """Return the calibration at a size (width, height), or height maps' (H, W), px; TactileError where they differ."""
     if heights is not None:
         height, width = heights
         if size not in (None, (width, height)):

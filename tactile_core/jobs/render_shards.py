@@ -1,4 +1,6 @@
-"""`tactile render` in many processes: the same folder as from one process, but without timings.json."""
+"""`tactile render` in many processes: the same folder as from one process, but without timings.json.
+
+`prepare_input`, `make` and `inspect_input` are called as ``engine.recipes`` says."""
 
 from __future__ import annotations
 

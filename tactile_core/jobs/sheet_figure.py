@@ -151,7 +151,7 @@ class SheetFigure:
         self.top += GAP
 
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
-        """Draw maps of displacement (k, M, 3) m on the gel, with its picture's border; centers : (k, c, 2) m"""
+        """Draw maps of displacement (k, M, 3) m on the gel after a label, the picture's border, centers (k, c, 2) m."""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(
             label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
@@ -256,8 +256,7 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write each column's force (k, 3) N and `trust`, the first four arguments (k,) of `trust_words.in_words`, and
-        a key."""
+        """Write each column's force (k, 3) N, trust, the first four arguments (k,) of `in_words`, and a key."""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]

@@ -6,7 +6,7 @@
 A grid is all combinations of `NAME=A:B:N`, N values evenly from A to B, or `NAME=V,V,...`. NAME is a field of the
 scene's TOML, with numbers for places in lists (``recording.tilt_deg``, ``indenters.0.radius_mm``), or one of three that
 change the whole motion of the [recording]: ``force_n`` scales all forces to this greatest one, N; ``x_mm`` and ``z_mm``
-move all points, so that the one of greatest force lies there."""
+move all points, so that the one of greatest force lies there. ``engine.recipes`` says how jobs call this."""
 
 from __future__ import annotations
 

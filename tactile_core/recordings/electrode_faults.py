@@ -1,4 +1,6 @@
-"""Find and interpolate faulty electrodes and rows: glitches, repeated rows, dead channels, unlikely rest counts."""
+"""Find and interpolate faulty electrodes and rows: glitches, repeated rows, dead channels, unlikely rest counts.
+
+A `recording` is as it was read: its rows name the places in `warnings`, a list that is extended."""
 
 from __future__ import annotations
 
@@ -35,11 +37,10 @@ MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 def without_absent(
     path: str, electrodes: np.ndarray, names: Sequence[str], sensor: str
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Fill electrodes that a file lacks with a typical unit's rest, as if they never changed.
+    """Fill electrodes that a file lacks with the rest of a sensor's typical unit, as if they never changed.
 
     electrodes : (T, e) float, in any unit of measurement, with NaN; names : of their columns, empty for none
-    Returns the electrodes, a mask (e,) of the filled ones, and a sentence on them. Raises TactileError where half of
-    them are missing."""
+    Returns electrodes, a mask (e,) of the filled ones, and a sentence on them. TactileError where half are missing."""
     unread = ~np.isfinite(electrodes)
     empty = unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES) & ~unread.all()  # where all are, rows are to blame
     absent = np.array([not name for name in names]) | empty
@@ -121,7 +122,7 @@ def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats (of kind "raw"); return them, flags
-    (T,) with REPAIRED and DEAD_CHANNEL added, and a report of numbers and rows. warnings : extended"""
+    (T,) with REPAIRED and DEAD_CHANNEL added, and a report of numbers and rows."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:

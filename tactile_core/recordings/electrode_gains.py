@@ -58,7 +58,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Calibration of one unit, or of the units of a hand's fingers, each in its own section.
+    """Calibration of one unit, or of those of a hand's fingers 0 to 4, each in its own section; format : FORMAT
     topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
     sensor : of the units: "biotac", or another, whose units have a rest and no gains"""
 
@@ -101,7 +101,7 @@ def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> Sensor
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Convert signals to those of a unit with the simulated one's gains: (change - offset) / gain, of rectified ones
+    """Convert signals of a unit, sensor, to those with the simulated one's gains: (change - offset) / gain, rectified
     without offset. Raw changes are converted to a typical unit's rest before that and back to this unit's after it.
     The unit's stiffness is noted, and the law of contacts checked again (`doubt_law`)."""
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)

@@ -28,8 +28,7 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
     A file with as many rows as the recording has frames needs no time. Otherwise unix time aligns the two if both have
     it; else both begin at the same moment.
     Returns rising times (n,) s from the recording's first frame, and the magnitude (n,) N of the force.
-    Raises TactileError: no such file or column, other rows, a clock that does not overlap, values that cannot be
-    newtons."""
+    Raises TactileError: no such file or column, other rows, a clock that does not overlap, values not in newtons."""
     own = not os.path.exists(named)
     path, where = (split(recording.path).file, f"{recording.path}, {named}") if own else (named, named)
     names = [name.strip().lower() for name in named.split(",")] if own else None
@@ -50,7 +49,7 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
 
 
 def read_columns(path: str, names: list[str]) -> np.ndarray:
-    """Read further columns of a recording's own file, (n, c) as it has them. Raises TactileError for one it has not."""
+    """Read columns, by names in any case, of a recording's own file: (n, c) as it has them. TactileError for none."""
     table = _table(path, [name.lower() for name in names])
     missing = [name for name in names if name.lower() not in table.header]
     if missing:

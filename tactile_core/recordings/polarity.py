@@ -2,7 +2,7 @@
 
 Raw BioTac counts fall (``sensors.COUNT_SIGN``). Some files hold rest minus reading without saying so. Two changes show
 the polarity: the change that correlates with the fluid's pressure, and the change against rest. With the right sign
-each resembles that of simulated contacts."""
+each resembles that of simulated contacts; a `sensor` is the one whose contacts these are."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Polarity:
 
     @property
     def evidence(self) -> str:
-        """Return the evidence in words, for reports."""
+        """Return the evidence in words, marked where it is an assumption, for reports."""
         return f"assumed: {self.found}" if self.basis is Basis.ASSUMED else self.found
 
     @property

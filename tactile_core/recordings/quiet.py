@@ -119,8 +119,7 @@ def _spread(centred: np.ndarray, n: int) -> np.ndarray:
 
 
 def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
-    """Estimate the noise (19,) of electrodes (T, 19) counts by steps over APART frames, in the calmer windows of n
-    frames."""
+    """Estimate the noise (19,) of electrodes (T, 19) counts by steps over APART frames, in calmer windows of n."""
     starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
     windows = (electrodes[start : start + n].astype(float) for start in starts)
     steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])

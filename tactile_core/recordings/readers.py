@@ -1,4 +1,4 @@
-"""Registry of file layouts, and the one function that reads them all: ``read(path)``."""
+"""Registry of file layouts, and the function that reads all: ``read(path)``. `columns` is a map, None without."""
 
 from __future__ import annotations
 

@@ -84,7 +84,7 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """Return pdc (T,) at rest, counts: 0 for a tared file; else that of the quiet frames, or the lowest without any."""
+    """Return pdc (T,) at rest, counts: 0 if tared, and not of kind "raw"; else that of quiet frames, or the lowest."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0

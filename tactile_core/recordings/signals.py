@@ -155,6 +155,6 @@ class Signals:
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Convert change (n, 19) counts of a unit at counts rest (19,) to a typical unit's, if its kind is "raw"."""
+    """Convert change (n, 19) counts of a unit at counts rest (19,) to a sensor's typical unit's, if of kind "raw"."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

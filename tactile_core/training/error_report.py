@@ -1,4 +1,4 @@
-"""Report a training's errors on presses it never saw, and its loss curves."""
+"""Report a training's errors on presses it never saw, and its loss curves; measure : of `Measure`."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Return the errors of the direct network, which the chain must beat."""
+    """Return the errors of `Model.directly`, one network from signal to gel, which the chain of networks must beat."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:

@@ -153,7 +153,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
-    """Return the numpy networks before a card exists."""
+    """Return the numpy networks of tensors, network -> name -> array, and their sizes, before a card exists."""
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in tensors}})
 
 

@@ -45,8 +45,7 @@ class Block(nn.Module):
 
 
 class Residual(nn.Module):
-    """Residual MLP of `blocks` blocks of a width, with a linear skip from input to output (docs/sources.md,
-    Networks)."""
+    """Residual MLP of `blocks` blocks of a width, with a linear skip from input to output (docs/sources.md)."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int) -> None:
         super().__init__()
@@ -82,8 +81,7 @@ class ContactPosterior(nn.Module):
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Return -log density (B,), nats, of latent's (B, K) mixture at the true state (B, STATE), but for a
-        constant."""
+        """Return -log density (B,), nats, of latent's (B, K) mixture at state (B, STATE), but for a constant."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
@@ -171,8 +169,7 @@ class MeshVae(Vae):
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, in cells, from the places that begin latent (B, L) to those of contacts rows
-        (B,)."""
+        """Return the mean distance, cells, of the places that begin latent (B, L) from those of rows (B,)."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:
@@ -183,8 +180,8 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
-    """Make SVB: 20-256-128-64 to the latent, and back, on compressed signals (ACROSS: docs/sources.md, Networks). The
-    last of 20 inputs says whether the signals are rectified."""
+    """Make SVB: electrodes + 1 inputs, 256, 128, 64, the latent, and back, on compressed signals (ACROSS:
+    docs/sources.md, Networks). The last input says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 

@@ -117,8 +117,7 @@ class Options:
 
 
 def device_of(name: str) -> torch.device:
-    """Return the torch device of a name in DEVICES. Raises TactileError for another name, and for a GPU that torch does
-    not see."""
+    """Return the torch device of a name in DEVICES. TactileError for another, and for a GPU that torch does not see."""
     import torch
 
     if name not in DEVICES:

@@ -55,8 +55,7 @@ class Model(nn.Module):
         return biotac, self.to_target(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) and the contact's state (B, STATE) to latent_source, and to -log density (B,) of that
-        state."""
+        """Map signal (B, 20), the contact's state (B, STATE) to latent_source, and to the state's -log density (B,)."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))

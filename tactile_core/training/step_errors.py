@@ -23,19 +23,19 @@ Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number per contact
 
 @dataclass(frozen=True)
 class Bodies:
-    """The gel's surface, and the unrolled places (N, 2) m of the skin's nodes on its plane."""
+    """digit : the gel's surface; unrolled : (N, 2) m, places of the skin's nodes on its plane, NaN beside it."""
 
     digit: Lattice
     unrolled: np.ndarray
 
 
 def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
-    """Return the bodies of this version's sensors."""
+    """Return the bodies of a skin, source, and a gel, target, as this version has them."""
     return Bodies(sensors.sensor_surface(target), unrolling.unrolled_nodes(source))
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """Return the displacement (B, n, 3) float32 m of a sensor's nodes in contacts by indices rows (B,) into pairs."""
+    """Return displacements (B, n, 3) float32 m of a surface, sensor "biotac" or "digit", in rows (B,) of pairs."""
     return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
         getattr(pairs, f"scale_{sensor}")
     )
@@ -109,7 +109,7 @@ def error_columns(
     rectified: bool = False,
 ) -> Columns:
     """Return columns (B,): largest node errors, m, of BioTac and DIGIT meshes from signals, and the head's estimates.
-    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as they are read
+    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}

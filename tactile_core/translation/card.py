@@ -133,8 +133,7 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Return a sentence on weights that are worse than none or hardly better, or the card's own (``DOUBT``); ""
-    else."""
+    """Return a sentence on weights that are worse than none or hardly better, or the card's own (``DOUBT``), or ""."""
     if isinstance(card.get(DOUBT), str):
         return card[DOUBT]
     found = chain_error(card)

@@ -68,7 +68,7 @@ def with_stiffness(
 ) -> tuple[ElectrodeGains, str]:
     """Return a unit with the stiffness that a measured force shows, if that improves the force; and a text on the fit.
     Gains and offsets that do not improve the scaled force are dropped as well.
-    named : file of the force beside the first recording, or columns of all recordings' own files
+    paths : the unit's recordings; named : file of the force beside the first, or columns of all their own files
     Raises TactileError for what `force_file.read_force` refuses, too few frames, and a scale that no unit has."""
     beside = paths[:1] if os.path.exists(named) else paths
     recordings = [read(path, options.columns, translator.source) for path in beside]

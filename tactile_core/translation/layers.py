@@ -89,7 +89,7 @@ def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndar
 
 
 def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    """Return the tensor shapes of `plain` with these layer sizes."""
+    """Return the shapes of `plain`'s tensors, name -> shape; name : before each; sizes : of inputs, then each layer"""
     shapes: dict[str, tuple[int, ...]] = {}
     for layer, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
         shapes |= {f"{name}.{layer}.weight": (outputs, inputs), f"{name}.{layer}.bias": (outputs,)}
@@ -97,7 +97,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Return the tensor shapes of `residual`: from inputs through `blocks` blocks of a width to outputs."""
+    """Return the shapes of `residual`'s tensors, as `plain_shapes`: inputs, `blocks` blocks of a width, outputs."""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

@@ -125,8 +125,7 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_source)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return expected largest node errors (T, 2) m of BioTac and DIGIT, for change (T, 19), rectified (T,) or
-        one."""
+        """Return expected largest node errors (T, 2) m, BioTac and DIGIT, by change (T, 19), rectified (T,) or one."""
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_source(self, displacement: np.ndarray) -> np.ndarray:
@@ -274,7 +273,7 @@ class Networks:
 
 
 def shipped_folder(source: str | None = None) -> Path:
-    """Return the folder of the weights that ship for recordings of a sensor; the BioTac's where it has none."""
+    """Return the folder of the weights that ship for a sensor's recordings; the BioTac's for None, or one without."""
     own = WEIGHTS_FOLDER / (source or SOURCE)
     return own if (own / CARD_NAME).is_file() else WEIGHTS_FOLDER
 

@@ -106,8 +106,7 @@ class Translator:
         self._unrolled = surface.unrolled_nodes(self.source)
 
     def encode(self, signals: Signals) -> Evidence:
-        """Return each frame's own posterior, and what tracking and decoding need. Raises TactileError for another
-        sensor."""
+        """Return each frame's own posterior, and what tracking and decoding need. TactileError for another sensor."""
         change, unsigned = self.changes(signals)
         whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
         if self.answer.contacts > 1:

@@ -80,8 +80,8 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
 
 
 def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
-    """Read the rest of a unit from a recording of it untouched. Raises TactileError for a recording that is not raw, or
-    in which an electrode moves more than drift does."""
+    """Read the rest of a unit from a recording of it untouched; columns : its map, or None. Raises TactileError for a
+    recording that is not raw, or in which an electrode moves more than drift does."""
     recording = read(path, columns)
     readings = _raw(recording)
     spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)
@@ -124,7 +124,7 @@ def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: f
         told = divider.of_typical_film(told, rest, 1 / film)
         products, squares, whole = change @ told.T, np.square(told).sum(axis=1), np.square(change).sum(axis=1)
         size = np.clip(products / squares, *SIZES)
-        left = whole[:, None] - 2 * size * products + size**2 * squares
+        left = whole[:, None] - 2 * size * products + size**2 * squares  # |change - size told|^2 of each pair
         row, nearest = np.arange(len(change)), left.argmin(axis=1)
         weight = 1 / np.maximum(whole, SMALL**2)
         share = float((left[row, nearest] * weight).mean())

@@ -45,7 +45,7 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raise TactileError for an option below 1; names : of whole-number options, as options' attributes"""
+    """Raise TactileError for an option below 1, None excepted; names : attributes of options, whole numbers"""
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:
@@ -83,8 +83,7 @@ def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
 
 
 def tell_plan(planned: Path, folder: Path, after: str) -> None:
-    """Print where a plan is, `planned`, and how to run the parts of the job in `folder`; after : the command that
-    follows them."""
+    """Print the path of a plan, and how to run the parts of the job in `folder`; after : the command after those."""
     tell(str(planned))
     parts = f"tactile batch --out {quote(str(folder))} --array I/N"
     next_step(f"{parts}, for each I from 0 to N - 1, on any machines; then {after}")

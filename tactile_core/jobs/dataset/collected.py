@@ -44,8 +44,7 @@ class Collected:
 
 
 def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
-    """Find a data set's files in a folder, but for linked and hidden folders and `out`. TactileError where none
-    fits."""
+    """Find a recipe's files in a folder, without linked or hidden folders and `out`. TactileError where none fits."""
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]

@@ -44,10 +44,10 @@ def installed() -> bool:
 
 
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
-    """Classify the label `task` by each kind of features of summaries, with whole groups of recordings held out.
+    """Classify the label `task` by each kind of features of summaries, and by RANDOM and ALWAYS, groups held out whole.
     apart : label whose values are held out together; "" holds out single recordings (of snapshots, tenths of each)
     progress : called with (classifiers made, in all)
-    Needs scikit-learn. Returns no row where the label has one value or too few examples."""
+    Needs scikit-learn. Returns no row where the label has one value, one group or too few examples."""
     told = [(one, one.told[task]) for one in summaries if task in one.told]
     labels = np.concatenate([texts for _, texts in told]) if told else np.array([])
     groups = np.concatenate([_groups(one, len(texts), apart) for one, texts in told]) if told else labels

@@ -130,5 +130,5 @@ def prepared_file(folder: Path, name: str) -> Path:
 
 
 def shard_file(folder: Path, name: str, number: int) -> Path:
-    """Return the path of the shard of that number in the recording, from 0."""
+    """Return the path of a shard by its number, from 0, in the recording called `name`, existing or not."""
     return folder / SHARDS / f"{name}-{number:06d}.h5"

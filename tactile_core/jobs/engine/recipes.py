@@ -77,7 +77,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`.
+    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`; electrodes : their law.
     surfaces, files : sha256 of sensors' nodes and of meshes; keep : words of ``pairs_file.KEEPABLE``"""
 
     count: Annotated[int, Meta(ge=1)]

@@ -177,7 +177,7 @@ def folder_of(out: Path) -> Path:
 
 @contextlib.contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Lock the folder of a new job, or of the same one begun before. Raises TactileError for another job's."""
+    """Lock <out>.parts, the folder of a new job or of the same one begun before. TactileError for another job's."""
     folder = folder_of(out)
     with opened(folder, None):
         if not jobs.exists(folder):
@@ -190,8 +190,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
-    """Write only the job of the result `out`, for `tactile batch --array`; returns its folder, <out>.parts. Raises as
-    `begun` does."""
+    """Write only the job of the result `out`, for `tactile batch --array`; returns <out>.parts. Raises as `begun`."""
     with begun(Path(out), job) as folder:
         return folder
 

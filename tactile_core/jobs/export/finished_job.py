@@ -62,7 +62,7 @@ class Recorded:
                     yield {name: data[start : start + BLOCK] for name, data in held.items() if name not in without}
 
     def picture(self, frame: int) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8 of a frame; the job must have kept ``image``."""
+        """Return the picture (H, W, 3) uint8 of a translated frame, counted from 0, which the job must have kept."""
         import h5py
 
         for path in self.shards:

@@ -54,8 +54,7 @@ class Layout(Protocol):
         """Close an episode's files; returns its place for the list of episodes."""
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Close all files and write all lists, of episodes and their stats; returns the layout's entries of
-        info.json."""
+        """Close all files and write the lists of episodes and stats; returns the layout's entries of info.json."""
 
 
 def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:

@@ -33,8 +33,7 @@ class FrameServer:
     view.
 
     port : 0 for any free one. Raises TactileError for a port that is not available.
-    Whatever readers send is ignored: their own libraries drop what they did not subscribe to. A slow reader misses
-    frames."""
+    Whatever readers send is ignored: their libraries drop what they did not subscribe to. A slow one misses frames."""
 
     def __init__(self, port: int) -> None:
         try:

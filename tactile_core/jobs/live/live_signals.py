@@ -70,7 +70,7 @@ class LiveSignals:
         self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
 
     def learn(self, rows: Recording) -> bool:
-        """Search new frames for rest and polarity; returns true once rest is known."""
+        """Search new frames, rows, for rest and polarity; returns true once rest is known."""
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
         self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
@@ -122,8 +122,7 @@ class LiveSignals:
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return signals of frames electrodes (T, 19), pdc (T,), as in the file or NaN. ValueError before rest is
-        known."""
+        """Return signals of electrodes (T, 19), pdc (T,), as in the file or NaN. ValueError before rest is known."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)

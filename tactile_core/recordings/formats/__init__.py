@@ -37,8 +37,7 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
     """Build the recording of a table with pdc, tac and tdc. time, electrodes, channels : names of their columns
 
-    Missing channels are None, missing electrodes dead channels. Raises TactileError for another missing column, and the
-    errors of ``assemble``."""
+    Missing channels are None, missing electrodes dead. TactileError for other missing columns, and as of `assemble`."""
     _check_numbers(table, electrodes)
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)

@@ -39,8 +39,7 @@ def number(cell: str) -> float | None:
 
 
 def seconds(cell: str) -> float:
-    """Parse a cell with a time, and its day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight.
-    ValueError."""
+    """Parse a time, with a day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight; else ValueError."""
     found = CLOCK.fullmatch(cell.strip())
     if found is None:
         raise ValueError(cell)

@@ -50,7 +50,7 @@ class Table:
     texts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
-        """Return the values (T, len(names)) of the columns. Raises TactileError naming a column that is missing."""
+        """Return columns' values (T, len(names)) of a dtype; texts are parsed. TactileError names a missing one."""
         missing = [name for name in names if not self.has(name)]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -93,8 +93,7 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns` (T, n), in float32 where exact; missing columns are NaN. Raises TactileError where half are
-        missing."""
+        """Return `columns` (T, n), float32 where exact, NaN for missing ones. TactileError where half are missing."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:

@@ -8,7 +8,7 @@ another fluid pressure, which shows it where recorded (table: docs/accuracy.md).
 
 A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Of what a free
 conductivity leaves of a level's difference to a typical rest, one contact leaves .53 to .84 in five real units at rest,
-and .23 to .38 in eight hard grips; soft grips (.47 to .87) are not separable."""
+and .23 to .38 in eight hard grips; soft grips (.47 to .87) are not separable. A `sensor` has the simulated contacts."""
 
 from __future__ import annotations
 

@@ -135,8 +135,7 @@ class _Seen:
         self._squares = np.square(self._known).sum(axis=1)
 
     def typical(self, thickness: float, conductivity: float | np.ndarray) -> np.ndarray:
-        """Convert the changes to (n, e) counts of a typical unit, for a film's thickness and conductivity (n, 1) over
-        rest."""
+        """Convert changes to (n, e) counts of a typical unit, by a film's thickness, conductivity (n, 1) over rest."""
         change = divider.of_typical_film(self.change, self.rest, thickness, conductivity)
         return divider.typical(change, self.rest, self.typical_rest)
 
@@ -166,8 +165,8 @@ def find(
     """Find the film of the unit that made a raw recording.
 
     change : (T, e) counts from rest (T, e); time : (T,) s; pressure : (T,) Pa, NaN where it was not measured
-    thickness : where it is known; own_rest : true if rest was found in this recording; drifts : true if conductivity
-        may drift"""
+    thickness : if known; own_rest : true if rest was found in this recording; drifts : true if conductivity may drift
+    sensor : whose simulated contacts separate contact from drift"""
     frames = spread_out(len(change), FRAMES)
     seen = _Seen(change[frames], rest[frames], time[frames], sensor)
     believed = _believed(_doubt_at_rest(_impedance_at_rest(seen))) if thickness is None else thickness

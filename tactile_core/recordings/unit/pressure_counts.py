@@ -18,7 +18,7 @@ MOST = 1.01 * COUNT_MAX
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
     """Return pdc (T,) of a file in counts; None if unknown how. unit : counts that an electrode's 1 there means
-    warnings : extended by what was assumed"""
+    warnings : extended by what was assumed; sensor : whose PDC this is"""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
