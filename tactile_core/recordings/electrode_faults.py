@@ -31,6 +31,8 @@ TURNS = 0.08
 STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
 # Largest ratio of an impedance at rest to a typical unit's, or the reverse: .9 to 3.3 are seen in units (assumed)
 STRANGE_REST = 8.0
+# The same of a single electrode: .6 to 8 in 65 real recordings; volts, shares and 8 bits lie beyond (assumed)
+STRANGE_ELECTRODE = 30.0
 MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 
 
@@ -197,13 +199,20 @@ def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -
 
 
 def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
-    """Return true, and add a warning, if no unit of the sensor rests at the counts rest (e,)."""
+    """Return true, and add a warning, if no unit of the sensor, or no electrode, rests at the counts rest (e,)."""
     typical = typical_rest(sensor)
     if typical is None:
         return False
-    ratio = float(np.median(divider.film_impedance(rest) / divider.film_impedance(typical)))
+    ratios = divider.film_impedance(rest) / divider.film_impedance(typical)
+    ratio = float(np.median(ratios))
     if 1 / STRANGE_REST <= ratio <= STRANGE_REST:
-        return False
+        strange = (np.abs(np.log(ratios)) > np.log(STRANGE_ELECTRODE)) & (rest > 0) & (rest < COUNT_MAX)
+        if strange.any():
+            warnings.append(
+                f"{named_electrodes(strange)} at {', '.join(f'{each:.4g}' for each in rest[strange])} counts at rest, "
+                "as no electrode is: broken, or in another unit of measurement than the others"
+            )
+        return bool(strange.any())
     warnings.append(
         f"electrodes rest at {np.median(rest):.0f} counts, an impedance {ratio:.2g} times a typical unit's, which no "
         "film gives: counts of another number of bits? (--counts-per-unit)"

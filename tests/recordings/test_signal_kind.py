@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tactile_core.recordings import prepare, read
+from tactile_core.recordings.flags import Flag
 from tactile_core.recordings.rest_level import level
 from tactile_core.recordings.signal_kind import WHOLE, counted, detect, median, percentiles
 
@@ -35,3 +37,12 @@ def test_a_long_recording_has_the_kind_of_a_part_of_it(columns):
 def test_other_numbers_are_not_counted(columns, odd):
     columns[77, 1] = odd
     assert counted(columns) is None and counted(columns[:100]) is None
+
+
+@pytest.mark.parametrize("factor", [0.1, 1 / 16, 3.3 / 4095, 1 / 4095])
+def test_an_electrode_in_another_unit_of_measurement_is_named_and_flagged(factor, press, tmp_path):
+    press.electrodes[:, 6] *= factor
+    np.savez(tmp_path / "touch.npz", electrodes=press.electrodes, time=press.time)
+    found = prepare(read(tmp_path / "touch.npz"))
+    assert found.warnings[0].startswith("E7 at ") and "another unit of measurement" in found.warnings[0]
+    assert (found.flags & Flag.OUT_OF_RANGE).all()
