@@ -157,9 +157,10 @@ def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
         return
     off, usual = levels - levels.mean(), typical - typical.mean()
     if off @ usual < MIRRORED * np.sqrt(off @ off * (usual @ usual)):
-        found = f"levels of {levels.min():.0f} to {levels.max():.0f} counts, low where a unit's are high"
+        found = f"levels of {levels.min():.0f} to {levels.max():.0f}, low where a unit's are high"
         expected = f"{typical.min():.0f} to {typical.max():.0f} as of a typical unit"
-        advice = f"The file seems to hold {COUNT_MAX:g} - counts: subtract its electrodes from {COUNT_MAX:g}"
+        top = f"{COUNT_MAX:g} counts, 3300 mV"
+        advice = f"The file seems to hold the top of a range minus readings: subtract its electrodes from it ({top})"
         raise TactileError(f"{path}, electrodes", found, expected, advice)
 
 
