@@ -120,6 +120,8 @@ def test_the_fast_tier_writes_a_real_contact(mesh, tmp_path):
     [
         (["--out", "a.obj"], "'.obj'; expected .ply or .stl or .vtu"),
         (["--out", ""], "--out: an empty name"),
+        (["--out", "m.ply", "--frames", ""], "--frames: an empty value"),
+        (["--out", "m.ply", "--press", ""], "--press: an empty value"),
         (["--out", "scene.toml/a.ply"], "cannot be written"),
         (["--out", "a.ply", "--frames", "f.h5"], "one of them alone"),
         (["--out", "a.ply", "--frame", "3"], "one of them alone"),
@@ -164,9 +166,3 @@ def test_a_press_by_a_mesh_is_led_to_a_scene(mesh, tmp_path):
     (tmp_path / "star.stl").write_bytes(b"\xff" * 90)
     status, _, err = mesh("digit", "--press", "star.stl", "--depth-mm", "0.3", "--out", "m.ply")
     assert status == 2 and "star.stl: a mesh file; expected sphere, cylinder, or a scene" in err and "user_mesh" in err
-
-
-@pytest.mark.parametrize("option", ["--frames", "--press"])
-def test_an_empty_value_is_not_taken_for_none(option, mesh):
-    status, _, err = mesh("digit", option, "", "--out", "m.ply")
-    assert status == 2 and f"{option}: an empty value" in err

@@ -72,16 +72,19 @@ def test_globs_that_may_take_for_ever_are_refused(word, tmp_path):
         inputs.find([word], tmp_path / "out")
 
 
-def test_a_folder_that_may_not_be_read_is_no_bag(recordings, tmp_path, monkeypatch):
+@pytest.mark.parametrize("name", ["stat", "scandir"])
+def test_a_folder_that_may_not_be_read_is_passed_over(name, recordings, tmp_path, monkeypatch, caplog):
     def refused(path, *words, **more):
         if "closed" in str(path):
             raise PermissionError(13, "Permission denied", str(path))
-        return stat(path, *words, **more)
+        return real(path, *words, **more)
 
     (recordings[0].parent / "closed").mkdir()
-    stat = os.stat
-    monkeypatch.setattr(os, "stat", refused)
+    real = getattr(os, name)
+    monkeypatch.setattr(os, name, refused)
     assert inputs.find([str(recordings[0].parent)], tmp_path / "out") == recordings
+    told = "closed: cannot be looked into (Permission denied), passed over" in caplog.text
+    assert told or name == "stat"
 
 
 @pytest.mark.parametrize(
@@ -116,20 +119,21 @@ def test_the_calibration_belongs_to_the_job(command, recordings, tmp_path):
 
 
 def damage(job):
-    yield "not json"
-    yield "[" * 100_000
-    yield json.dumps(job | {"more": 1})
-    yield json.dumps(job | {"inputs": [job["inputs"][0] | {"name": "00000_/../../x"}]})
-    yield json.dumps(job | {"recipe": job["recipe"] | {"shard_frames": 0}})
-    yield json.dumps(job | {"format": "other"})
+    yield "not json", ""
+    yield "[" * 100_000, ""
+    yield json.dumps(job | {"more": 1}), ""
+    for more in ({"name": "00000_/../../x"}, {"path": "/a\0b"}, {"path": "/a\ud800"}):
+        yield json.dumps(job | {"inputs": [job["inputs"][0] | more]}), ".*inputs"
+    yield json.dumps(job | {"recipe": job["recipe"] | {"shard_frames": 0}}), ""
+    yield json.dumps(job | {"format": "other"}), ""
 
 
 def test_a_job_file_of_others_is_checked(new_job):
     folder, _ = new_job()
     good = json.loads((folder / jobs.FILE).read_text())
-    for text in damage(good):
+    for text, field in damage(good):
         (folder / jobs.FILE).write_text(text)
-        with pytest.raises(TactileError, match=r"job\.json"):
+        with pytest.raises(TactileError, match=r"job\.json" + field):
             jobs.read(folder)
 
 

@@ -138,20 +138,6 @@ def test_names_that_no_disk_takes_are_told(name, tmp_path):
         inputs.hashed(inputs.find([f"@{tmp_path / 'list.txt'}"], tmp_path / "out"), none)
 
 
-def test_a_folder_that_cannot_be_looked_into_is_told(recordings, tmp_path, monkeypatch, caplog):
-    scandir = os.scandir
-
-    def refused(path):
-        if "closed" in str(path):
-            raise PermissionError(13, "Permission denied", str(path))
-        return scandir(path)
-
-    (recordings[0].parent / "closed").mkdir()
-    monkeypatch.setattr(os, "scandir", refused)
-    assert inputs.find([str(recordings[0].parent)], tmp_path / "out") == recordings
-    assert "closed: cannot be looked into (Permission denied), passed over" in caplog.text
-
-
 @pytest.mark.skipif(os.name == "nt", reason="links and pipes of POSIX")
 def test_links_to_nothing_and_pipes_are_told(tmp_path):
     (tmp_path / "*.csv").symlink_to(tmp_path / "none")
@@ -179,16 +165,6 @@ def test_options_that_no_recording_can_meet_make_no_job(words, said, command, re
     done = command(*recordings, "--out", tmp_path / "job", *words)
     assert done.returncode == 2 and said in done.stderr
     assert not (tmp_path / "job" / jobs.FILE).exists()
-
-
-@pytest.mark.parametrize("path", ["/a\0b", "/a\ud800"])
-def test_a_job_file_with_impossible_paths_is_refused(path, new_job):
-    folder, _ = new_job()
-    said = json.loads((folder / jobs.FILE).read_text())
-    said["inputs"][0]["path"] = path
-    (folder / jobs.FILE).write_text(json.dumps(said))
-    with pytest.raises(TactileError, match="inputs"):
-        jobs.read(folder)
 
 
 @pytest.mark.parametrize("after", [0, 1, 3])
