@@ -336,13 +336,15 @@ def test_an_electrode_that_is_not_there_is_a_dead_channel(absent, press, slide_l
 @pytest.mark.parametrize(
     ("top", "words"),
     [(1.0, "shares"), (3.3, "volts of 3.3 V"), (5.0, "volts of 5 V"), (100.0, "percent"), (255.0, "8 bit"),
-     (1023.0, "10 bit"), (65535.0, "16 bit")],
+     (1023.0, "10 bit"), (65535.0, "16 bit"), (3.0, "")],
 )  # fmt: skip
 def test_readings_in_other_units_are_counts(top, words, press, tmp_path):
     np.savez(tmp_path / "a.npz", electrodes=press.electrodes * top / 4095, time=press.time, pdc=press.pdc)
-    found = recordings.prepare(recordings.read(tmp_path / "a.npz"))
-    counts = recordings.prepare(recordings.read(_saved(tmp_path / "b.npz", press)))
-    assert found.kind == "raw" and any(words in text for text in found.warnings)
+    options = recordings.PrepareOptions(counts_per_unit=None if words else 4095 / top)
+    found = recordings.prepare(recordings.read(tmp_path / "a.npz"), options)
+    np.savez(tmp_path / "b.npz", electrodes=press.electrodes, time=press.time, pdc=press.pdc)
+    counts = recordings.prepare(recordings.read(tmp_path / "b.npz"))
+    assert found.kind == "raw" and (not words or any(words in text for text in found.warnings))
     np.testing.assert_allclose(found.change, counts.change, atol=1e-6)
     np.testing.assert_allclose(found.pdc, counts.pdc)
 
@@ -351,20 +353,6 @@ def test_millivolts_are_told_by_their_names(press, tmp_path):
     text = table(press).replace(",E", ",mV_E")
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     assert "electrodes are called mV ('mv_e1')" in " ".join(read_by_guess(tmp_path / "a.csv").warnings)
-
-
-def test_counts_per_unit_makes_readings_raw(press, tmp_path):
-    np.savez(tmp_path / "a.npz", electrodes=press.electrodes * 3 / 4095, time=press.time, pdc=press.pdc)
-    options = recordings.PrepareOptions(counts_per_unit=4095 / 3)
-    found = recordings.prepare(recordings.read(tmp_path / "a.npz"), options)
-    assert found.kind == "raw"
-    counts = recordings.prepare(recordings.read(_saved(tmp_path / "b.npz", press)))
-    np.testing.assert_allclose(found.change, counts.change, atol=1e-6)
-
-
-def _saved(path, press):
-    np.savez(path, electrodes=press.electrodes, time=press.time, pdc=press.pdc)
-    return path
 
 
 SILENT = {
