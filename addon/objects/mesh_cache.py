@@ -109,7 +109,7 @@ def stop(thing: bpy.types.Object) -> None:
 
 
 def check(*things: bpy.types.Object | None) -> None:
-    """Raise TactileError where the file that moves an object is not where the .blend looks for it."""
+    """Raise TactileError where the file that moves one of these objects is not where the .blend looks for it."""
     for thing in filter(None, things):
         for modifier in thing.modifiers:
             path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None

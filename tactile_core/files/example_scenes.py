@@ -36,7 +36,8 @@ def described() -> list[str]:
 
 
 def copy(names: Sequence[str], out: str | Path) -> list[Path]:
-    """Copy scenes, or all, to ``out``/NAME, each whole. Raises TactileError for unknown ones or those there."""
+    """Copy the scenes called `names`, all if none, to ``out``/NAME, each whole; returns these folders. Raises
+    TactileError for unknown names, and where a folder exists."""
     known = _names()
     for name in names:
         if name not in known:

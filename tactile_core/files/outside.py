@@ -110,7 +110,8 @@ def _size(count: int) -> str:
 def damage_reported(
     where: str | os.PathLike, what: str, advice: str = "Copy or export the recording again"
 ) -> Iterator[None]:
-    """Turn any error of a file library into a TactileError, with advice, on `what`, a word for the file `where`."""
+    """Turn a library's error in the block into a TactileError: `where`, a file or part of one, "damaged `what`".
+    TactileError and MemoryError pass."""
     try:
         yield
     except (TactileError, MemoryError):

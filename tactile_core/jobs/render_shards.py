@@ -52,7 +52,8 @@ def render_in_parts(
 
 
 def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job[Render]:
-    """Plan the job. Raises TactileError for what can be refused before any work."""
+    """Plan the rendering of a file, or of a folder's scene.toml, to the folder `out`. Raises TactileError for what can
+    be refused before any work."""
     preset = claimed(Path(out), options)
     file = Path(path).resolve()
     file = file / "scene.toml" if file.is_dir() else file

@@ -82,7 +82,7 @@ class SheetFigure:
         self.figure.text(left / WIDTH, 1 - (self.top + down) / self.height, text, **style)
 
     def title(self, name: str, simulated: bool) -> None:
-        """Draw the name, a mark if simulated, and the warnings below it."""
+        """Draw the recording's name, a mark if simulated, and the figure's warnings below."""
         self._text(LEFT, 0.36, name, size=15, weight="bold", va="center", parse_math=False)
         if simulated:
             box = {"boxstyle": "round,pad=0.35", "facecolor": MARK, "edgecolor": "none"}
@@ -134,7 +134,7 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write number and time, seconds (k,), or a snapshot's own number, above each column."""
+        """Write above each column its number, from 1, and the time, seconds (k,), or the number of a snapshot."""
         for k, at in enumerate(seconds):
             text = f"{k + 1}:  {self._heading.format(at)}"
             self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")

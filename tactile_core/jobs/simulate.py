@@ -87,7 +87,8 @@ def _number(word: str, text: str) -> float:
 
 
 def name_of(values: dict[str, Value]) -> str:
-    """Make a file name from the values: ``force_n-0.2_tilt_deg-10``."""
+    """Make a file name, of at most 80 characters, from the values: ``force_n-0.2_tilt_deg-10``; a text is its own name.
+    Without values: ``scene``."""
     parts = [
         f"{name.rpartition('.')[2]}-{value:g}" if isinstance(value, float) else value for name, value in values.items()
     ]

@@ -68,7 +68,8 @@ class Store:
         return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
-        """Read an array as ``dtype``; shape : expected, None for any length. Raises TactileError for anything wrong."""
+        """Read an array as ``dtype``; shape : expected, None for any length. Raises TactileError where the array is
+        missing, damaged, not of numbers, of another shape, or too large."""
         where = f"{self.path}, {name}"
         if name not in self.shapes:
             raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")

@@ -45,7 +45,7 @@ class Baseline:
 
 
 class Changes:
-    """Changes (T, e) counts, indexed like an array and computed on demand: a long recording's take twice its memory.
+    """Changes (T, e) counts, indexed like an array; computed on demand, as all would take twice a recording's memory.
     count : T; of : function from frames (n,) to their changes (n, e)"""
 
     def __init__(self, count: int, of: Callable[[np.ndarray], np.ndarray]) -> None:

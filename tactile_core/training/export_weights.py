@@ -41,7 +41,7 @@ def export(
 ) -> dict:  # fmt: skip
     """Write one safetensors file per network and the card; returns the card. The errors in the card are those of the
     files: `networks.py` computes them from the rounded weights.
-    parts : tensors of the network that separates two contacts"""
+    parts : tensors of the network that separates two contacts; bodies : the sensors' surfaces; seed : of drawn noise"""
     model.cpu()
     with torch.no_grad():
         for parameter in model.parameters():
@@ -124,7 +124,8 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Compute `Networks.signal_distance`'s tensors: training latents' mean (K,), whitening (K, K), SVB's residuals."""
+    """Compute `Networks.signal_distance`'s tensors: training latents' mean (K,), whitening (K, K), SVB's residuals.
+    seed : of the noise drawn for the signals"""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)

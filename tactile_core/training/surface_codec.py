@@ -34,7 +34,7 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 @functools.cache
 def image_of_electrodes(sensor: str = SOURCE) -> np.ndarray:
-    """Return the index (19,) of the electrode nearest to each one's mirror image."""
+    """Return, for each electrode of a sensor, the index (19,) of the one nearest to its mirror image in z."""
     at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 

@@ -4,7 +4,8 @@ A bound is a factor on the expected error that covers the largest error of 95 of
 conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012). The
 groups are regions along the finger: one factor for all gave bounds that were too wide over the electrodes and too
 narrow beyond them. Results without contact are a group whose score is the error itself: nearly all are right to a
-micrometre, so a ratio to the expected error says nothing about the few that missed a light touch."""
+micrometre, so a ratio to the expected error says nothing about the few that missed a light touch.
+where : the card's file, for errors"""
 
 from __future__ import annotations
 

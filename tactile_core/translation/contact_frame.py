@@ -64,8 +64,8 @@ class ContactFrame:
         return local
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
-        """Locate the dent of displacement (T, n, 3): (T, 2) float32, row and column from the middle in PLACE_UNIT
-        cells.
+        """Locate the dent of displacement (T, n, 3) m, in any frame: (T, 2) float32, row and column from the middle in
+        PLACE_UNIT cells; 0 where no node moves by STILL.
         It is the mean of the nodes that move more than `CORE` of the largest displacement, weighted with theirs."""
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
@@ -79,7 +79,8 @@ class ContactFrame:
         return np.where(total[:, None] > 0, place, 0).astype(np.float32)
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Round places (T, 2) of `place` to cells (T, 2) int of the lattice; also return remainders (T, 2) in cells."""
+        """Round places (T, 2) of `place`, NaN as the middle, to cells (T, 2) int of the lattice; also return remainders
+        (T, 2), -1..1 cell."""
         at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
         cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
         left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge

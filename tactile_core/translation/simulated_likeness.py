@@ -98,7 +98,7 @@ def two_contacts(shares: np.ndarray) -> np.ndarray:
 
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool frames that resemble no simulated contact, or drift more; shares : (T, 3), `residual_shares`
+    """Mark (T,) bool frames like no simulated contact, or that drift explains better; shares : of `residual_shares`
     change : (T, 19) counts; in faint changes a larger share is allowed, for noise"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)

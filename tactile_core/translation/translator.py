@@ -198,8 +198,8 @@ class Translator:
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
         """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
 
-        displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts, changes against
-            rest. All are zero where the gel moves less than noise alone makes the networks move it."""
+        The result's displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts,
+        changes against rest. All are zero where the gel moves less than noise alone makes the networks move it."""
         nets = self.nets
         skin = nets.m2m_back(nets.encode_target(displacement))
         found = {

@@ -63,7 +63,7 @@ def part(text: str | None) -> tuple[int, int] | None:
 
 
 def place(folder: Path, options: argparse.Namespace) -> Place:
-    """Return the executor of the tasks of the job in `folder`."""
+    """Return the executor of the tasks of the job in `folder`: the cluster of the options, or else local workers."""
     if options.cluster is not None:
         from ...jobs.engine.dask_cluster import Cluster
 

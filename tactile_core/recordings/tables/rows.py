@@ -24,7 +24,7 @@ def is_row(line: str, header: Header) -> bool:
 
 
 def clean(rows: list[str], header: Header) -> np.ndarray | None:
-    """Parse rows to (n, columns), ten times as fast as `row` does; None if any cell is no finite number."""
+    """Parse rows to (n, columns of the header), ten times as fast as `row`; None if any cell is no finite number."""
     trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
     if not all(map(str.strip, trimmed)):
         return None

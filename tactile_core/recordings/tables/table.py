@@ -259,7 +259,8 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
 
 
 def text_lines(path: str, data: bytes) -> list[str]:
-    """Split a text into lines, with an empty one after its last newline."""
+    """Split the text of a file into lines, with an empty one after its last newline. Raises TactileError, of the file
+    `path`, for bytes that are no UTF-8 text, and for a line of over MAX_LINE characters."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:

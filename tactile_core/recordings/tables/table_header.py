@@ -32,7 +32,7 @@ class Header:
     def parse(cls, path: str, lines: Sequence[str]) -> Header:
         """Parse the header of a text that starts with these lines. Comments before the rows are passed over, except the
         last one where it names the columns, as in files of ``np.savetxt`` and ``rostopic echo -p``.
-        Raises TactileError for a text without a line, too many columns, and two columns of one name."""
+        Raises TactileError, of the file `path`, for a text without a line, too many columns, or two of one name."""
         first, comment = _first_row(lines)
         if first is None:
             raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")

@@ -135,6 +135,7 @@ def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURC
     like = np.where(np.abs(larger) < SIZE, change[judged] @ known.T / (size[judged, None] * of_known), -2.0)
     best = np.argsort(-like, axis=1)[:, :NEIGHBOURS]
     there = np.take_along_axis(like, best, 1) > -1
+    # pressure grows with size: log expected = log simulated - log(its size / this size), the mean over those alike
     expected = np.log(simulated)[best] - np.take_along_axis(larger, best, 1)
     known_size = there[:, 0]
     mean = np.where(there, expected, 0.0).sum(axis=1)[known_size] / there[known_size].sum(axis=1)
