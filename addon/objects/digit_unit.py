@@ -12,7 +12,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
 from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
-from . import axes, digit_body, digit_materials, image_frame, surfaces
+from . import axes, digit_body, digit_materials, image_frame, motion, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
@@ -114,10 +114,12 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     if preset == "fast":
         found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps if lamp.data.type == "POINT"]
-    action = gel.animation_data and gel.animation_data.action
-    if action and not action.frame_range[0] <= scene.frame_current_final <= action.frame_range[1]:
-        first, last = action.frame_range
-        found.append(f"Frame {scene.frame_current}: {gel.name} stands still, it moves from {first:g} to {last:g}")
+    if digit_body.has_body(gel) and all(led.hide_render for led in digit_body.leds_of(gel).values()):
+        found.append(f"{gel.name}: its LEDs are hidden or deleted, so that only other lamps light it")
+    played = motion.played(gel)
+    if played and not played[0] <= scene.frame_current_final <= played[1]:
+        words = f"stands still, it moves from {played[0]:g} to {played[1]:g}"
+        found.append(f"Frame {scene.frame_current}: {gel.name} {words}")
     camera = scene.camera
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
@@ -134,8 +136,9 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
         "White balance": getattr(view, "use_white_balance", False),  # since Blender 4.3
         f"Display {device}": device != "sRGB" and view.view_transform != "Raw",
     }  # fmt: skip
-    names = ", ".join(name for name, there in changes.items() if there)
-    return found + [f"{names} changes the levels; Set Up Render sets Raw alone"] * bool(names)
+    names = [name for name, there in changes.items() if there]
+    verb = "changes" if len(names) == 1 else "change"
+    return found + [f"{', '.join(names)} {verb} the levels; Set Up Render sets Raw alone"] * bool(names)
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202

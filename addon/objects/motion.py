@@ -44,6 +44,21 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
     return f"{thing.name}: {len(frames)} shape keys"
 
 
+def played(thing: bpy.types.Object) -> tuple[float, float] | None:
+    """Return the first and last frame at which an object's surface moves; None where it may move at any.
+
+    Keyframes of its place, and F-curves that go on beyond their keys or are repeated, say nothing of that."""
+    keys = thing.data.shape_keys
+    owner, path = (keys, "eval_time") if keys else (thing, '["dent_um"]')
+    if owner.animation_data is None or owner.animation_data.action is None:
+        return None
+    curve = curves.fcurves_of(owner).find(path)
+    if curve is None or curve.modifiers or curve.extrapolation != "CONSTANT":
+        return None
+    first, last = curve.range()
+    return first, last
+
+
 def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:
     """Write one key per frame, shown one after the other by one F-curve of ``eval_time``.
 

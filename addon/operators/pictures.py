@@ -39,15 +39,19 @@ def draw(
     size: tuple[int, int] | None = None,
     stopped: Callable[[], bool] = lambda: False,
     better: Callable[[np.ndarray], None] = lambda picture: None,
+    warn: Callable[[str], None] = lambda words: None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m by a preset; size : (width, height) px, None for the
     calibration's.
 
-    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba. Pictures that get better,
-    up to the one that is returned, are given to better(). Raises TactileError, and ``tracer_process.Stopped`` once
-    stopped(), which is asked again and again, returns true.
+    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba, which warn() is told of.
+    Pictures that get better, up to the one that is returned, are given to better(). Raises TactileError, and
+    ``tracer_process.Stopped`` once stopped(), which is asked again and again, returns true.
     """
-    return _drawn_of(*shown_state(gel, depsgraph, size), preset, stopped, better)
+    shown, moved = shown_state(gel, depsgraph, size)
+    if preset == FAST and shown.around.occluders:
+        warn(f"Meshes that reach into {gel.name}'s housing: {len(shown.around.occluders)}, left out by the preset fast")
+    return _drawn_of(shown, moved, preset, stopped, better)
 
 
 def shown_state(

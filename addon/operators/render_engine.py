@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import traceback
 
 import bpy
@@ -52,8 +53,9 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         scene, layer = depsgraph.scene, depsgraph.view_layer_eval.name
         gel = properties.needed_gel(scene)
         size, preset = (self.resolution_x, self.resolution_y), render_settings.preset_of(scene)
+        warn = functools.partial(self.report, {"WARNING"})
         for left_out in digit_unit.left_out(scene, gel, preset):
-            self.report({"WARNING"}, left_out)
+            warn(left_out)
         self.update_stats("", f"Frame {scene.frame_current}: {preset}")
 
         for name, channels in PASSES.items():
@@ -66,7 +68,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         def show(picture: np.ndarray) -> None:
             self._show({"Combined": to_linear(picture, raw)} | fields, scene.render, layer)
 
-        show(pictures.draw(gel, depsgraph, preset, size, self.test_break, show)[0])
+        show(pictures.draw(gel, depsgraph, preset, size, self.test_break, show, warn)[0])
         self.update_progress(1.0)
 
     def _show(self, found: dict[str, np.ndarray], render: bpy.types.RenderSettings, layer: str) -> None:

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -190,7 +191,7 @@ def test_what_is_left_out_is_said(ready, part, capfd):
     for words in (
         "softbox: no point lamp", "bulb: left out by the preset fast", "depth of field", "Motion blur",
         "Frame 5000: DIGIT gel stands still, it moves from 70 to 89",
-        "View transform Filmic, Exposure changes the levels",
+        "View transform Filmic, Exposure change the levels",
     ):  # fmt: skip
         assert words in said.out + said.err
 
@@ -212,6 +213,31 @@ def test_colours_of_the_output_alone_are_seen_and_set_back(ready, part, tmp_path
     assert left_out(ready, gel) == ["Exposure changes the levels; Set Up Render sets Raw alone"]
     bpy.ops.tactile.set_up_render()
     assert left_out(ready, gel) == [] and image.color_management == "FOLLOW_SCENE"
+
+
+def test_a_gel_that_is_moved_as_an_object_does_not_stand_still(ready, part):
+    left_out, gel = part("addon.objects.digit_unit").left_out, ready.objects["DIGIT gel"]
+    ready.frame_set(80)
+    gel.animation_data.action = None
+    for frame in (1, 10):
+        gel.keyframe_insert("location", frame=frame)
+    assert left_out(ready, gel) == []
+    ready.frame_set(5)
+    assert left_out(ready, gel) == ["Frame 5: DIGIT gel stands still, it moves from 70 to 89"]
+    curve = part("addon.objects.curves").fcurves_of(gel.data.shape_keys).find("eval_time")
+    curve.modifiers.new("CYCLES")
+    assert left_out(ready, gel) == []
+
+
+def test_hidden_leds_and_meshes_in_the_housing_are_told(ready, part, capfd):
+    gel = ready.objects["DIGIT gel"]
+    bpy.ops.mesh.primitive_cube_add(size=2, location=gel.matrix_world @ Vector((-3, 0, 2)))
+    for thing in part("addon.objects.digit_body").leds_of(gel).values():
+        thing.hide_render = True
+    bpy.ops.render.render()
+    said = capfd.readouterr()
+    for words in ("its LEDs are hidden or deleted", "reach into DIGIT gel's housing: 1, left out by the preset fast"):
+        assert words in said.out + said.err
 
 
 def test_exr_by_raw_says_how_to_look_at_it(ready, part):
