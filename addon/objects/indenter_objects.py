@@ -99,7 +99,7 @@ def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.t
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
-    """Return the object's surface as a binary STL in mm, z out of the sensor; relative : (3, 3), in its axes"""
+    """Return the object's surface as a binary STL in mm, z out of the sensor; relative : (3, 3), of ``world_axes``"""
     corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
     record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
     record["corners"] = corners

@@ -80,7 +80,7 @@ class Job:
         return True
 
     def wait(self) -> None:
-        """Wait for its end; raises TactileError when it failed."""
+        """Wait for the end of the process; raises TactileError when it failed."""
         while not self.poll(_LOOK):
             pass
 

@@ -78,7 +78,8 @@ def read_toml_text(path: str | os.PathLike) -> str:
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
-    """Return the path of a file, existing or not, in a third-party folder. Raises TactileError if it leads out."""
+    """Return the path of a file, existing or not, in a third-party folder. Raises TactileError, which says what was
+    `expected`, if it leads out."""
     path = Path(folder) / name
     try:
         within = path.resolve().is_relative_to(Path(folder).resolve())

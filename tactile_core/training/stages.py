@@ -142,8 +142,8 @@ def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Return the weighted mean of two errors of latents found against target (B, L): of their places and of the rest,
-    the shape's code. Each is the mean square error divided by the target's mean square."""
+    """Return the weighted mean of two errors of latents found against target (B, L): of their places (CELL_WEIGHT) and
+    of the rest, the shape's code (1). Each is the mean square error divided by the target's mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
