@@ -314,7 +314,7 @@ def write_stamp(folder: Path, content: dict) -> None:
 
 
 def sources_hash() -> str:
-    """Return a hash that changes when the list of packages does."""
+    """Return a hash, hexadecimal, that changes when pyproject.toml or constraints.txt do: the lists of packages."""
     digest = hashlib.sha256()
     for name in ("pyproject.toml", "constraints.txt"):
         digest.update((ROOT / name).read_bytes())

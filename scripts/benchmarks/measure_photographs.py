@@ -55,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def own_unit(data: Path) -> Photographs:
-    """Read the 14 photographs of the unit that ships, in the folder of ``data``."""
+    """Read the 14 photographs of the unit that ships. Here and below, data : the folder that the module calls DATA"""
     return read_photographs(data / "digit_real" / "presses")
 
 
@@ -92,7 +92,8 @@ def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
 
 
 def thirds(data: Path) -> Iterator[Row]:
-    """Yield rows of fits to two thirds of the 14, begun at round numbers, tried on the third and on the deeper two."""
+    """Yield rows of fits to two thirds of ``own_unit`` each, begun at round numbers, tried on the last third and on
+    ``deeper``."""
     known = own_unit(data)
     start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
     for unit, third in folds(known, 3, start):

@@ -62,7 +62,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure the indenters and the region of the pad that the networks' training left out, by their card."""
+    """Measure contacts by indenters and in the region that training left out, as the translator's card names them."""
     options, names = translator.card["options"], np.array(pairs.indenter_names)
     there = pairs.place[:, 0] < (-np.inf if options["without_below_x"] is None else options["without_below_x"])
     known = ~np.isin(names[pairs.indenter], options["without"])

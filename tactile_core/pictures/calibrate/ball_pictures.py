@@ -98,7 +98,7 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """Return the whole factor by which a fit reduces pictures of width x height px: to 120 px or more on either."""
+    """Return the whole factor by which a fit reduces width x height px: to 120 px or more on either; 1 if none."""
     return whole_factor(width, height, WORKING_WIDTH)
 
 
