@@ -27,9 +27,13 @@ def _wanted(part, frame):
     return part("addon.objects.axes").to_blender(rest + moved, 1000)
 
 
-def test_the_skin_moves_as_the_recording_says(imported, nodes_of, part, scene):
-    skin = imported()
-    for frame in (40, 77, 90, 139):
+@pytest.mark.parametrize(
+    ("options", "frames"),
+    [({}, (40, 77, 90, 139)), ({"motion": "MESH_CACHE", "frames": "40:140:2"}, (40, 78, 90, 138))],
+)
+def test_the_skin_moves_as_the_recording_says_also_every_second_frame(options, frames, imported, nodes_of, part, scene):
+    skin = imported(**options)
+    for frame in frames:
         scene.frame_set(frame)
         np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=TOLERANCE)
 
@@ -128,13 +132,6 @@ def test_a_mesh_cache_of_a_new_file_of_blender_s_is_in_its_units(imported, nodes
     bpy.ops.wm.read_homefile(use_factory_startup=True)  # with cube, light and camera
     skin = imported(motion="MESH_CACHE")
     assert np.ptp(nodes_of(skin), axis=0).max() == pytest.approx(28, abs=3)  # mm
-
-
-def test_a_mesh_cache_of_every_second_frame_plays_in_time(imported, nodes_of, part, scene):
-    skin = imported(motion="MESH_CACHE", frames="40:140:2")
-    for frame in (40, 78, 90, 138):
-        scene.frame_set(frame)
-        np.testing.assert_allclose(nodes_of(skin), _wanted(part, frame), atol=TOLERANCE)
 
 
 def test_the_scene_plays_in_the_recording_s_time(imported, scene):

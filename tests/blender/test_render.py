@@ -41,14 +41,24 @@ def _wanted(part, frame=80):
     return part("tactile_core.pictures.renderer").Renderer(preset="fast")(heights)
 
 
-@pytest.mark.parametrize("view", ["Raw", "Standard"])
-def test_a_frame_holds_the_library_s_own_pixels(ready, part, tmp_path, view):
+@pytest.fixture
+def rendered(ready, tmp_path):
+    """``rendered(file="frame.png", **options)``: renders frame 80 and reads the levels of the file."""
     ready.frame_set(80)
+
+    def run(file="frame.png", **options):
+        ready.render.filepath = str(tmp_path / "frame.png")
+        bpy.ops.render.render(write_still=True, **options)
+        return np.rint(255 * _pixels(tmp_path / file))
+
+    return run
+
+
+@pytest.mark.parametrize("view", ["Raw", "Standard"])
+def test_a_frame_holds_the_library_s_own_pixels(ready, rendered, part, view):
     assert ready.view_settings.view_transform == "Raw"
     ready.view_settings.view_transform = view
-    ready.render.filepath = str(tmp_path / "frame.png")
-    bpy.ops.render.render(write_still=True)
-    levels = np.rint(255 * _pixels(tmp_path / "frame.png"))
+    levels = rendered()
     assert levels.shape == (320, 240, 3)
     # A level: displacements of 30 mm coordinates are held in float32, and colour goes through sRGB's curve and back.
     assert np.abs(levels - _wanted(part).astype(float)).max() <= 1
@@ -61,29 +71,13 @@ def test_an_animation_writes_every_frame(ready, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["0078.png", "0079.png", "0080.png"]
 
 
-def test_the_percentage_scales_the_picture(ready, part, tmp_path):
-    ready.frame_set(80)
+def test_the_percentage_scales_the_picture(ready, rendered, part):
     ready.render.resolution_percentage = 200
-    ready.render.filepath = str(tmp_path / "large.png")
-    bpy.ops.render.render(write_still=True)
-    large = np.rint(255 * _pixels(tmp_path / "large.png"))
+    large = rendered()
     assert large.shape == (640, 480, 3)
     small = large.reshape(320, 2, 240, 2, 3).mean(axis=(1, 3))
     # The same view: means of four pixels against one, which differ at the dent's steep rim alone.
     assert np.abs(small - _wanted(part)).mean() < 1
-
-
-@pytest.fixture
-def rendered(ready, tmp_path):
-    """``rendered(file="frame.png", **options)``: renders frame 80 and reads the levels of the file."""
-    ready.frame_set(80)
-
-    def run(file="frame.png", **options):
-        ready.render.filepath = str(tmp_path / "frame.png")
-        bpy.ops.render.render(write_still=True, **options)
-        return np.rint(255 * _pixels(tmp_path / file))
-
-    return run
 
 
 @pytest.mark.parametrize("percent", [12, 33, 66, 67, 150])
@@ -273,15 +267,10 @@ def test_exr_holds_the_same_in_float(ready, part, tmp_path):
     assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
 
 
-def test_lights_change_their_own_colour(ready, tmp_path):
-    ready.frame_set(80)
-    levels = []
-    for factor in (1.0, 0.2):
-        bpy.data.lights["LED red"].energy *= factor
-        ready.render.filepath = str(tmp_path / f"{factor}.png")
-        bpy.ops.render.render(write_still=True)
-        levels.append(_pixels(tmp_path / f"{factor}.png"))
-    change = np.abs(levels[0] - levels[1]).max(axis=(0, 1))
+def test_lights_change_their_own_colour(ready, rendered):
+    levels = rendered()
+    bpy.data.lights["LED red"].energy *= 0.2
+    change = np.abs(levels - rendered()).max(axis=(0, 1)) / 255
     # A unit's LEDs leak into the other colours: the shipped response has at most 0.26 of the red one, in a corner.
     assert change[0] > 0.1 and change[0] > 3 * max(change[1], change[2])
 
@@ -346,13 +335,11 @@ TRACED = importlib.util.find_spec("mitsuba") is not None
 
 
 @pytest.mark.skipif(not TRACED, reason="mitsuba is missing")
-def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, part, tmp_path):
-    ready.frame_set(80)
+def test_a_preset_of_mitsuba_draws_nearly_the_same(ready, rendered, part):
     ready.tactile_render.preset = "standard"
-    ready.render.filepath = str(tmp_path / "frame.png")
-    bpy.ops.render.render(write_still=True)
-    levels = 255 * _pixels(tmp_path / "frame.png")
-    assert np.sqrt(np.mean((levels - _wanted(part)) ** 2)) < 5  # grey levels: fast and standard differ by one or two
+    assert (
+        np.sqrt(np.mean((rendered() - _wanted(part)) ** 2)) < 5
+    )  # grey levels: fast and standard differ by one or two
 
 
 @pytest.fixture

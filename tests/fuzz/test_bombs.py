@@ -112,12 +112,9 @@ def tensor(begin, end, shape, dtype="F32"):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (safetensors({"a": tensor(0, 16, [4]), "b": tensor(8, 24, [4])}, bytes(24)), "from byte 8"),  # overlap
         (safetensors({"a": tensor(0, 2**62, [2**60])}, bytes(24)), "a range inside"),
         (safetensors({"a": tensor(0, 8, [2**60, 2**60])}, bytes(8)), "for shape"),
-        (safetensors({"a": tensor(0, 8, [-2])}, bytes(8)), "whole numbers"),
         (safetensors({"a": tensor(-8, 0, [2])}, bytes(8)), "whole numbers"),
-        (safetensors({"a": tensor(0, 16, [4])}, bytes(24)), "24 bytes of data"),
         (struct.pack("<Q", 2**63) + b"{}", "header of"),
         (struct.pack("<Q", 900_000) + b"[" * 900_000, "not JSON"),
     ],

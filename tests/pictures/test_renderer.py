@@ -197,16 +197,13 @@ def test_a_background_in_other_units_is_refused(levels, small):
         assert Renderer(small, "fast", background=np.full((*small.camera.shape, 3), kept)).background.max() <= 255
 
 
-def test_heights_in_millimetres_are_refused(small):
+def test_heights_in_millimetres_of_the_other_sign_and_changes_alone_are_refused(small):
     """A dent of half a millimetre, as half a metre: away from the camera nothing else stops it."""
-    with pytest.raises(TactileError, match=r"50\d\.\d\d mm below the undeformed gel; .* Give metres"):
-        Renderer(small, "fast")(np.full(small.camera.shape, -0.5))
-
-
-def test_heights_of_the_other_sign_and_changes_alone_are_refused(small):
     rest = rest_height_map(small.camera)
-    for wrong in (-rest, rest - rest):
-        with pytest.raises(TactileError, match=r"mm below the undeformed gel; .* add the undeformed gel's"):
+    add = r"mm below the undeformed gel; .* add the undeformed gel's"
+    deep = r"50\d\.\d\d mm below the undeformed gel; .* Give metres"
+    for wrong, words in ((np.full(rest.shape, -0.5), deep), (-rest, add), (rest - rest, add)):
+        with pytest.raises(TactileError, match=words):
             Renderer(small, "fast")(wrong)
 
 

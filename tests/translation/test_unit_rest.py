@@ -20,6 +20,7 @@ from tactile_core.translation import adapt, networks, reference_signals
 from tactile_core.translation.unit_rest import find_rest, read_rest
 
 REST = np.linspace(3100.0, 3500.0, 19)
+UNIT = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
 
 
 def held(strength: float, seed: int, *, pdc: bool = True, drift: float = 3.0) -> recordings.Recording:
@@ -108,16 +109,15 @@ def test_a_rest_that_a_grip_may_be_is_said(tmp_path):
 
 
 def test_a_grip_without_rest_is_measured_from_the_unit_s_own():
-    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     grip = held(0.6, 3)
-    bare, found = recordings.prepare(grip), Preparer(None, unit)(grip)
+    bare, found = recordings.prepare(grip), Preparer(None, UNIT)(grip)
     assert np.abs(bare.change).max() < 10  # the grip is calm, and taken for rest
     np.testing.assert_allclose(found.change.mean(axis=0), grip.electrodes.mean(axis=0) - REST, atol=1e-6)
     assert not (found.flags & Flag.NO_QUIET_PART).any() and found.report["polarity"] == "falls"
     assert found.pdc.mean() == pytest.approx(120, abs=2)
-    light = Preparer(None, unit)(held(0.01, 4))  # calm and near the unit's rest: its own is better
+    light = Preparer(None, UNIT)(held(0.01, 4))  # calm and near the unit's rest: its own is better
     assert light.quiet.any() and np.abs(light.change).max() < 10
-    said = Preparer(PrepareOptions(tare="0:50"), unit)(grip)
+    said = Preparer(PrepareOptions(tare="0:50"), UNIT)(grip)
     assert np.abs(said.change).max() < 10  # the user's own frames stand
 
 
@@ -177,19 +177,17 @@ def in_box(places: np.ndarray) -> np.ndarray:
 
 
 def test_a_quiet_part_under_the_pressure_of_rest_is_kept_however_far_it_drifted():
-    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     drifted = held(0.0, 5, drift=0.0)
     drifted = dataclasses.replace(drifted, electrodes=drifted.electrodes + 90)
-    found = Preparer(None, unit)(drifted)
+    found = Preparer(None, UNIT)(drifted)
     assert found.quiet.any() and np.abs(found.change).max() < 10
-    grip = Preparer(None, unit)(held(0.6, 3))
+    grip = Preparer(None, UNIT)(held(0.6, 3))
     assert any("rest is the unit's own: what is calm lies up to" in warning for warning in grip.warnings)
 
 
 def test_pressure_of_another_zero_is_not_measured_from_the_unit_s(tmp_path):
-    unit = ElectrodeGains("made", [1.0] * 19, [0.0] * 19, REST.tolist(), [5.0] * 19, 1000.0)
     grip = held(0.6, 3)
-    found = Preparer(None, unit)(dataclasses.replace(grip, pdc=grip.pdc - 1000))
+    found = Preparer(None, UNIT)(dataclasses.replace(grip, pdc=grip.pdc - 1000))
     assert np.abs(found.pdc).max() < 200
     tared = [dataclasses.replace(one, pdc=one.pdc - 1000) for one in (held(s, k) for k, s in enumerate((0.01, 0.1, 1)))]
     assert find_rest(tared).pdc is None
