@@ -81,6 +81,22 @@ def test_shear_back_and_forth_returns_while_everything_sticks(solid):
     np.testing.assert_allclose(back.force, touch.force, atol=1e-5 * np.abs(touch.force).max())
 
 
+def test_a_step_that_fails_is_halved_until_it_is_reported(solid, monkeypatch):
+    """Beyond 0.3 of the way every step fails, from the whole way down to a sixteenth of it."""
+    contact, solve_step, tried = problem(solid), FiniteStrainContact._solve, []
+
+    def part_of_the_way(self, pose, touch):
+        tried.append((pose.apex - contact.pose.apex)[1] / 0.4e-3)
+        if tried[-1] > 0.3:
+            raise FloatingPointError
+        return solve_step(self, pose, touch)
+
+    monkeypatch.setattr(FiniteStrainContact, "_solve", part_of_the_way)
+    with pytest.raises(NoEquilibriumError, match="no equilibrium beyond 25% of the way"):
+        contact.press(0.4e-3, step=0.4e-3)
+    assert tried == pytest.approx([1, 0.5, 0.25, 0.75, 0.5, 0.375, 0.3125])
+
+
 def test_unloading_gives_the_resting_shape_back(solid):
     contact = problem(solid)
     touch = contact.press(0.4e-3, step=0.4e-3)
