@@ -144,7 +144,7 @@ def test_links_lead_nowhere_else_and_a_missing_file_is_named(ball):
     (ball / "link.stl").symlink_to(ball.parent / "ball.stl")
     (ball / "folder").symlink_to(ball.parent)
     (ball / "circle.stl").symlink_to("circle.stl")
-    out, none = "a link out", "indenter 'm', file"
+    out, none = "a link out", "indenter 'm', file: 'none.stl' is not there"
     for name, said in (("link.stl", out), ("folder/ball.stl", out), ("circle.stl", "circle.stl"), ("none.stl", none)):
         with pytest.raises(TactileError, match=said):
             load_scene(mesh_scene(ball, name))
