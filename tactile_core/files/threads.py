@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import os
+import sys
+import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -23,3 +27,48 @@ def one_thread() -> threadpoolctl.threadpool_limits:
 
     os.environ.update(ONE)
     return threadpoolctl.threadpool_limits(1, user_api="blas")  # torch's own threads, of training, stay
+
+
+class _OneThread(contextlib.ContextDecorator):
+    """Keep linear algebra in one thread while a block, or a function decorated with it, runs in any thread."""
+
+    def __init__(self) -> None:
+        self._lock, self._running = threading.Lock(), 0
+        self._before: list[tuple[threadpoolctl.LibController, int]] = []  # libraries, and their numbers of threads
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._running:
+                libraries = _libraries("scipy.linalg" in sys.modules)
+                self._before = [(each, each.num_threads) for each in libraries if each.num_threads != 1]
+                for library, _ in self._before:
+                    _set_threads(library, 1)
+            self._running += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._running -= 1
+            for library, count in () if self._running else self._before:
+                _set_threads(library, count)
+
+
+in_one_thread = _OneThread()
+
+
+@functools.cache
+def _libraries(scipy_is_loaded: bool) -> list[threadpoolctl.LibController]:
+    """Find the libraries of linear algebra that are loaded; scipy brings one of its own."""
+    import threadpoolctl
+
+    return threadpoolctl.ThreadpoolController().select(user_api="blas").lib_controllers
+
+
+def _set_threads(library: threadpoolctl.LibController, count: int) -> None:
+    """Set a library's number of threads, from any thread: threadpoolctl keeps that to the first one that did, since
+    version 3.7, until told otherwise."""
+    free = getattr(library, "clear_controlling_thread", None)
+    if free is not None:
+        free(force=True)
+    library.set_num_threads(count)
+    if free is not None:
+        free(force=True)

@@ -15,6 +15,7 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError, finite_number
 from ..files.installed import require
+from ..files.threads import in_one_thread
 from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
@@ -53,15 +54,12 @@ class Gel:
 
     sensor : name of a sensor, such as "digit" or "biotac"
     indenter : one of ``geometry.indenters``, or a closed ``trimesh.Trimesh`` in metres
-    friction : Coulomb's coefficient; 0 for none
+    friction : Coulomb's coefficient, 0 for none; preset : of the pictures
     calibration : the camera and its lights, of ``load_calibration``, or their file; None for the one that ships
-    preset : of the pictures
-    texture : (h, w), 0 black to 1 white or 8 bits, of the indenter: what shows through the coating where it touches.
-        It spans the body, columns along its own x, rows from the greatest own y down; a photograph of the face that
-        presses is its mirror image. None for the calibration's reflectance everywhere
+    texture : (h, w), 0 black to 1 white or uint8, of the indenter, which shows through the coating where it touches:
+        columns along own x, rows from the greatest own y down, as a mirrored photograph; None for the calibration's
     Raises TactileError for another sensor, and for meshes and values that no indenter can have; ModuleNotFoundError
-    without the extra [fem], and without [render] for presets other than ``fast``.
-    """
+    without the extra [fem], and without [render] for presets other than ``fast``."""
 
     def __init__(
         self, sensor: str = sensors.TARGET, indenter: Any = None, *,
@@ -105,6 +103,7 @@ class Gel:
         reported in ``flags``."""
         return self._step(*given(pose, force))
 
+    @in_one_thread
     def _step(self, here: Pose, force: float | None) -> GelContact:
         """Do ``press`` to a checked pose and force."""
         flags: list[str] = []
@@ -160,6 +159,7 @@ class Gel:
         """Area (n,) m2 of the resting surface that belongs to each node."""
         return node_areas(self.sensor)
 
+    @in_one_thread
     def height_map(self) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact, in which it
         follows the indenter between its nodes, too. Where a hard slide folds the gel over itself a height is a guess.
@@ -176,7 +176,7 @@ class Gel:
     def picture(self) -> np.ndarray:
         """Return the picture (H, W, 3) uint8 of the last contact. Raises TactileError for a sensor without camera."""
         heights, reflectance = self.height_map(), None
-        if self.texture is not None:
+        if self.texture is not None and self._contact.patch.any():
             reflectance = reflectance_on(self.texture, heights, self._renderer.camera, self.indenter, self._under)
         return self._renderer(heights, self._renderer.marks(self._contact.displacement), reflectance)
 
@@ -293,8 +293,8 @@ class Gel:
         pressed = traction(self.sensor, nodes, found.corrected.factor * linear.nodal_force)
         patch = np.zeros(len(pressed), bool)
         patch[nodes] = True
-        slipping = float(linear.slipping.mean()) if len(nodes) and self.friction else 0.0
         return GelContact(
-            found.force, found.corrected.displacement, pressed, patch, slipping, found.depth, found.pressure,
+            found.force, found.corrected.displacement, pressed, patch,
+            float(linear.slipping.mean()) if len(nodes) and self.friction else 0.0, found.depth, found.pressure,
             matrix_of(linear.pose), tuple(flags),
         )  # fmt: skip

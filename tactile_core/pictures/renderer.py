@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import TactileError
 from ..files.compiled import Loop, available
 from ..files.installed import needing
+from ..files.threads import in_one_thread
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import calibration_of
 from ..sensors.camera import COLOURS
@@ -101,6 +102,7 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
+    @in_one_thread
     def __call__(
         self, height_map: np.ndarray, marks: np.ndarray | None = None, reflectance: np.ndarray | None = None
     ) -> np.ndarray:
@@ -108,7 +110,8 @@ class Renderer:
         marks : (H, W) share of light that dots leave, from ``marks``; required for a unit with dots
         reflectance : (H, W), 0 black to 1 white, of the object behind each point of height_map, whose light shows
             through the coating where it touches; None for the calibration's ``object_reflectance`` everywhere"""
-        if marks is None and self._rest_picture is not None and np.array_equal(height_map, self._resting):
+        plain = marks is None and reflectance is None
+        if plain and self._rest_picture is not None and np.array_equal(height_map, self._resting):
             return self._rest_picture.copy()
         return self.picture(self.radiance(height_map, reflectance), marks=marks)
 
@@ -145,7 +148,7 @@ class Renderer:
             reflectance = camera_array(reflectance, self.camera.shape, "reflectance")
             if reflectance.min() < 0 or reflectance.max() > 1:
                 found = f"values from {reflectance.min():g} to {reflectance.max():g}"
-                raise TactileError("reflectance", found, "0 black to 1 white", "Divide grey levels by 255")
+                raise TactileError("reflectance", found, "0 black to 1 white", "Divide by the level of white")
         return self._spread_radiance(self._heights(height_map, "height map"), reflectance)
 
     def _spread_radiance(self, heights: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError, file_name
+from ..files.threads import in_one_thread
 from ..recordings import PrepareOptions, Recording, Signals
 from ..recordings.preparer import Preparer
 from ..sensors import SOURCE, TARGET
@@ -96,6 +97,7 @@ class PreparedRows:
         return self.recording.time[rows], self.signals.at(rows)
 
 
+@in_one_thread
 def translate(
     recording: Recording,
     *,

@@ -2,12 +2,14 @@
 
 import subprocess
 import sys
+import threading
 
 import numpy as np  # noqa: F401 - loads a library of linear algebra
 import pytest
 import threadpoolctl
 from conftest import ROOT
 
+import tactile_core as tactile
 from tactile_core.files import threads
 
 SCENE = ROOT / "scenes" / "training"
@@ -48,6 +50,37 @@ def test_libraries_that_are_loaded_are_limited_and_have_their_threads_back(monke
         with threads.one_thread():
             assert set(counts()) <= {1}
         assert counts() == before
+
+
+def test_the_last_of_several_blocks_gives_the_threads_back():
+    @threads.in_one_thread
+    def inner():
+        return counts()
+
+    with threadpoolctl.threadpool_limits(2, user_api="blas"):
+        before = counts()
+        with threads.in_one_thread:
+            assert set(inner()) == {1}
+            assert set(counts()) == {1}
+            other = threading.Thread(target=inner)
+            other.start()
+            other.join()
+            assert set(counts()) == {1}
+        assert counts() == before
+        with pytest.raises(ZeroDivisionError), threads.in_one_thread:
+            1 / 0  # noqa: B018
+        assert counts() == before
+
+
+def test_a_gel_and_a_translation_give_the_same_bytes_at_any_number_of_threads():
+    recording, found = tactile.read(ROOT / "scenes/press_roll_slide/press_roll_slide.h5"), []
+    for count in (1, 2):
+        with threadpoolctl.threadpool_limits(count, user_api="blas"):
+            gel = tactile.Gel("digit", tactile.indenters.Sphere(15e-3))
+            contact = gel.press(gel.touching(-7e-3, 0.0), force=2.0)
+            touch = tactile.translate(recording, frames=slice(100, 140))
+            found.append((contact.displacement.tobytes(), gel.picture().tobytes(), touch.displacement_digit.tobytes()))
+    assert found[0] == found[1]
 
 
 def counts():

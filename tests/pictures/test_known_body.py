@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 from tactile_core.errors import TactileError
+from tactile_core.files.threads import in_one_thread
 from tactile_core.geometry.indenters import Box, Cylinder, Sphere
 from tactile_core.jobs.gel import Gel
 from tactile_core.mechanics.fast.active_set import UnsolvedError
@@ -25,7 +26,8 @@ def pressed(indenter, depth, friction=0.5):
 def between_nodes(gel):
     """Heights (H, W) m, by the nodes alone and as they are, and the rest's."""
     mapper = gel_mapper()
-    return mapper(gel.contact.displacement), gel.height_map(), mapper.rest
+    with in_one_thread:  # several threads round sums otherwise
+        return mapper(gel.contact.displacement), gel.height_map(), mapper.rest
 
 
 def gaps(gel, heights):
@@ -58,12 +60,17 @@ def test_a_ball_s_print_comes_nearer_to_the_converged_one(depth):
         assert (errors(heights) < 0.65 * errors(by_nodes)).all()
 
 
-@pytest.mark.parametrize("indenter", [Sphere(3e-3), Box((6e-3,) * 3, 0.1e-3), Cylinder(3e-3, 0.1e-3)], ids=repr)
-def test_no_gel_is_inside_the_body_and_what_was_outside_stays(indenter):
-    gel = pressed(indenter, 0.3e-3)
+@pytest.mark.parametrize(
+    ("indenter", "depth"),
+    [(Sphere(3e-3), 0.3e-3), (Sphere(150e-3), 1e-3), (Box((6e-3,) * 3, 0.1e-3), 0.3e-3),
+     (Cylinder(3e-3, 0.1e-3), 1e-3)], ids=repr,
+)  # fmt: skip
+def test_no_gel_is_inside_the_body_and_what_was_outside_stays(indenter, depth):
+    gel = pressed(indenter, depth)
     by_nodes, heights, _ = between_nodes(gel)
     assert gaps(gel, by_nodes).min() < -10e-6  # the check can fail
-    assert gaps(gel, heights).min() > -1e-6
+    assert gaps(gel, heights).min() > -5e-6  # by 5 um at upright walls, which 20 rounds leave
+    assert gaps(gel, heights)[heights > by_nodes].max() < 5e-6  # none is raised past the body
     outside = gaps(gel, by_nodes) >= 0
     assert (heights[outside] == by_nodes[outside]).all()
     assert (heights >= by_nodes).all()
@@ -93,6 +100,17 @@ def test_grooves_finer_than_nodes_are_seen():
     assert marks(heights) > 3 * marks(by_nodes)
 
 
+@pytest.mark.parametrize(("depth", "force"), [(0.1e-3, 1.0), (3e-3, None)], ids=["force", "too deep"])
+def test_heights_are_those_where_the_contact_was_solved(depth, force):
+    """Not where the pose was asked for: with a force the indenter moves on, and too deep it stays behind."""
+    gel = Gel("digit", Sphere(3e-3))
+    contact = gel.press(gel.touching(-7e-3, 0.0, depth), force=force)
+    assert abs(contact.depth - depth) > 0.2e-3
+    inside = gaps(gel, gel.height_map())
+    assert inside.min() > -5e-6
+    assert (np.abs(inside) < 5e-6).sum() > 500
+
+
 def test_an_unsolved_step_keeps_its_picture(monkeypatch):
     gel = pressed(Sphere(3e-3), 0.3e-3)
     before = gel.height_map()
@@ -105,7 +123,8 @@ def test_a_contact_beside_the_picture_changes_nothing_in_it():
     gel = Gel("digit", Sphere(1e-3))
     gel.press(gel.touching(3e-3, 0.0, 0.2e-3))
     assert gel.contact.patch.any()
-    assert (gel.height_map() == gel_mapper()(gel.contact.displacement)).all()
+    by_nodes, heights, _ = between_nodes(gel)
+    assert (heights == by_nodes).all()
 
 
 def test_a_texture_shows_through_where_the_body_touches_and_turns_with_it():
@@ -134,7 +153,8 @@ def test_a_texture_shows_through_where_the_body_touches_and_turns_with_it():
 @pytest.mark.parametrize(
     ("texture", "words"),
     [(np.ones((4, 4, 3)), "Average"), (np.full((4, 4), 7.0), "Divide"), (np.full((4, 4), np.nan), "nan"),
-     (np.ones((1, 4)), "2 x 2"), ([["a"]], "grey")],
+     (np.full((4, 4), 40000, np.uint16), "white"), (np.ones((1, 4)), "2 x 2"), ([["a"]], "grey"),
+     ([[1, 0], [1]], "grey")],
 )  # fmt: skip
 def test_what_is_no_texture_is_refused(texture, words):
     with pytest.raises(TactileError, match=words):
@@ -145,4 +165,4 @@ def test_what_is_no_reflectance_is_refused():
     renderer = Renderer(preset="fast")
     for reflectance, words in ((np.ones((2, 2)), "shape"), (np.full(renderer.camera.shape, 2.0), "Divide")):
         with pytest.raises(TactileError, match=words):
-            renderer(gel_mapper().rest + np.float32(1e-4), reflectance=reflectance)
+            renderer(gel_mapper().rest, reflectance=reflectance)
