@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib.util
 import os
 import sys
 import threading
@@ -57,7 +58,10 @@ in_one_thread = _OneThread()
 
 @functools.cache
 def _libraries(scipy_is_loaded: bool) -> list[threadpoolctl.LibController]:
-    """Find the libraries of linear algebra that are loaded; scipy brings one of its own."""
+    """Find the libraries of linear algebra that are loaded; scipy brings one of its own. None where Blender has
+    none of the extension's wheels."""
+    if importlib.util.find_spec("threadpoolctl") is None:
+        return []
     import threadpoolctl
 
     return threadpoolctl.ThreadpoolController().select(user_api="blas").lib_controllers

@@ -159,7 +159,6 @@ class Gel:
         """Area (n,) m2 of the resting surface that belongs to each node."""
         return node_areas(self.sensor)
 
-    @in_one_thread
     def height_map(self) -> np.ndarray:
         """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact, in which it
         follows the indenter between its nodes, too. Where a hard slide folds the gel over itself a height is a guess.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..files.threads import in_one_thread
 from ..sensors.camera import Camera
 
 FINE = 2.5  # least coarse pixels in a standard deviation: a sum of such Gaussians is even to 1e-8 of its size
@@ -25,6 +26,7 @@ class CoatingSpread:
             self.down, self.right = _means(camera.height, deviation / down), _means(camera.width, deviation / right)
             self._down, self._right = _blocks(self.down[1]), _blocks(self.right[1])
 
+    @in_one_thread
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
         """Smooth pictures (..., H, W) float32; near an edge, over the part inside the picture."""
         if self.none:

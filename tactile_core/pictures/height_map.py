@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import TactileError
 from ..files.compiled import available
+from ..files.threads import in_one_thread
 from ..geometry.cubic_spline import bspline_weights
 from ..geometry.lattice import Lattice
 from ..sensors.calibration import Calibration
@@ -74,6 +75,7 @@ class HeightMapper:
         self.rest = (down @ self.rest_y @ right.T).astype(np.float32)
         self.rest.flags.writeable = False
 
+    @in_one_thread
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
         """Return heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
 

@@ -10,7 +10,6 @@ import numpy as np
 from ..errors import TactileError
 from ..files.compiled import Loop, available
 from ..files.installed import needing
-from ..files.threads import in_one_thread
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import calibration_of
 from ..sensors.camera import COLOURS
@@ -102,7 +101,6 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<Renderer of a {self.camera.sensor}, preset {self.preset}, pictures {(*self.camera.shape, 3)}>"
 
-    @in_one_thread
     def __call__(
         self, height_map: np.ndarray, marks: np.ndarray | None = None, reflectance: np.ndarray | None = None
     ) -> np.ndarray:
