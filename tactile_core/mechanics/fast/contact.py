@@ -111,8 +111,7 @@ class ContactProblem:
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of followed nodes: ``near`` without points between nodes, which
-        ``EdgeContactProblem`` follows too."""
+        """Sorted touchable indices (n,) of followed nodes: ``near`` without ``EdgeContactProblem``'s points between."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
@@ -136,8 +135,7 @@ class ContactProblem:
         return contact
 
     def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
-        """Solve in one step: choose the nodes that may touch and where they begin, then go on as ``_rounds``.
-        axial_force : N, None for the pose's depth"""
+        """Solve in one step, as ``_rounds``, from chosen nodes. axial_force : N, None for the pose's depth"""
         before = start or self._nothing(self.pose)
         moved = self._moved(before)
         gap, _ = self._distance(pose, self.near, moved)
@@ -172,8 +170,7 @@ class ContactProblem:
 
     def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
         """Solve, look at the whole surface, take in what it shows, until nothing more is found.
-        axial_force : N, None for the pose's depth; before, moved : last contact, near nodes' displacement (n, 3) m in
-            it"""
+        axial_force : N, None for the pose's depth; before : last contact; moved : (n, 3) m, near nodes in it"""
         iterations, shift = 0, 0.0
         contact = self._nothing(pose)  # where every round found creases
         for _ in range(_MOST_ROUNDS):
@@ -192,7 +189,7 @@ class ContactProblem:
         return dataclasses.replace(contact, converged=False)
 
     def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
-        """Solve for the candidates, without or with friction; None where that fails. Arguments as in ``_rounds``."""
+        """Solve for candidates, with friction or without; None where that fails. Arguments as in ``_rounds``."""
         self.work.check()
         block = self._block
         if block is None or not (

@@ -43,8 +43,7 @@ class Try:
     """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core_force (c,) N, shift m along the motion.
     active : (k + c,) bool, which touch; settled : true if it fulfils the tolerances; iterations : so far
     slipping : (k,) bool, nodes whose friction is at its limit; without friction all
-    creases : nodes (j,) of the block that flip between two faces, points (j, 3) m of the face they left, and normals
-        (j, 3) there; None if no node does"""
+    creases : nodes (j,) that flip between two faces, points (j, 3) m and normals (j, 3) of the face left, or None"""
 
     displacement: np.ndarray
     force: np.ndarray
@@ -128,8 +127,7 @@ class Frictionless:
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from the first guess ``begin``: the contact where ``pose`` and its shift stand, or, if not None, that
-        at ``axial_force``, N along the motion.
+        """Solve from the guess ``begin`` the contact at ``pose``, shifted, or at ``axial_force``, N along the motion.
         The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step
         fails."""
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
