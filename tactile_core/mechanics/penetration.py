@@ -75,8 +75,6 @@ def check_follows(
         first
     normals : (k, 3), outward, of the indenter at the nodes that carry force
     behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back"""
-    if not len(normals) and depth > _LEAST:
-        raise _let_through(where, f"the indenter is {depth * 1e3:.2f} mm deep and touches none of the surface's nodes")
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
         raise _let_through(where, found)
