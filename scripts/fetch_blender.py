@@ -110,7 +110,7 @@ def wrapper(tree: Path) -> Path:
 
 
 def photograph(binary: Path) -> None:
-    """Photograph the window at each of ``STAGES``, out/screenshots/<stage>.png; binary : runs the tree's Blender"""
+    """Photograph the window at each of ``STAGES``, out/screenshots/<stage>.png; binary : of ``wrapper``"""
     out = ROOT / "out" / "screenshots"
     out.mkdir(parents=True, exist_ok=True)
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]

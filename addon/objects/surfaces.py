@@ -40,8 +40,8 @@ def triangles_of(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) -> None:
-    """Assign a material that shows the object's own colour, so that it can be animated and seen in every shading.
-    colour : red, green, blue and opacity, 0 to 1"""
+    """Add a material that shows the object's own colour, which can be animated and is seen in every shading.
+    colour : red, green, blue and opacity, 0 to 1; not seen on a mesh that has another material already"""
     thing.color = colour
     thing.data.materials.append(_material())
 

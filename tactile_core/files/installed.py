@@ -12,7 +12,7 @@ PACKAGE = "tactile-core"
 
 
 def advice(extra: str) -> str:
-    """Return the command that installs the libraries of an extra: from the checkout, or each by its own name."""
+    """Return, for a message, the command that installs an extra: in the checkout, or each library by its own name."""
     root = checkout()
     size = " (torch on Linux fetches CUDA's libraries too, some GB)" if extra == "train" else ""
     if root is not None:

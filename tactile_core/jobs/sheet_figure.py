@@ -134,7 +134,8 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write above each column its number, from 1, and the time, seconds (k,), or the number of a snapshot."""
+        """Write above each column its number, from 1, and its time; seconds : (k,), of a figure made with
+        ``snapshots`` their numbers"""
         for k, at in enumerate(seconds):
             text = f"{k + 1}:  {self._heading.format(at)}"
             self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")

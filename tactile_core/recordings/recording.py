@@ -29,8 +29,8 @@ class Truth(Summary):
 
     displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
     displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
-    force : (T, 3) float, N, exerted by the object on the sensor
-    contact_center : (T, 2) float, m, (x, z) on the DIGIT after unrolling; NaN without contact
+    force : (T, 3) float, N, of the object on the BioTac or, where that was not solved, on the first sensor
+    contact_center : (T, 2) float, m, (x, z) of pressure on the first gel at rest; NaN without contact
     traction_biotac : (T, N, 3) float32, Pa, of the object on the resting skin's nodes
     traction_digit : (T, M, 3) float32, Pa, of the object on the resting gel's nodes
     displacement, traction : the same of further sensors, by their names"""

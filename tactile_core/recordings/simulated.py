@@ -89,7 +89,8 @@ def write_simulated(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Read an opened file, true values as float32 m. Raises TactileError for misfits, and without electrodes."""
+    """Read an opened file; layout : its name in words, kept in the recording. Raises TactileError for misfits, and
+    without electrodes."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")

@@ -184,8 +184,8 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Loss of the fluid's pressure, on the head's scale, from the noisy signal with its sign. (Relative errors in its
-    place biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
+    """Mean square error of the fluid's pressure, on the head's scale, from noisy signals, rectified ones left out.
+    (Relative errors in its place biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
     signed = batch.signal[:, -1:] == 0
     error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return (signed * error.square()).sum() / signed.sum().clamp(min=1)

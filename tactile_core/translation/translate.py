@@ -157,12 +157,12 @@ def translate(
 
 
 def translated(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Translation:
-    """Translate rising frames (T,) of prepared rows."""
+    """Translate rising frames (T,) of a recording; rows : prepared for them"""
     return Translation.joined(list(translated_parts(translator, rows, frames)))
 
 
 def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Iterator[Translation]:
-    """Yield the translations of rising frames (T,) of prepared rows, `CHUNK` at a time."""
+    """Yield the translations of rising frames (T,) of a recording, `CHUNK` at a time; rows : prepared for them"""
     whole = RecordingPass(translator, rows.read, rows.count)
     for start in range(0, len(frames), CHUNK):
         yield whole(frames[start : start + CHUNK]).translation

@@ -57,7 +57,7 @@ class Stream:
 
 def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
     """Return the fingers with signals in the chosen topic, or in all; of a topic without any, its first finger.
-    chosen : `split` of a path; a finger that it names is returned alone, with signals or not
+    chosen : `split` of a path; a finger that it names is returned alone of each topic, with signals or not
     Raises TactileError for a topic or finger that the bag does not have."""
     topics, finger = _topics(bag, chosen)
     found: list[Stream] = []

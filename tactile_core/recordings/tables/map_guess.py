@@ -169,7 +169,8 @@ def _is_raw(table: Table, name: str) -> bool:
 
 
 def _by_values(table: Table) -> list[ColumnMap]:
-    """Return the map of columns without names: electrodes are the 19 neighbouring columns with the highest counts."""
+    """Return the map of columns without names: electrodes are the 19 neighbouring columns with the highest counts;
+    the last 19 where none look like counts, none of a table with names."""
     names = table.header
     if not names[0].startswith("column") or len(names) < ELECTRODES:
         return [_beside((), names)]
