@@ -50,7 +50,8 @@ def played(thing: bpy.types.Object) -> tuple[float, float] | None:
     Keyframes of its place, and F-curves that go on beyond their keys or are repeated, say nothing of that."""
     keys = thing.data.shape_keys
     owner, path = (keys, "eval_time") if keys else (thing, '["dent_um"]')
-    if owner.animation_data is None or owner.animation_data.action is None:
+    moves = owner.animation_data
+    if moves is None or moves.action is None or getattr(moves, "action_slot", moves) is None:
         return None
     curve = curves.fcurves_of(owner).find(path)
     if curve is None or curve.modifiers or curve.extrapolation != "CONSTANT":

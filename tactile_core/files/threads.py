@@ -54,6 +54,8 @@ class _OneThread(contextlib.ContextDecorator):
 
 
 in_one_thread = _OneThread()
+if hasattr(os, "register_at_fork"):  # a child has none of the threads that are inside
+    os.register_at_fork(after_in_child=in_one_thread.__init__)  # type: ignore[misc]
 
 
 @functools.cache

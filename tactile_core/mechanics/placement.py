@@ -210,7 +210,7 @@ def friction_of(value: float, where: str) -> float:
     """Return ``value``, a friction's coefficient, as a float; raises TactileError, naming ``where``, for less than 0 or
     more than 5."""
     expected = f"Coulomb's coefficient, 0 to {MOST_FRICTION:g}"
-    return finite_number(value, where, expected, 0.0, MOST_FRICTION, "Divide per cent by 100")
+    return finite_number(value, where, expected, 0.0, MOST_FRICTION, "Divide per cent by 100; 5 sticks")
 
 
 @dataclasses.dataclass(frozen=True)

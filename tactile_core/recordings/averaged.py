@@ -1,4 +1,4 @@
-"""Find recordings that hold moving averages of the readings."""
+"""Find recordings whose readings lack a finger's noise: moving averages, filtered ones, simulations without noise."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from .recording import BLOCK, Recording
 from .rest_level import Framewise
 
 # Share of turns by noise below which readings are averaged. Rounded to counts, half of 142 real recordings turn in .149
-# and more of the samples, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06.
+# and more of the samples, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06; through a
+# Butterworth filter of 20 Hz, which does no harm, in .033.
 LEAST_TURNS = TURNS / 2
 AT = 100.0  # Hz at which turns are counted: rows interpolated to a higher rate are no averages
+FEWEST = 100  # rows whose turns tell anything (assumed): a few rising ones have none
 HALF = 0.25  # s to either side, within which averages of 50 rows mix readings
 MOVES = 0.5  # share of a change by which it moves within them, to be doubted (assumed)
 COARSE = 2.0  # counts between readings from which noise is lost in their steps, so that nothing is known
@@ -27,8 +29,8 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
     if recording.simulated or not np.isfinite(recording.time).all() or not _lacks_noise(readings, recording.rate):
         return flags
     warnings.append(
-        "readings lack the noise of a finger: averaged over many rows, or simulated without noise. Where they move "
-        "within half a second, forces may be too low or too late, and are flagged: give readings as they were recorded"
+        "readings lack the noise of a finger: averaged, filtered, or simulated without noise. Where they move within "
+        "half a second, averages of many rows give forces too low or too late, and are flagged: give raw readings"
     )
     half = max(1, round(HALF * recording.rate))
     for start in range(0, len(readings), BLOCK):
@@ -45,5 +47,7 @@ def _lacks_noise(readings: np.ndarray, rate: float) -> bool:
     whole = np.rint(readings[: BLOCK * max(1, round(rate / AT)) : max(1, round(rate / AT))])
     whole = whole[~repeats(whole)[0]]
     steps = np.abs(np.diff(whole, axis=0))
+    if len(whole) < FEWEST:
+        return False
     fine = bool((steps > 0).any()) and np.percentile(steps[steps > 0], 5) < COARSE
     return fine and noise_turns(whole) < LEAST_TURNS

@@ -206,7 +206,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
     ratios = divider.film_impedance(rest) / divider.film_impedance(typical)
     ratio = float(np.median(ratios))
     if 1 / STRANGE_REST <= ratio <= STRANGE_REST:
-        strange = (np.abs(np.log(ratios)) > np.log(STRANGE_ELECTRODE)) & (rest > 0) & (rest < COUNT_MAX)
+        strange = (np.abs(np.log(ratios)) > np.log(STRANGE_ELECTRODE)) & (rest > 0) & (rest < COUNT_MAX) | (rest < 0)
         if strange.any():
             warnings.append(
                 f"{named_electrodes(strange)} at {', '.join(f'{each:.4g}' for each in rest[strange])} counts at rest, "

@@ -64,7 +64,8 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
     slope = (at_end - at_start) / recording.duration if recording.duration > 0 else np.zeros(len(at_start))
     window = options.smooth or (RECTIFIED if kind == "rectified" else SIGNED)
     change = _changes(readings, rest, window)
-    flags |= averaged(recording, readings, change, warnings)
+    if kind == "raw":
+        flags |= averaged(recording, readings, change, warnings)
     polarity = _polarity(recording, readings, change, kind, quiet, options, rest_known=unit_rest is not None)
     flags |= np.uint16(polarity.doubt)
     warnings += polarity.warnings
