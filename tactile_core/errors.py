@@ -54,7 +54,7 @@ def finite_number(
     return number
 
 
-def file_name(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:
+def path_text(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:
     """Return the name of a file as text; raises TactileError unless it is text or an ``os.PathLike``."""
     if not isinstance(value, str | os.PathLike):
         raise TactileError(where, f"a {type(value).__name__}", expected, advice)

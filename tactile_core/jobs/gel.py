@@ -15,7 +15,6 @@ import numpy as np
 from .. import sensors
 from ..errors import TactileError, finite_number
 from ..files.installed import require
-from ..files.threads import in_one_thread
 from ..geometry.indenters import Indenter, Pose, as_indenter
 from ..mechanics.fast.active_set import UnsolvedError, Work
 from ..mechanics.fast.compliance import Compliance, compliance_of
@@ -24,7 +23,8 @@ from ..mechanics.node_areas import node_areas, traction
 from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, friction_of, same_line, thickness_under
 from ..pictures.height_map import folds_counted, gel_mapper
-from ..pictures.known_body import checked_texture, out_of_body, reflectance_on
+from ..pictures.known_body import out_of_body, reflectance_on
+from ..pictures.object_light import checked_reflectance
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration
@@ -74,7 +74,7 @@ class Gel:
         self.sensor, self.preset = sensor, preset
         self.friction = friction_of(friction, "Gel, friction")
         self.indenter: Indenter = as_indenter(indenter)
-        self.texture = None if texture is None else checked_texture(texture)
+        self.texture = None if texture is None else checked_reflectance(texture, "Gel, texture")
         self.surface = sensors.sensor_surface(sensor)
         self._calibration = None if calibration is None else calibration_of(calibration, "Gel, calibration")
         if self._calibration is not None and self._calibration.camera.sensor != sensor:
@@ -103,7 +103,6 @@ class Gel:
         reported in ``flags``."""
         return self._step(*given(pose, force))
 
-    @in_one_thread
     def _step(self, here: Pose, force: float | None) -> GelContact:
         """Do ``press`` to a checked pose and force."""
         flags: list[str] = []

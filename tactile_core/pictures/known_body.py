@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import TactileError
 from ..geometry.indenters import Indenter, Pose
 from ..sensors.camera import Camera
 from .height_map import MOVE_TOLERANCE
@@ -16,6 +15,8 @@ from .perspective import lookup
 _ROUNDS = 20  # of Newton's method, at most: a few for most pixels; at upright walls 4 um may be left
 _LEAST_SLOPE = 0.2  # of the distance along +y, by which a step is divided: a surface 80 degrees steep
 _BEYOND = 1e-3  # m, beyond the outermost nodes that touch: a ball of 150 mm radius dips into the spline that far out
+
+_ALL = slice(None)
 
 
 def out_of_body(
@@ -32,8 +33,7 @@ def out_of_body(
     if not (len(rows) and len(columns)):
         return heights
     near = np.ix_(rows, columns)
-    x, z = np.meshgrid(camera.gel_x[rows], camera.gel_z[columns], indexing="ij")
-    points = np.stack([x, heights[near] + camera.height_zero_y, z], axis=-1).reshape(-1, 3)
+    points = _points(camera, heights[near], rows, columns)
     gap, gradient = pose.distance(indenter, points)
     lowest, inside = points[:, 1].copy(), gap < 0
     left = np.flatnonzero(inside)
@@ -45,25 +45,8 @@ def out_of_body(
         if not len(left):
             break
     found = heights.copy()
-    found[near] += np.maximum(points[:, 1] - lowest, 0).reshape(x.shape)
+    found[near] += np.maximum(points[:, 1] - lowest, 0).reshape(len(rows), len(columns))
     return found
-
-
-def checked_texture(texture: np.ndarray) -> np.ndarray:
-    """Return a texture (h, w), 0 black to 1 white or grey levels of 8 bits, as float32 from 0 to 1. Raises
-    TactileError for another."""
-    try:
-        values = np.asarray(texture)
-    except ValueError:  # rows of unequal length
-        values = np.asarray(texture, object)
-    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
-        advice = "Average the three colours of a picture" if values.ndim == 3 else ""
-        raise TactileError("texture", f"{values.dtype} of shape {values.shape}", "grey (h, w), 2 x 2 or more", advice)
-    white = 255 if values.dtype == np.uint8 else 1
-    if not (values.min() >= 0 and values.max() <= white):
-        found = f"values from {values.min():g} to {values.max():g}"
-        raise TactileError("texture", found, "0 black to 1 white, or uint8", "Divide by the level of white")
-    return values.astype(np.float32) / np.float32(white)
 
 
 def reflectance_on(
@@ -71,13 +54,20 @@ def reflectance_on(
 ) -> np.ndarray:
     """Return the reflectance (H, W) float32 of the body behind gel at heights (H, W) m.
 
-    texture : (h, w) of ``checked_texture``, projected along the body's own z over its ``bounds``: columns along own x,
-        rows against own y, so that the first row is at the greatest y; 0 beside the body"""
-    x, z = np.meshgrid(camera.gel_x, camera.gel_z, indexing="ij")
-    own = pose.to_own(np.stack([x, heights + camera.height_zero_y, z], axis=-1).reshape(-1, 3))
+    texture : (h, w) of ``object_light.checked_reflectance``, projected along the body's own z over its ``bounds``:
+        columns along own x, rows against own y, so that the first row is at the greatest y; 0 beside the body"""
+    own = pose.to_own(_points(camera, heights))
     lower, upper = indenter.bounds()
     share = ((own - lower) / (upper - lower)).astype(np.float32)  # 0 to 1 over the body
     behind = ((share[:, :2] >= 0) & (share[:, :2] <= 1)).all(axis=1)
     rows, columns = texture.shape
     at = lookup((1 - share[:, 1]) * rows - 0.5, share[:, 0] * columns - 0.5, texture.shape)
     return (at(texture) * behind).reshape(heights.shape)
+
+
+def _points(
+    camera: Camera, heights: np.ndarray, rows: np.ndarray | slice = _ALL, columns: np.ndarray | slice = _ALL
+) -> np.ndarray:
+    """Return places (h w, 3) m, sensor's frame, of gel at heights (h, w) m under these rows and columns of pixels."""
+    x, z = np.meshgrid(camera.gel_x[rows], camera.gel_z[columns], indexing="ij")
+    return np.stack([x, heights + camera.height_zero_y, z], axis=-1).reshape(-1, 3)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..errors import TactileError
 from ..sensors.calibration import Calibration
 
 FULL = 0.5  # share of the largest rise that shows all of the light; less does in proportion (two photographs, see page)
@@ -28,3 +29,20 @@ def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray |
     if reflectance is not None:
         amount, share = unit.coating.transmission, share * reflectance
     return (amount * unit.facing).astype(np.float32)[:, None, None] * share
+
+
+def checked_reflectance(given: np.ndarray, name: str) -> np.ndarray:
+    """Return a map (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 from 0 to 1. Raises
+    TactileError, with ``name``, for another."""
+    try:
+        values = np.asarray(given)
+    except ValueError:  # rows of unequal length
+        values = np.asarray(given, object)
+    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
+        advice = "Average the three colours of a picture" if values.ndim == 3 else ""
+        raise TactileError(name, f"{values.dtype} of shape {values.shape}", "grey (h, w), 2 x 2 or more", advice)
+    white = 255 if values.dtype == np.uint8 else 1
+    if not (values.min() >= 0 and values.max() <= white):
+        found = f"values from {values.min():g} to {values.max():g}"
+        raise TactileError(name, found, "0 black to 1 white, or uint8", "Divide by the level of white")
+    return values.astype(np.float32) / np.float32(white)

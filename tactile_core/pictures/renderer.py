@@ -23,7 +23,7 @@ from .mitsuba.gel_light import GelLight
 from .mitsuba.gel_scene import NOTHING, Surroundings
 from .mitsuba.matte_light import MatteLight
 from .mitsuba.variant import LLVM, choose_variant
-from .object_light import object_light
+from .object_light import checked_reflectance, object_light
 from .perspective import Perspective
 from .presets import DEFAULT, FAST, preset_named
 
@@ -143,10 +143,8 @@ class Renderer:
         """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m.
         reflectance : see ``__call__``"""
         if reflectance is not None:
-            reflectance = camera_array(reflectance, self.camera.shape, "reflectance")
-            if reflectance.min() < 0 or reflectance.max() > 1:
-                found = f"values from {reflectance.min():g} to {reflectance.max():g}"
-                raise TactileError("reflectance", found, "0 black to 1 white", "Divide by the level of white")
+            grey = checked_reflectance(reflectance, "reflectance")
+            reflectance = camera_array(grey, self.camera.shape, "reflectance")
         return self._spread_radiance(self._heights(height_map, "height map"), reflectance)
 
     def _spread_radiance(self, heights: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:

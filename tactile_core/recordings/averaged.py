@@ -10,8 +10,8 @@ from .polarity import TOUCHING
 from .recording import BLOCK, Recording
 from .rest_level import Framewise
 
-# Share of turns by noise below which readings are averaged. Rounded to counts, half of 142 real recordings turn in .149
-# and more of the samples, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06; through a
+# Share of samples at which readings turn, below which they lack noise. Rounded to counts half of 142 real recordings
+# turn in .149 and more, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06; through a
 # Butterworth filter of 20 Hz, which does no harm, in .033.
 LEAST_TURNS = TURNS / 2
 AT = 100.0  # Hz at which turns are counted: rows interpolated to a higher rate are no averages
@@ -44,10 +44,11 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
 
 def _lacks_noise(readings: np.ndarray, rate: float) -> bool:
     """Return true if readings (T, e) counts at this rate, Hz, rise and fall without a finger's noise."""
-    whole = np.rint(readings[: BLOCK * max(1, round(rate / AT)) : max(1, round(rate / AT))])
+    step = max(1, round(rate / AT))
+    whole = np.rint(readings[: BLOCK * step : step])
     whole = whole[~repeats(whole)[0]]
-    steps = np.abs(np.diff(whole, axis=0))
     if len(whole) < FEWEST:
         return False
-    fine = bool((steps > 0).any()) and np.percentile(steps[steps > 0], 5) < COARSE
+    moves = np.abs(np.diff(whole, axis=0))
+    fine = bool((moves > 0).any()) and np.percentile(moves[moves > 0], 5) < COARSE
     return fine and noise_turns(whole) < LEAST_TURNS

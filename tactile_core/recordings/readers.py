@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import cache, partial
 from types import ModuleType
 
-from ..errors import TactileError, file_name
+from ..errors import TactileError, path_text
 from ..files.registry import modules_of
 from ..files.short_text import shown
 from ..sensors import SOURCE, electrode_count, title
@@ -64,7 +64,7 @@ def read(
     >>> recording = tactile.read("touch.csv")
     >>> len(recording), recording.rate, recording.electrodes.shape
     """
-    path = file_name(path, "read, path", advice="numpy.savez writes arrays to one")
+    path = path_text(path, "read, path", advice="numpy.savez writes arrays to one")
     columns = read_map(columns) if isinstance(columns, str | os.PathLike) else columns
     if not isinstance(columns, ColumnMap | None):
         raise TactileError("read, columns", f"a {type(columns).__name__}", "the name of a map's file", MAP_ADVICE)

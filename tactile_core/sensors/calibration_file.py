@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import TactileError, file_name
+from ..errors import TactileError, path_text
 from ..files import atomic, outside
 from ..files.outside import toml_value
 from .calibration import Calibration, Coating, Fit, Markers, Response
@@ -41,7 +41,7 @@ def load_calibration(
         return dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
     if path is None:
         return _shipped(sensor or Camera.sensor)
-    file = Path(file_name(path, "load_calibration, path"))
+    file = Path(path_text(path, "load_calibration, path"))
     found = read_toml(file, lambda content: _calibration(content, file.parent), EXPECTED, ADVICE)
     if sensor not in (None, found.camera.sensor):
         raise TactileError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from .. import sensors
-from ..errors import TactileError, file_name
+from ..errors import TactileError, path_text
 from ..files.threads import in_one_thread
 from ..recordings import PrepareOptions, Recording, Signals
 from ..recordings.preparer import Preparer
@@ -143,13 +143,13 @@ def translate(
     if np.ndim(chosen) != 1 or not len(chosen) or (np.diff(chosen) <= 0).any():
         expected = f"a slice forward through {len(recording)} frames that holds at least one"
         raise TactileError("translate, frames", str(frames), expected)
-    folder = None if weights is None else file_name(weights, "translate, weights", "a folder's name")
+    folder = None if weights is None else path_text(weights, "translate, weights", "a folder's name")
     chosen_by = (folder, recording.sensor if folder is None else None)
     translator, unit = _shared_translator(*chosen_by, answer), None
     if sensor is not None:
         from ..recordings import electrode_gains  # reads by msgspec, which Blender has by the extension's wheels alone
 
-        sensor = file_name(sensor, "translate, sensor", "the name of a unit's file")
+        sensor = path_text(sensor, "translate, sensor", "the name of a unit's file")
         file, section = electrode_gains.read(sensor), recording.section
         unit = file.gains_for(recording.path, section, sensor, recording.sensor)
     rows = PreparedRows(recording, chosen, translator.answer, prepare, unit)

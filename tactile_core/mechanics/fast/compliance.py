@@ -22,7 +22,7 @@ from ...errors import TactileError
 from ...files import array_cache, lock
 from ...files.array_cache import cache_folder
 from ...files.shipped import shipped
-from ...files.threads import one_thread
+from ...files.threads import in_one_thread
 from ...geometry.lattice import Lattice
 from ...sensors import TARGET, Material
 from ...sensors import unrolling as surface
@@ -174,7 +174,7 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
     except array_cache.DamagedError as damage:
         if (folder / array_cache.HASHES).exists():
             log.warning("%s: damaged (%s); it is built again", folder, damage)
-    with one_thread():  # what one process keeps, every other computes with
+    with in_one_thread:  # what one process keeps, every other computes with
         halves = unpack(compact_file(solid.name), folder.name)
         if halves is None:
             log.warning("building the compliance of the %s in %s: about a minute, once", solid.name, folder)

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...errors import TactileError
+from ...files.threads import in_one_thread
 from ...geometry.indenters import Indenter, Pose
 from ..force_search import FORCE_TOLERANCE, touch_at_force
 from ..penetration import BENDS, PenetrationError, sharpest
@@ -52,6 +53,7 @@ class CorrectedPress:
     work : what contacts may cost, None for as much as they take; what is used up ends a solve with ExhaustedError
     """
 
+    @in_one_thread
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, limit: float, friction: float = 0.0,
         work: Work | None = None,
@@ -62,6 +64,7 @@ class CorrectedPress:
         self._on_the_way: tuple[Contact, float] | None = None  # last contact of a search, and ``fall`` there
         self._last_power = 1.0
 
+    @in_one_thread
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
         """Solve the contact at a depth, m, along the motion from ``pose`` (None: the press's own); the result may not
         have converged (``linear.converged``).
@@ -71,6 +74,7 @@ class CorrectedPress:
         fall = self._surface_drop(there, touches=touches)
         return self._guarded_if_needed(lambda: self._at_depth(depth, there, fall))
 
+    @in_one_thread
     def at_force(self, force: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact | None:
         """Solve the contact whose corrected force along the motion is force N, to a thousandth; None if that lies
         beyond the limit, or is not found. pose : None for the press's own; touches : as in ``at_depth``"""
@@ -81,6 +85,7 @@ class CorrectedPress:
         except UnsolvedError:
             return None
 
+    @in_one_thread
     def nearest(self) -> FastContact | None:
         """Return the last contact within the limit that the last ``at_force`` met; the next solve goes on from it.
 
