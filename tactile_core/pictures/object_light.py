@@ -32,7 +32,7 @@ def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray |
 
 
 def checked_reflectance(given: np.ndarray, name: str) -> np.ndarray:
-    """Return a map (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 from 0 to 1. Raises
+    """Return a map `given` (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 0..1. Raises
     TactileError, with ``name``, for another."""
     try:
         values = np.asarray(given)
