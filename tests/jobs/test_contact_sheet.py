@@ -153,9 +153,9 @@ def test_captions_touch_neither_each_other_nor_the_line_below_them() -> None:
 
     figure = SheetFigure(6, load_calibration().camera, [], False)
     figure.top = figure.height - CAPTION - FOOT
-    pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.BEYOND_PICTURE | Flag.POLARITY_ASSUMED, Flag.RECTIFIED]
+    pairs = [Flag.UNEXPLAINED | Flag.OUT_OF_RANGE, Flag.LAW_DOUBTED | Flag.OUT_OF_RANGE, Flag.RECTIFIED]
     flags = np.array([int(flag) for flag in (*pairs, *pairs)], np.uint16)
-    figure.captions(np.full((6, 3), 9.0), np.linspace(0, 1, 6), flags, np.full(6, 1e-3), np.full(6, 2e-3))
+    figure.captions(np.full((6, 3), 9.0), np.linspace(0, 1, 6), flags, np.full(6, 1e-3), np.full(6, 0.8e-3))
     renderer = FigureCanvasAgg(figure.figure).get_renderer()
     boxes = [text.get_window_extent(renderer) for text in figure.figure.texts]
     assert len(boxes) == 7
