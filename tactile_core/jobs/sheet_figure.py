@@ -26,7 +26,7 @@ DPI = 100
 WIDTH, LEFT, RIGHT, GAP = 16.0, 0.95, 1.05, 0.12
 TITLE, WARNING_LINE, NUMBERS, ELECTRODES, TIME_AXIS, HEADING, Z_AXIS = 0.62, 0.21, 0.16, 1.4, 0.45, 0.26, 0.36
 PRESSURE, EXPLAINED = 0.75, 0.5
-# Room for five lines of 31 letters: force, verdict, two reasons, expected error.
+# Room for five lines: force, two reasons of which one is too long for a line, expected error; of 31 letters at most.
 CAPTION, CAPTION_LETTERS, FOOT = 1.045, 31, 0.25
 
 UNROLLED_X, UNROLLED_Z = (-24e-3, 8e-3), (-11.2e-3, 11.2e-3)  # m, what the unrolled rows show
@@ -259,8 +259,9 @@ class SheetFigure:
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
         """Write each column's force (k, 3) N, trust, the first four arguments (k,) of `in_words`, and a key."""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
-            words = textwrap.fill(in_words(confidence, flags, error, dent, force[k]), CAPTION_LETTERS)
-            text = f"force {np.linalg.norm(force[k]):.2f} N\n{words}"
+            words = in_words(confidence, flags, error, dent, force[k])
+            lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]
+            text = "\n".join(textwrap.fill(line, CAPTION_LETTERS) for line in lines)
             color = MARK if is_guess(confidence, flags, error, dent) else "black"
             self._text(self._middle(k), 0.08, text, size=10, ha="center", va="top", color=color)
         self.top += CAPTION

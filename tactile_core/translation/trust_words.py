@@ -15,7 +15,7 @@ _UNLIKE, _SHAPE, _SILENT = "signals unlike training", "shape unsure", "no contac
 # What makes a frame a guess, the gravest first; then what is only worth saying.
 _DOUBTS = {
     Flag.UNEXPLAINED: "unlike any contact",
-    Flag.LAW_DOUBTED: "gains, order or skin doubted",
+    Flag.LAW_DOUBTED: "electrodes or skin doubted",
     Flag.POLARITY_DOUBTED: "polarity doubted",
     Flag.OUT_OF_RANGE: _UNLIKE,
     Flag.NO_QUIET_PART: "rest not found",
