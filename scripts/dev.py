@@ -99,8 +99,7 @@ def check_python(version: tuple[int, int]) -> None:
 
 
 def run_demo(folder: Path) -> int:
-    """Convert the shipped recording into out/demo by the environment in ``folder``, name the files; return the
-    status."""
+    """Convert the shipped recording into out/demo by the environment in ``folder``, name the files; return status."""
     python = install(folder, extras=())
     out = ROOT / "out" / "demo"
     command = ["-m", "tactile_core", "convert", str(DEMO_RECORDING), "--out", str(out), "--overwrite"]
@@ -269,8 +268,7 @@ def why_unusable(python: Path, have: dict) -> str | None:
 
 
 def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> bool:
-    """Run pip to install ``what``; it says itself what it does; returns false where it failed. numpy : see
-    ``install``"""
+    """Install packages ``what`` by pip, which prints what it does; return false if it failed. numpy : of ``install``"""
     constraints = ROOT / "constraints.txt"
     if numpy:
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))

@@ -91,8 +91,7 @@ def build_packages(out: Path) -> Path:
 
 
 def try_wheel(wheel: Path, version: str) -> None:
-    """Install the wheel alone and convert the recording that it brings. Raises ReleaseError unless it is
-    ``version``."""
+    """Install the wheel alone and convert the recording that it brings. ReleaseError unless it states ``version``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         python = new_environment(folder / "venv", "--constraint", str(ROOT / "constraints.txt"), str(wheel))

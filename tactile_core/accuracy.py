@@ -71,8 +71,7 @@ def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = hei
 def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
     """Return the centre (C, 2) = (x, z) m of the dent, its core's depth-weighted mean; NaN where none moves 10 um.
 
-    displacement : (C, n, 3) m
-    rest : (n, 3) m
+    displacement : (C, n, 3) m, of the nodes; rest : (n, 3) m, their places at rest
     """
     return core_center(height(displacement), np.asarray(rest, np.float64)[:, [0, 2]])
 

@@ -23,7 +23,8 @@ _OFF_BAND = 1e-6  # brightness, levels m^2, taken for none: a hundred-thousandth
 
 @dataclasses.dataclass(frozen=True)
 class ShownUnit:
-    """unit : the calibration as the scene shows it; around : lamps and bodies that are not the unit's own."""
+    """Unit and surroundings that a scene shows.
+    unit : calibration with LEDs, coating and camera as the scene has them; around : other lamps and bodies"""
 
     unit: Calibration
     around: Surroundings

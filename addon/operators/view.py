@@ -79,8 +79,7 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
 
 
 def look_again(context: bpy.types.Context, pictures_alone: bool = False) -> None:
-    """Frame pictures, and unless ``pictures_alone`` the selection, again once the window is drawn: until then, a view
-    keeps its old size."""
+    """Frame pictures and, unless ``pictures_alone``, the selection, once the window is drawn and views have a size."""
     look = functools.partial(_look_at_selected, context.window_manager, context.window, pictures_alone)
     bpy.app.timers.register(look, first_interval=DRAWN)
 

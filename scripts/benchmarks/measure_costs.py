@@ -38,8 +38,7 @@ SETS = {  # what is added -> the outputs asked for, each beside those before it
 
 
 class Part(NamedTuple):
-    """Measured cost. start : CPU s before the first frame; ms : CPU, mb : peak resident, kb : on disk, per frame but
-    mb"""
+    """Measured cost. start : CPU s before the first frame; ms : CPU per frame; mb : peak memory; kb : disk per frame"""
 
     start: float
     ms: float
@@ -70,8 +69,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
-    """Return a ball's path over the pad, rows (s, x mm, z mm, N): no force in the first frame, then ``force``, N, in
-    ``contacts`` frames."""
+    """Return a ball's path over the pad, rows (s, x mm, z mm, N): a frame at 0 N, then ``contacts`` at ``force`` N."""
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 

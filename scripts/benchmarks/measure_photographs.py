@@ -92,8 +92,7 @@ def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
 
 
 def thirds(data: Path) -> Iterator[Row]:
-    """Yield rows of fits to two thirds of ``own_unit`` each, begun at round numbers, tried on the last third and on
-    ``deeper``."""
+    """Yield rows of fits to two thirds of ``own_unit``, from round numbers, tried on the last third and ``deeper``."""
     known = own_unit(data)
     start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
     for unit, third in folds(known, 3, start):

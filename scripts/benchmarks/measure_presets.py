@@ -94,8 +94,7 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
-    """Make ``count`` height maps (H, W) m of random contacts in the picture, to ``DEEPEST`` at most, by the fast
-    tier."""
+    """Make ``count`` height maps (H, W) m of random contacts by the fast tier, up to ``DEEPEST``; seed : of the draw"""
     camera, found = unit.camera, []
     for contact in random_contacts(40 * count, seed):
         row, column = camera.to_pixel(contact.place.x, contact.place.z)

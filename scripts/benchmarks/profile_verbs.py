@@ -120,8 +120,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write_inputs(folder: Path) -> None:
-    """Write into ``folder`` touch.csv, the shipped recording's first 100 frames, and scene.toml, a press of 11
-    frames."""
+    """Write into ``folder`` touch.csv, 100 frames of the shipped recording, and scene.toml, a press of 11 frames."""
     write_scene(folder, (0.0, -8.0, 0.0, 0.0), (0.1, -8.0, 0.0, 0.3))
     electrodes = recordings.read(RECORDING).electrodes[:100]
     names = ["timestamp", "tdc", "tac", "pdc", *(f"pac{i}" for i in range(1, 23)), *(f"ele{i}" for i in range(1, 20))]

@@ -21,9 +21,8 @@ def one_thread() -> threadpoolctl.threadpool_limits:
     """Keep linear algebra in one thread: libraries loaded already, and by the environment those loaded later.
 
     It stays so for good, or for a block with the returned context manager (the environment stays). The same input then
-    gives the same bytes in every process of a machine. A single frame or contact gains nothing by several threads: on a
-    busy machine a live picture took four times the processor time, pairs of contacts five times, a conversion 2.6
-    times."""
+    gives the same bytes in every process of a machine. A frame or contact gains nothing by several threads: on a busy
+    machine a live picture took four times the processor time, pairs of contacts five times, a conversion 2.6 times."""
     import threadpoolctl
 
     os.environ.update(ONE)

@@ -99,8 +99,8 @@ class Gel:
 
         pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z), of the indenter's origin and axes
         force : N along +y; the indenter then moves on along +y, out or in, until it bears that force; 0 lifts it
-        Raises TactileError for an invalid pose or force, and above 500 N; the contact before then stays. All else is
-        reported in ``flags``."""
+        Raises TactileError for an invalid pose or force, and above 500 N, and keeps the contact before; all other
+        trouble is in the result's ``flags``."""
         return self._step(*given(pose, force))
 
     def _step(self, here: Pose, force: float | None) -> GelContact:

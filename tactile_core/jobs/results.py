@@ -65,9 +65,9 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
-    """Raise TactileError where a result exists (unless `overwrite`), or something that is none.
-    maker : verb of the result by its note, "" for `tactile convert`; another verb's result is something else, as is a
-     folder with foreign files"""
+    """Raise TactileError where a folder exists, unless it is a result of the verb and `overwrite` is true.
+    maker : verb by which the result's note says it was made, "" for `tactile convert`
+    A result of another verb, or with foreign files in it, is refused whatever `overwrite` says."""
     if not os.path.lexists(folder):
         return
     if not is_result(folder, maker):
@@ -88,7 +88,7 @@ def check_writable(out: Path) -> None:
 
 
 def is_result(folder: Path, maker: str = "") -> bool:
-    """Return true if a folder holds a result of this package, so that --overwrite may replace it; maker : see above"""
+    """Return true if a folder holds a result that --overwrite may replace; maker : of `check_free`"""
     try:
         note = json.loads(read_small(folder / NOTE))
     except (OSError, ValueError, RecursionError, TactileError):

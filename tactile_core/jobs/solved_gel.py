@@ -93,7 +93,7 @@ def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, 
     arrays : by the names of frames.h5, T first. Solved frames bring their traction. For others in contact it is
         derived: pattern and direction from the displacement, size from the networks' force, which is nearer the truth
         (on the gel a dent a tenth too shallow carries a fifth too little: docs/convert.md). It is zero elsewhere
-    gel : the sensor"""
+    gel : the gel's sensor, by name"""
     displacement, touched = arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0])
     solved = arrays.get("traction_digit")
     traction = np.zeros(displacement.shape, np.float32) if solved is None else solved

@@ -43,8 +43,7 @@ def touch_at_force(
     last : the contact to begin from
     limit : m, greatest depth; guess : m, a depth near the one sought (None: an eighth of the limit)
     slid_to : m, depth of first touch here; given if the indenter has slid since ``last``, else None
-    Raises TactileError, which begins with ``where``, if no depth is found in 30 steps; UnreachableError beyond the
-    limit."""
+    Raises TactileError, beginning with ``where``, if 30 steps find no depth; UnreachableError beyond the limit."""
     goal, before = _root(force), last
     low, high = (before.depth, _root(before.force @ direction)) if slid_to is None else (slid_to, 0.0), None
     lets_go = low[1] > goal  # the last contact bears more: go back toward first touch

@@ -66,7 +66,7 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
     """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch; negative
-    where the resting surface rises. ``_FARTHEST`` if the indenter has slid off the sensor."""
+    where the resting surface rises; 30 mm, more than any sensor is deep, if the indenter has slid off the sensor."""
     if same_line(pose, slid):
         return 0.0
     try:
@@ -112,8 +112,7 @@ def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pos
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
     """Find where the line on which an indenter's foremost point moves meets a surface, on the side met first.
     axes : (3, rows, columns) m, x, y, z of the surface's nodes; closed : true if its last column joins the first
-    Returns the place (1, 2), row and column with fractions, and the point (1, 3) m; None if no node lies within 1 mm of
-    the line."""
+    Returns the place (1, 2), fractional row and column, and the point (1, 3) m; None with no node within 1 mm."""
     foremost = pose.support(indenter, pose.direction)
     along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
     near = beside < _BESIDE
@@ -207,8 +206,7 @@ MOST_FRICTION = 5.0  # more is a percentage, or sticks as 5 does (assumed)
 
 
 def friction_of(value: float, where: str) -> float:
-    """Return ``value``, a friction's coefficient, as a float; raises TactileError, naming ``where``, for less than 0 or
-    more than 5."""
+    """Return ``value``, a coefficient of friction, as a float; TactileError, naming ``where``, unless it is 0 to 5."""
     expected = f"Coulomb's coefficient, 0 to {MOST_FRICTION:g}"
     return finite_number(value, where, expected, 0.0, MOST_FRICTION, "Divide per cent by 100; 5 sticks")
 

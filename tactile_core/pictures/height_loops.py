@@ -17,8 +17,7 @@ def heights_above(  # noqa: ANN201
     ``geometry.cubic_spline.bspline_weights`` are written out.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
     to_x, to_z, miss : (2, n), rows of the inverse Jacobian and the residual of each place at the start
-    start, step : (2,) m, of the coefficients' grid; tolerance : m, of the residual; most_steps : then it is not
-        found"""
+    start, step : (2,) m, of the coefficients' grid; tolerance : m, of the residual; most_steps : before giving up"""
     intervals = coefficients.shape[1] - 3, coefficients.shape[2] - 3
     heights, lost = np.empty(len(x), np.float32), 0
     u, v, found = np.empty(4), np.empty(4), np.empty(3, np.float32)

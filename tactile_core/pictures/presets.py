@@ -85,8 +85,7 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Return the table of ``measure_presets.py``: in "presets", for each name, its ms by variant and its error in
-    grey levels."""
+    """Return the table of ``measure_presets.py``: "presets" holds, by name, ms by variant and error in grey levels."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 

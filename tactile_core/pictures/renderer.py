@@ -238,8 +238,7 @@ def _given_background(picture: np.ndarray, shape: tuple[int, int, int]) -> np.nd
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Return values (...) as float32. Raises TactileError, which names them ``name``, for another ``shape`` or values
-    that are not finite."""
+    """Return values (...) as float32. Raises TactileError, with ``name``, for another ``shape``, or if not finite."""
     values = np.asarray(values)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")

@@ -22,8 +22,7 @@ MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothin
 
 def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
     """Interpolate linearly over the bad samples of each column; the nearest good one at the ends.
-    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0. Where none is bad, the values
-    themselves come back."""
+    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0; values is never changed."""
     if not bad.any():
         return values
     values = values.astype(float)

@@ -148,8 +148,7 @@ class Fit:
     ball_diameter : m, of the ball that they show
     errors : on those photographs, by the names of ``tactile calibrate --test``
     standard_errors : by parameter, in its unit of measurement in the file
-    not_identified : parameters that the photographs do not determine; held near the start values by a prior of how
-        units differ"""
+    not_identified : parameters that the photographs do not determine, held near the start by a prior on units"""
 
     note: str
     photographs: tuple[str, ...]

@@ -123,8 +123,7 @@ class Camera:
         return self.centre_z + self.right_z * self.right
 
     def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Project gel points at x, z and height (toward the camera), m, to fractional (row, column); whole numbers are
-        pixel centres."""
+        """Project gel points at x, z and height (toward the camera), m, to (row, column), whole at pixel centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5

@@ -23,8 +23,7 @@ RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19), not rounded, at impedances ``growth`` (..., 19) times those that read ``rest`` (19,)
-    counts."""
+    """Return counts (..., 19), not rounded, at growth (..., 19) times the impedances that read rest (19,) counts."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 

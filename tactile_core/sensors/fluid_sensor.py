@@ -85,8 +85,7 @@ class SkinLattice:
 
 @dataclasses.dataclass(frozen=True)
 class FluidFilm:
-    """Fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, least that is
-    modelled"""
+    """Fluid between core and skin. conductivity : S/m; interface : ohm, in series; thinnest : m, least film modelled"""
 
     conductivity: float = number("s_per_m", above=0)
     interface: float = number("ohm", above=-1)

@@ -83,8 +83,7 @@ class GelShape:
         return np.array([x, self.back_y - height[0], z]), normal / np.linalg.norm(normal)
 
     def thickness_below(self, point: np.ndarray) -> float:
-        """Return the distance, m, from a point (3,) m of the resting surface to the flat back along its inward
-        normal."""
+        """Return the distance, m, from a point (3,) m of the resting surface along its inward normal to the back."""
         on_dome, outward = self.dome_point(float(point[0]), float(point[2]))
         return float((self.back_y - on_dome[1]) / -outward[1])
 

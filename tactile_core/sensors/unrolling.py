@@ -47,8 +47,7 @@ def rolled_grid(sensor: str) -> np.ndarray:
 
 def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
     """Places (n_nodes, 2) = (x, z) m of a fluid sensor's nodes, unrolled onto the DIGIT's plane: z = R theta across,
-    arc length of the lowest line along (docs/sources.md). NaN for nodes on the back, beyond 90 degrees, and for the
-    poles."""
+    arc length of the lowest line along (docs/sources.md). NaN on the back, beyond 90 degrees, and at the poles."""
     skin = skin_of(sensor)
     on_pad = np.abs(skin.angles)[None, :, None] <= skin.pad_angle + 1e-9
     rolled = np.where(on_pad, rolled_grid(sensor), np.nan)

@@ -78,9 +78,8 @@ def _plain(value: object) -> object:
 
 
 def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
-    """Return the unit of each dataset that is written; the leading axis counts contacts. Datasets are named after the
-    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, datasets to
-    add"""
+    """Return the unit of each dataset that is written; the leading axis counts contacts. Some are named after the two
+    sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, datasets to add"""
     fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
     return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",

@@ -44,8 +44,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A point of a recorded motion: time_s, the indenter's place x_mm, z_mm on the DIGIT's (unrolled) plane,
-    force_n."""
+    """A point of a recorded motion: time_s, the indenter's place x_mm, z_mm on the gel's (unrolled) plane, force_n."""
 
     time_s: Annotated[float, Meta(ge=0, le=600)]
     x_mm: float

@@ -22,7 +22,7 @@ from .scene import RecordingSpec, load_scene
 
 class TierChoice(NamedTuple):
     """Tier chosen for a sensor. error : of shape, um rms, that 95 of 100 contacts stay below
-    ms : CPU time of a contact; share : greatest depth that is reached, divided by the thickness"""
+    ms : CPU time of a contact; share : greatest depth of the scene's presses, divided by the sensor's thickness"""
 
     tier: Tier
     error: float

@@ -158,8 +158,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
     Shapes are compared at the contact's true place, and places separately: a dent beside its place would otherwise be
     made fainter to reduce the error. The gel's place is the state's, trained by its likelihood before and fixed here.
-    The autoencoders' own losses stay in at half weight, so that latents keep their meaning and meshes can be
-    encoded."""
+    The autoencoders' own losses count half, so that latents keep their meaning and meshes can be encoded."""
     biotac, _ = model.given(batch.signal, batch.state)
     digit, across = model.to_target(batch.state, biotac), model.across(model.MVB.mean(batch.biotac))
     given = (model, contacts, batch, options, generator)
@@ -206,7 +205,8 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """Return the largest node error (B,) m of the decoded latent (B, L) against rows (B,), at least ERROR_FLOOR."""
+    """Return the largest node error (B,) m of displacements decoded from latent (B, L) against the true ones of
+    contacts ``rows`` (B,), at least ERROR_FLOOR; vae : of the surface"""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 

@@ -23,14 +23,15 @@ Columns = dict[str, np.ndarray]  # name of a metric -> (C,) a number per contact
 
 @dataclass(frozen=True)
 class Bodies:
-    """digit : the gel's surface; unrolled : (N, 2) m, places of the skin's nodes on its plane, NaN beside it."""
+    """Surfaces of a pair of sensors, on which errors are measured.
+    digit : the gel's surface; unrolled : (N, 2) = (x, z) m, the skin's nodes unrolled on its plane, NaN beside it"""
 
     digit: Lattice
     unrolled: np.ndarray
 
 
 def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
-    """Return the bodies of a skin, source, and a gel, target, as this version has them."""
+    """Return the surfaces of a skin, source, and a gel, target, as this version has them."""
     return Bodies(sensors.sensor_surface(target), unrolling.unrolled_nodes(source))
 
 

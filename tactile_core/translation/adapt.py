@@ -96,8 +96,9 @@ def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
-    """Fit the unit of single-finger recordings (paths), or one for each finger of a hand; also returns warnings.
-    untouched : recording of the unit's rest, for a single unit of a sensor whose typical rest is known
+    """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings.
+    typical, options : as of `adapt`; of a sensor without a typical rest, rest and film are found, but no gains
+    untouched : path of a recording without contact, where there is one unit; None finds rest in all recordings
     Raises TactileError like `adapt`, and for a mixture of hands and single fingers."""
     columns = None if options is None else options.columns
     every = [one for path in paths for one in each_finger(path, columns)]

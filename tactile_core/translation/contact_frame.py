@@ -79,8 +79,8 @@ class ContactFrame:
         return np.where(total[:, None] > 0, place, 0).astype(np.float32)
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Round places (T, 2) of `place`, NaN as the middle, to cells (T, 2) int of the lattice; also return remainders
-        (T, 2), -1..1 cell."""
+        """Round places (T, 2) of `place`, NaN as the middle, to the lattice's cells (T, 2) int; also return what is
+        left (T, 2), in cells, at most 1 either way."""
         at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
         cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
         left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge

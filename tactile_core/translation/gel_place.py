@@ -107,7 +107,8 @@ def _fast_length(least: int) -> int:
 
 
 class Shift:
-    """Shifts fields on the gel's nodes; the gel is assumed equally thick wherever the BioTac lies."""
+    """Function that shifts displacements along a gel, as of a BioTac mounted elsewhere on it, whose gel is assumed
+    equally thick there."""
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
         """Take the shift (2,) = (x, z) m of contacts."""

@@ -152,9 +152,8 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def read_verified(
     path: str | os.PathLike, expected_sha256: str, shapes: dict[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Read arrays of a safetensors file whose hash and tensor shapes are known. Raises TactileError naming the file or
-    tensor, what was found and what was expected; for an intact file of other shapes it names the shapes, which say more
-    than a hash."""
+    """Read arrays of a safetensors file whose hash and tensor shapes are known. Raises TactileError with what was found
+    and expected: the shapes for an intact file of others, which say more than a hash."""
     data = read_bytes(path)
     found = sha256(data)
     if found == expected_sha256:

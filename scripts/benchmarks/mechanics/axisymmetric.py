@@ -105,8 +105,7 @@ class AxisymmetricSolid:
         return State(np.zeros_like(self.mesh.nodes), np.zeros((len(self.mesh.cells), 3)))
 
     def deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation gradient F (n_cells, 9, 3, 3), its determinant J (n_cells, 9) by displacement (n, 3)
-        m."""
+        """Return F (n_cells, 9, 3, 3), the deformation gradient, and det F (n_cells, 9), by displacement (n, 3) m."""
         f, change = self._deformation(displacement)
         return f, 1 + change
 

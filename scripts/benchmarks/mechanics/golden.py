@@ -43,7 +43,8 @@ def path(contact: FiniteStrainContact) -> Iterator[ContactState]:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield each force's error, %, on nodes 0.05 mm apart, and without ``quick`` with the production cell as well."""
+    """Yield the errors, %, of forces solved in axial symmetry from the golden ones, the smallest volume ratio, and the
+    time; unless ``quick`` also ``in_space``'s errors."""
     started = time.perf_counter()
     of = "axisymmetric, nodes 0.05 mm apart"
     contact = disc(0.05e-3)
@@ -58,7 +59,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def in_space() -> Iterator[Row]:
-    """Yield the same errors with the production cell, on quarter discs: a finer one for the smallest contact."""
+    """Yield the errors, %, from the golden forces in space, with the 27-node cells of the sensors, on quarter discs."""
     for (inside, outside), side, layers, depths in _QUARTERS:
         mesh, fixed = quarter_disc(GOLDEN_RADIUS, GOLDEN_THICKNESS, side, (inside, outside), np.array(layers))
         ball = Sphere(GOLDEN_BALL)

@@ -34,8 +34,7 @@ def gradient(points: np.ndarray) -> np.ndarray:
 
 
 def errors(cells: int, poisson: float) -> tuple[float, float]:
-    """Return the rms errors of displacement (side 1) and gradient on ``cells`` cells per side. poisson : the
-    material's"""
+    """Return rms errors of displacement (side 1) and its gradient, ``cells`` a side; poisson : of the material"""
     planes = np.linspace(0, 1, 2 * cells + 1)
     mesh = block(planes, planes[::-1], planes)
     solid = FiniteStrainSolid(mesh, Material(1.0, poisson))

@@ -65,8 +65,7 @@ def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> 
 
 
 def gel_normals(displacement: np.ndarray) -> np.ndarray:
-    """Return unit normals (201, 153, 3) of a gel under displacement (n, 3) m where the camera looks, by cubic
-    splines."""
+    """Return unit normals (201, 153, 3) of the camera's part of a gel under displacement (n, 3) m, by cubic splines."""
     surface = digit_surface()
     grid = surface.grid(surface.rest + displacement)[surface.window]
     splines = [EvenSpline(0.0, 1.0, size) for size in grid.shape[:2]]

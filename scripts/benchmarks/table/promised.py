@@ -28,8 +28,8 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Promise:
-    """Stated 95 % bounds ``bound`` and measured errors ``found``, both (C,) in ``unit``.
-    name : of what is bounded; groups : (C,), each contact's group; of : the contacts, in words"""
+    """Stated 95 % bounds ``bound`` and measured errors ``found`` of C contacts, both (C,) in ``unit``.
+    name : of the bounded error; groups : (C,), each contact's group; of : the contacts, in words"""
 
     name: str
     unit: str
@@ -39,7 +39,7 @@ class Promise:
     of: str
 
     def covered(self, among: np.ndarray | None = None) -> float:
-        """Return the share of all C, or of those that ``among`` (C,) bool marks, that stayed below their bounds."""
+        """Return the share, 0 to 1, of contacts whose error is within its bound; among : (C,) bool, None for all"""
         held = self.found <= self.bound
         return float((held if among is None else held[among]).mean())
 

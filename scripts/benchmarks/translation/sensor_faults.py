@@ -181,8 +181,8 @@ def bits(by: float) -> Fault:
 
 
 def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Put the largest contact, by change from rest (19,), if any, in the first and last QUIET frames of electrodes (T,
-    19)."""
+    """Put the strongest contact's frame, with noise, in the first and last QUIET frames of electrodes (T, 19) counts;
+    no frame where none differs from rest (19,) by LEAST_LOAD."""
     change = np.abs(electrodes - rest)
     if change.max() < LEAST_LOAD:
         return electrodes

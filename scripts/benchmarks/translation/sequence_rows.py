@@ -57,8 +57,7 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
 
 
 def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
-    """Return errors of all sequences' judged frames, followed, and each frame alone; rest_off : counts, the most by
-    which the rest is off."""
+    """Return errors of ``judged`` frames, tracked and each alone; rest_off : counts, largest error of the rest."""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
     followed, alone = [], []
     for number, signal in enumerate(truth["signal"]):
@@ -76,8 +75,8 @@ def read(file: Path = FILE) -> Truth:
 
 
 def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: float = 0.0) -> np.ndarray:
-    """Return the true change signal (T, 19) counts as a unit of steady gains reads it, its rest off by up to
-    ``rest_off`` counts."""
+    """Return the change (T, 19) counts that a unit with random gains, noise and error of rest reads of the true one.
+    signal : (T, 19) counts, the true change; rest_off : counts, largest error of the rest"""
     gain = 1 + GAIN * random.standard_normal(signal.shape[1])
     found = gain * signal + NOISE * random.standard_normal(signal.shape)
     return (found + random.uniform(-rest_off, rest_off, signal.shape[1])).astype(np.float32)

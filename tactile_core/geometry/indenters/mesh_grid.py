@@ -37,8 +37,7 @@ _BESIDE = ((1.234e-4, 0.876e-4), (-0.543e-4, 1.567e-4), (0.987e-4, -1.654e-4))
 
 
 def finest(extent: np.ndarray, spacing: float = _FINEST) -> float:
-    """Return the spacing, m, of the finest grid of at most MAX_NODES nodes that a body of extent (3,) m fits in; at
-    least ``spacing``, m."""
+    """Return ``spacing``, m, raised until the grid of a body of extent (3,) m has at most MAX_NODES nodes."""
     while np.prod(_shape(extent, spacing)) > MAX_NODES:
         spacing *= _STEP_UP
     return float(np.round(spacing, 8))
@@ -106,8 +105,7 @@ def error_of(
 ) -> np.ndarray:
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (a trimesh, mm).
 
-    Measured at 500 random places up to 0.3 mm inside and outside the surface, over those triangles that reach below the
-    height ``top``, m."""
+    Measured at 500 random places within 0.3 mm of the surface, at triangles that reach below the height ``top``, m."""
     random = np.random.default_rng(0)
     area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
     face = random.choice(len(mesh.faces), _CHECKED, p=area / area.sum())

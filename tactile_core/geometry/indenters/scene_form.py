@@ -49,8 +49,7 @@ class SceneForm:
     icon: str = ""
 
     def build(self, values: Mapping[str, Any]) -> Indenter:
-        """Build the shape from a scene's values, mm or degrees, by ``Size.field``. Raises TactileError: no such
-        body."""
+        """Build the shape from values, mm or degrees, by ``Size.field``. Raises TactileError for an impossible body."""
         return self.shape(**{argument: size.in_si(values[size.field]) for argument, size in self.sizes.items()})
 
 

@@ -68,8 +68,7 @@ def complement(
     along : (k,), by how much each gap closes per metre of ``step``, which is then free so that ``along . p`` is
         ``force``, N; None: ``step`` is 0
     factors : Cholesky factors of this matrix by active set, used and added to; None to keep none
-    Raises UnsolvedError where the matrix is not positive definite, no node can carry the force, or exchanges do not
-    end."""
+    Raises UnsolvedError if the matrix is not positive definite, no node can carry the force, or exchanges go on."""
     fewest, patience = len(gap) + 1, _PATIENCE
     pressing, step = np.zeros(len(gap)), 0.0
     for _ in range(_MOST_EXCHANGES):

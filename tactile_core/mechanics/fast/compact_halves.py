@@ -48,8 +48,7 @@ class Basis(NamedTuple):
 
 
 def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> None:
-    """Transform the rows of values (n, c) in ``segments`` to the wavelet basis, in place; back : true for the way
-    out"""
+    """Transform rows of values (n, c) in ``segments`` to the wavelet basis or, with ``back``, out of it, in place."""
     for first, last, axes, clusters in segments:
         of_points = values[first:last].reshape((last - first) // axes, -1)
         for points, turned in reversed(clusters) if back else clusters:

@@ -75,8 +75,8 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For each touchable node the number (m,) of the one of r whose rows of ``move`` answer for it, and if that is
-        its mirror image, (m,) bool; then every surface node's image (n,)."""
+        """Return, for each touchable node, the number i (m,) of the node whose rows of ``move`` it uses and whether
+        that is its mirror image, (m,) bool; and the mirror image (n,) of each surface node, as indices."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
@@ -95,8 +95,8 @@ def compliance_of(sensor: str) -> Compliance:
 
 class Solid(NamedTuple):
     """Solid from which a compliance is computed.
-    name : of the sensor; lattice : its surface; touchable : (m,), the lattice's nodes that may carry contact force
-    mesh : of the volume"""
+    name : of the sensor; lattice : its surface; mesh : of its volume
+    touchable : (m,), the lattice's nodes that may carry contact force"""
 
     name: str
     lattice: Lattice
@@ -190,8 +190,7 @@ def compact_file(sensor: str) -> pathlib.Path:
 def condensed(solid: Solid) -> tuple[Half, Half]:
     """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, in a skin, the fluid's swell.
 
-    Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where the memory does not
-    suffice.
+    Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where memory is too small.
     """
     from scipy import sparse
 

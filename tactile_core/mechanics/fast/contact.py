@@ -71,8 +71,8 @@ class ContactProblem:
         return self._walk(self.pose.moved(depth), None, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
-        """Solve the contact at another pose, going on from ``start`` (None: from rest) in one step, or in some where
-        one does not settle; it may not have converged.
+        """Solve the contact at another pose, from ``start`` (None: from rest) in one step or, where that does not
+        converge, in several; it may not have converged.
         axial_force : N; the indenter then moves on along its direction until it bears that force; None: it stays there
         """
         self._look_near(pose, start)

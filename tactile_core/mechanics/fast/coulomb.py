@@ -55,8 +55,8 @@ class Points(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion ``moves`` (k, 3) m of nodes to where a step begins; slip (k, 3) m from their spots and gap (k,) m
-    there."""
+    """State in which a Newton step begins: moves (k, 3) m, of the nodes since ``motion_from``'s ``place``; slip (k, 3)
+    m, from where they stuck to the indenter; gap (k,) m."""
 
     moves: np.ndarray
     slip: np.ndarray
@@ -137,7 +137,8 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
 
 @Loop
 def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
-    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m, where off, gap and normal are known, to ``moved``."""
+    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m to ``moved`` (k, 3) m, by their off (k, 3) m, gap (k,) m
+    and normal (k, 3) at ``place``, see ``Points``."""
     moves, slip, gap_then = np.empty(place.shape), np.empty(place.shape), np.empty(len(gap))
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0

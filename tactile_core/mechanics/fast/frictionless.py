@@ -40,7 +40,8 @@ _PROGRESS, _SHRINK, _GROW, _LEAST_TRUST = 0.8, 0.6, 1.3, 0.1
 
 @dataclasses.dataclass
 class Try:
-    """Iterate of the solver: displacement (k, 3) m, nodal force (k, 3) N, core_force (c,) N, shift m along the motion.
+    """Iterate of a solver for k surface nodes and c points over the core: displacement (k, 3) m, nodal force (k, 3) N,
+    core_force (c,) N, and shift, m, of the indenter along its motion from the problem's pose.
     active : (k + c,) bool, which touch; settled : true if it fulfils the tolerances; iterations : so far
     slipping : (k,) bool, nodes whose friction is at its limit; without friction all
     creases : nodes (j,) that flip between two faces, points (j, 3) m and normals (j, 3) of the face left, or None"""
@@ -128,8 +129,7 @@ class Frictionless:
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
         """Solve from the guess ``begin`` the contact at ``pose``, shifted, or at ``axial_force``, N along the motion.
-        The result is not ``settled`` where iterations run out or faces flip. Raises UnsolvedError where a step
-        fails."""
+        The result is not ``settled`` if iterations run out or faces flip. Raises UnsolvedError where a step fails."""
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
         gap, normal = self.distance(place, state.shift)
         flips = np.zeros(len(gap), int)

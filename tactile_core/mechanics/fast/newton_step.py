@@ -1,8 +1,7 @@
 """Newton step of a contact with Coulomb friction, in the forces of all touching points at once.
 
 Only the motions of slipping nodes are unknown; from motions the stiffness of the touching points
-(``contact_stiffness``) gives forces. So the system has two unknowns per slipping node, however many stick. See
-``coulomb``.
+(``contact_stiffness``) gives forces. The system has two unknowns per slipping node, however many stick (``coulomb``).
 """
 
 from __future__ import annotations
@@ -135,8 +134,8 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
 
 @Loop
 def slide(known, answer, slipping):  # noqa: ANN001, ANN201
-    """Add the slip by ``answer`` (2 s, r), slipping nodes' unknowns, to the motion ``known`` (3 k + c, r) m, in
-    place."""
+    """Add the slip of s nodes to the prescribed motion ``known`` (3 k + c, r) m, in place; answer : (2 s, r), solution
+    of ``slip_system``: each node's slip along friction, m, then the turn of its friction, N; slipping : those nodes"""
     s, lean, across, against = len(slipping.at), slipping.lean, slipping.across, slipping.against
     for a in range(s):
         node = slipping.at[a]

@@ -40,8 +40,8 @@ class SensingPoints(NamedTuple):
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
-    """List the sensing points in order: feet over electrodes, each in a triangle of nodes, free inner nodes over the
-    core, and those beside it; none on a gel, whose mesh has no inner nodes."""
+    """Return the sensing points of a sensor's ``mesh``: the inner skin's nearest point to each electrode (its foot, in
+    a triangle of nodes), then the free inner nodes over the core, then those beside it; none for a gel."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)
@@ -62,7 +62,7 @@ def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
-    """Ends of the film over each of e electrodes, on the inner skin.
+    """Points of the inner skin nearest to each of e electrodes: there the fluid film over the electrode ends.
 
     face : (e,) triangle; weights : (e, 3) of its nodes; outward : (e, 3) unit, from the electrode; gap : (e,) m"""
 

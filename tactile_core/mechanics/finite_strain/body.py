@@ -76,8 +76,7 @@ class Body:
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
         """Return the indenter's largest penetration, m, at the surface's nodes and between them in a solved contact,
-        see ``penetration_between``. Raises PenetrationError where that is too much. touch : the contact, here and
-        below"""
+        ``touch``, by ``penetration_between``. Raises PenetrationError where that is too much."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)
@@ -106,8 +105,7 @@ def graded_body(
 ) -> Body:
     """Make a sensor's body, fine where the indenter, ``depth`` m beyond its ``pose`` at first touch, overlaps the
     resting surface.
-    spacing : of the fine part's nodes, over the tier's own. The reference tier's cells are half as large as the full
-    tier's."""
+    spacing : of the fine part's nodes, over the tier's own; the reference tier's is half the full tier's"""
     place = _footprint(sensor, indenter, pose, depth)
     footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
     fine = graded(sensor, footprint)

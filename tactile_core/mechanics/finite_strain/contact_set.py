@@ -2,8 +2,7 @@
 
 Coulomb friction by return mapping, as in elastoplasticity: a stiff spring at each touching node pulls toward its anchor
 on the indenter, with mu times the normal force at most, and then drags the anchor along (J. Simo, T. Laursen, Computers
-and Structures 42, 1992, 97-116). A sticking node moves by its spring's stretch, at most mu times its normal force over
-``grip``.
+and Structures 42, 1992, 97-116). A sticking node moves by its spring's stretch, at most mu normal force / ``grip``.
 """
 
 from __future__ import annotations

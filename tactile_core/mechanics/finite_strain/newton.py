@@ -104,8 +104,7 @@ class FiniteStrainContact:
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve a contact without friction at another pose, in load steps of ``step`` m, by continuation from one with
         friction, which fades to 0 at that pose.
-        Friction keeps nodes from sliding off the indenter's edges on the way; the result is in balance without
-        friction."""
+        Friction keeps nodes from sliding off the indenter's edges on the way; the result is without friction."""
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
             for friction in _FADING[1:]:

@@ -36,8 +36,7 @@ _WEIGHTS = _weights()
 class Push:
     """Forces on k penalty points that an obstacle has reached.
     nodes : (k, 9) int, of the mesh, and weights : (k, 9): each point is its nodes' weighted mean
-    force : (k, 3) N, of the obstacle on the points; stiffness : (k, 3, 3) N/m, minus the force's derivative by the
-        point"""
+    force : (k, 3) N, of the obstacle on the points; stiffness : (k, 3, 3) N/m, minus its derivative by the point"""
 
     nodes: np.ndarray
     weights: np.ndarray

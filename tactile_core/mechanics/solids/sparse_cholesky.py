@@ -176,8 +176,7 @@ class DampedFactor:
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     """Return the curvature terms ``bending`` (k, 3, 3) N/m, limited to a share of their nodes' stiffness (k, 3, 3) N/m.
 
-    At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it costs iterations
-    only."""
+    At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it only costs steps."""
     size = np.abs(bending).max(axis=(1, 2))
     most = _MOST_BENDING * np.einsum("kii->k", stiffness) / 3
     return bending * np.minimum(1.0, most / np.maximum(size, 1e-30))[:, None, None]

@@ -136,8 +136,7 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the means over presses ``tried`` of the metrics, and of the baseline's, by name, without NaN; NaN where
-    all are."""
+    """Return the means over presses ``tried`` of the metrics and of the baseline's, by name, without presses' NaN."""
     means = []
     for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]

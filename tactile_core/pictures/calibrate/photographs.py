@@ -122,8 +122,7 @@ def read_photographs(
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:
-    """Select presses of a set by ``names``, in their order, with the whole set's background; raises TactileError for an
-    unknown name."""
+    """Return the set with the presses ``names`` alone, in their order; raises TactileError for an unknown name."""
     by_name = {press.name: press for press in photographs.presses}
     for name in names:
         if name not in by_name:
@@ -147,8 +146,7 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
     """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses. Means over
-    NOISE_WINDOW, which hold the drift of light, are subtracted first. A photographed background adds noise of its
-    own."""
+    NOISE_WINDOW, which hold the drift of light, are subtracted first; a photographed background adds its own noise."""
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:

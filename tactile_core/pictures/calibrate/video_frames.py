@@ -22,8 +22,7 @@ SHALLOW = 0.3  # of the deepest press's change; a weaker peak is part of another
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:
     """Return frames (H, W, 3) uint8 of a video by name: the deepest of each press, and some of the untouched gel.
-    Raises TactileError for a file that OpenCV cannot read as a video, or that is too long or large; ModuleNotFoundError
-    without it."""
+    Raises TactileError for no video of OpenCV's, or one too long or large; ModuleNotFoundError without OpenCV."""
     installed.require("camera", "cv2")
     small = np.stack([_small(frame) for frame in _read(path)])
     change = np.abs(small - np.median(small, axis=0).astype(np.float32)).max(-1) > CHANGE

@@ -117,8 +117,7 @@ class GelLight:
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m; of traced paths the noisier means after each
-        pass."""
+        """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m; of traced paths the mean so far after each pass."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)

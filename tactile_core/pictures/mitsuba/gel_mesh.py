@@ -22,8 +22,7 @@ MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 class GelMesh:
     """Vertices and faces of height maps under one camera. Mesh coordinates: right, up and toward the camera, mm.
 
-    With square pixels, up is scaled: straight lines stay straight, so visibility is right, but lengths and angles along
-    the picture are not."""
+    With square pixels, up is scaled: lines stay straight, so visibility is right, but lengths and angles are not."""
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
         """Take spacing : m between vertices, in whole pixels; square : true scales the up axis for square pixels."""

@@ -33,8 +33,7 @@ def air_over_window(camera: Camera, index: float) -> float:
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
     """Return the pinhole's apparent height (...), m over height zero, for pixels that look ``distance`` (...) m aside.
-    Snell's law through a flat window of refractive ``index``. A camera nearer than the window's thickness keeps its
-    own."""
+    Snell's law through a flat window of refractive ``index``; a camera nearer than its thickness keeps its height."""
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)

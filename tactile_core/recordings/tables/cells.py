@@ -101,7 +101,7 @@ class Cells:
         return [reader(cell) for reader, cell in zip(self._readers, cells, strict=True)]
 
     def value(self, place: int, cell: str) -> float | None:
-        """Read the cell of column number `place`; None for what is neither finite nor of the column's kind."""
+        """Read a cell of column number `place`; None for one that is not finite, or not of the column's kind."""
         try:
             found = self._readers[place](cell)
         except ValueError:
