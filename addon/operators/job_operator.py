@@ -13,7 +13,7 @@ _STEP = 0.1  # s between polls of the worker
 
 
 class JobOperator(TactileOperator):
-    """Base of operators with a job: ``begin`` starts ``_job``, or leaves it None; ``finish`` takes the result.
+    """Base of operators that do a job in another process: ``begin`` starts it, if any; ``finish`` takes its result.
     stopped : what is reported after Esc"""
 
     stopped: ClassVar[str] = "Stopped; the scene is as it was"
@@ -22,7 +22,7 @@ class JobOperator(TactileOperator):
     _timer: bpy.types.Timer | None = None
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Start the job: set ``_folder`` and ``_job``, or neither with nothing to wait for. Raises TactileError."""
+        """Start the job: set ``_folder`` and ``_job``, or leave both None without work to do. Raises TactileError."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context) -> None:

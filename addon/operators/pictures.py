@@ -44,7 +44,7 @@ def draw(
     """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m by a preset; size : (width, height) px, None for the
     calibration's.
 
-    The fast preset draws LEDs, coating and camera; lamps and bodies beside them need Mitsuba, which warn() is told of.
+    The fast preset draws LEDs, coating and camera; bodies beside them need Mitsuba and are reported to warn().
     Pictures that get better, up to the one that is returned, are given to better(). Raises TactileError, and
     ``tracer_process.Stopped`` once stopped(), which is asked again and again, returns true.
     """

@@ -38,7 +38,7 @@ class Tools:
 
 
 class FramePass:
-    """Makes all arrays of a recording's frames, part by part, and writes their file.
+    """Translates and draws a recording's frames, part by part, and writes the file of their arrays.
     folded : number of height maps so far in which the gel folds over itself"""
 
     def __init__(
@@ -56,10 +56,9 @@ class FramePass:
         self, path: Path, frames: np.ndarray, signals: Signals, start_time: float, about: dict[str, Any],
         take: Take | None = None, labels: dict[str, np.ndarray] | None = None, room: int = 0,
     ) -> None:  # fmt: skip
-        """Write the arrays of rising frames (T,) to a new file.
-
-        signals : any of the recording's, for rest and kind; start_time : unix s; about : attributes of the file
-        take : called with each chunk's frames and arrays; labels : name -> (T,) texts
+        """Translate and draw frames (T,), ascending indices, chunk by chunk, and write their arrays to a new file.
+        signals : of any frame of the recording, whose rest and kind hold for all; about : attributes of the file
+        take : called with each chunk's frames and arrays; labels : name -> (T,) texts; start_time : unix s
         room : bytes before the HDF5 part, as in `FramesFile`"""
         words = kept(self._keep, self._translator.answer)
         with FramesFile(path, len(frames), words, about, room=room, pair=self._pair) as file:

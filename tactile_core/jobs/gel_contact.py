@@ -70,8 +70,8 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 
 
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Return an indenter's pose and force, N, checked. pose : as of `_rigid`; force : None where none is asked for
-    Raises TactileError for an invalid pose or force."""
+    """Return an indenter's pose and force, N, checked; force : None where none is asked for
+    pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z). TactileError for an invalid one or force."""
     if force is not None:
         force = finite_number(force, "Gel, force", "newtons, zero or more, and finite", 0.0)
         if force > MOST_FORCE:

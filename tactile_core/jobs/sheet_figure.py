@@ -257,7 +257,8 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write each column's force (k, 3) N, trust, the first four arguments (k,) of `in_words`, and a key."""
+        """Write each column's force (k, 3) N and how far to trust it, and a key of the maps below.
+        trust : arrays (k,) of the first four arguments of `in_words`: confidence, flags, expected error m, dent m"""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]

@@ -175,8 +175,10 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @Loop
 def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN201
-    """Compute ``ShadowCaster._march`` by loops, of a field (rows, columns) m under an LED's foot, m high.
-    distance : (columns,) m; radii : (rows, columns); steps : (k,) columns, each of grid_step m"""
+    """Return the sight (rows, columns), -1 hidden to 1 visible, of an LED at height ``foot``, m, from polar places of
+    the mapped heights, field (rows, columns) m: ((foot - field) / distance - slope of the horizon) radii.
+    distance : (columns,) m from the LED's foot point; radii : (rows, columns), LED radii per unit of slope
+    steps : (k,) columns, each of grid_step m, at which the horizon is looked for toward the LED"""
     rows, columns = field.shape
     sight = np.empty((rows, columns), np.float32)
     horizon = np.empty(columns, np.float32)

@@ -13,7 +13,7 @@ def heights_above(  # noqa: ANN201
 ):  # fmt: skip
     """Find heights (n,) float32 m of the gel points displaced to places x, z (n,) m, and how many were not found.
 
-    It does what ``HeightMapper._source`` does, place by place, then takes the height there; the cubic B-splines of
+    Place by place, Broyden's method finds the point's place at rest, whose height is taken; the cubic B-splines of
     ``geometry.cubic_spline.bspline_weights`` are written out.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
     to_x, to_z, miss : (2, n), rows of the inverse Jacobian and the residual of each place at the start

@@ -180,7 +180,10 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
     """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
-    height, steepness : (H W,) m and 1; start, start_near, start_nearest : (H, W), see ``Perspective._begin_at``
+    height, steepness : (H W,), of the map: m, and its slope outward from the middle times distance from there, times
+        inverse
+    start : (H, W) m, heights near the sought ones, with start_near : (H, W), 1 - start inverse, and start_nearest :
+        (H, W) int, index of the map's place nearest to each
     rows, columns : (H,), (W,) px, from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)

@@ -22,9 +22,9 @@ COARSE = 2.0  # counts between readings from which noise is lost in their steps,
 
 
 def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of a recording: OUT_OF_RANGE where it moves within moving averages, if it holds such, else 0.
-    warnings : extended by a sentence on them
-    readings : (T, e) counts; change : (T, e) counts, against rest"""
+    """Return flags (T,): of a recording whose readings lack noise, OUT_OF_RANGE where they move within half a second,
+    as averages are wrong there; 0 elsewhere. readings : (T, e) counts; change : (T, e) counts, against rest
+    warnings : extended by a sentence if they lack it"""
     flags = np.zeros(len(readings), np.uint16)
     if recording.simulated or not np.isfinite(recording.time).all() or not _lacks_noise(readings, recording.rate):
         return flags

@@ -73,7 +73,7 @@ def contacts_of(name: str) -> np.ndarray | None:
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the rise (P,) float64 Pa of the fluid's pressure in ``contacts_of``'s contacts; None and errors as there."""
+    """Load the rise (P,) float64 Pa of the fluid's pressure in ``contacts_of``'s contacts; None if no table has it."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 

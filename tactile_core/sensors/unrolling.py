@@ -1,4 +1,4 @@
-"""Normals and areas of a sensor's surface, and the unrolling of the BioTac's pad onto the DIGIT's plane."""
+"""Unroll a BioTac's pad onto the gel's plane and back; find a surface's normals, and its nearest places to points."""
 
 from __future__ import annotations
 

@@ -167,10 +167,10 @@ TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | 
 
 
 def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
-    """Measure medians over contacts of units given, found and taken as typical, beside those of as many typical units.
-
-    units, presses : how many, and on each; found : by the recording itself, its rest and contacts, as `tactile convert`
-        does; stiffness cannot be"""
+    """Measure median errors of contacts on random units, translated with the unit given, found or taken as typical;
+    baseline: contacts on typical units.
+    units, presses : number of units, and on each. Found means from the recording, as `tactile convert` does: not the
+        stiffness"""
     drawn = [unit_of(number) for number in range(units)]
     made, typical = ([played(*each, presses) for each in enumerate(every)] for every in (drawn, [Unit()] * units))
     beside = _errors(network, typical, "unknown")

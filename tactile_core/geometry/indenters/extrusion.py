@@ -55,7 +55,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``distance``; for outline, along and half_span see there."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, for the same outline, along and half_span."""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

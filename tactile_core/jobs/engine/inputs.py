@@ -131,7 +131,7 @@ def _is_bag(folder: Path) -> bool:
 
 
 def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
-    """Return an input for each recording in the files, of which a hand's has one per finger, with the file's hash.
+    """Return an input, with the file's hash, for each recording in files ``paths``: of a hand, one for each finger.
     progress : called with (files done, in all). Raises TactileError for a file that cannot be read."""
     found: list[Input] = []
     for done, path in enumerate(paths, 1):

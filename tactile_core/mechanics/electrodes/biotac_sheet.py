@@ -53,7 +53,7 @@ class BiotacSheet:
     unresolved: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the film's thickness (k,) m, from ``fluid.thinnest`` up, under displacement (n, 3) m of the skin."""
+        """Return the film's thickness (k,) m, from ``fluid.thinnest`` up; displacement : (n, 3) m of the inner skin"""
         moved = np.einsum("ki,ki->k", displacement[self.wet], self.outward)
         return np.maximum(self.film + moved, self.fluid.thinnest)
 

@@ -214,8 +214,8 @@ def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the sensing points (v,) under which halves are solved; for each of all w points, the index (w,) among
-    these of the one that stands for it (itself, or its image, see `images`), and a sign (w,), -1 for an image."""
+    """Return the sensing points (v,) whose unit loads are solved; and, for each of all w points, the index (w,) among
+    these of the one solved in its place (see `images`), and a sign (w,), -1 where that is its mirror image."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)

@@ -154,7 +154,7 @@ def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
 
 @Loop
 def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001, ANN201
-    """Compute ``Slipping`` for nodes ``at`` (s,) of ``points`` with a ``motion``; curved, bend, friction : see there"""
+    """Compute ``Slipping``, which describes curved, bend and friction too, of nodes ``at`` (s,) of ``points``."""
     s = len(at)
     across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
     turning = np.empty((len(curved), 3, 3))

@@ -121,8 +121,8 @@ def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def images(sensor: str, mesh: HexMesh, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return for all ``count`` sensing points the index (count,) of the point that stands for each, and if that is its
-    mirror image, (count,) bool: the image stands for a free node at z < 0; others, and all feet, stand for themselves.
+    """Return, for each of ``count`` sensing points, the index (count,) of the point to solve in its place, and whether
+    that is its mirror image, (count,) bool: true for free nodes at z < 0; all others are solved themselves.
     """
     source, mirrored = np.arange(count), np.zeros(count, bool)
     first = count

@@ -202,8 +202,8 @@ def irradiance(
 ) -> np.ndarray:
     """Return the irradiance (h - 2 margin, w - 2 margin, 3) by the gel itself, over pi: in the unit of radiance.
 
-    (1 / pi) times the integral of L (n . w) dw over directions w that meet gel: for each azimuth, L times the rise of
-    `_weight` from each horizon to the next.
+    (1 / pi) times the integral of L (n . w) dw over directions w that meet gel: for each azimuth, L times the weighted
+    solid angle between each horizon and the next.
     height : (h, w) m; radiance : (h, w, 3); spacing : (right, down) m
     margin : places on each side that give light and receive none; the search goes 2 less far"""
     field = np.concatenate([height[..., None], radiance], -1).astype(np.float32)

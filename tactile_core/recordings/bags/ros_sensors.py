@@ -74,8 +74,8 @@ def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, 
 
 
 def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float], list[float]]:
-    """Return a list of pdc, tac, tdc and samples of pac, NaN where missing, and a list of the electrodes. Raises
-    ValueError for over MOST_PAC samples."""
+    """Return a sensor's pdc, tac, tdc (NaN where missing) and samples of pac in one list, and its electrodes. Raises
+    ValueError for over MOST_PAC samples. sensor : its part of a message; fields : their names in it"""
     row = [float(sensor[name]) if name else float("nan") for name in fields.slow]
     for name in fields.pac:
         samples = sensor[name]

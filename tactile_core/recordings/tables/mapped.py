@@ -169,7 +169,8 @@ def _readings(table: Table, names: Sequence[str]) -> np.ndarray:
 def read_by_map(
     path: str, container: str, file: BinaryIO, columns: ColumnMap, left_out: Callable[[str], bool] | None = None
 ) -> Recording:
-    """Read an open file by a map, columns. left_out : true for the name of a column that a long text is read without
+    """Read the recording of an open file by a map, columns; container : csv, json, hdf5, npz or mat
+    left_out : true for the name of a column that need not be kept of a long text; None keeps all
     Raises TactileError for a missing column or array."""
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else read_table(path, file, left_out)
@@ -191,7 +192,7 @@ def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
 
 
 def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap], tuple[str, ...]]:
-    """Guess the maps of an open file's fingers; return its columns, too. Raises TactileError, also for a bag."""
+    """Guess the map of each finger of an open file; also return the names of its columns. TactileError for a bag."""
     refuse_bag(path, container)
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else next(read_tables(path, file, GUESSED_BY, 0))[0]

@@ -104,8 +104,8 @@ def doubt_last_cell(
     kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
 ) -> None:
     """Report the last number of a file without final newline as a problem where it may be cut off: every other row ends
-    in a separator and this one does not, or else its value looks cut (`_looks_cut`). Complete files that merely lack it
-    are common. kept : number and text of each line; values : (T, C) of them, of which the last becomes NaN"""
+    in a separator and this one does not, or else its value is suddenly below half of the last. Many complete files lack
+    that newline. kept : number and text of each line; values : (T, C) of them, of which the last becomes NaN"""
     number, line = kept[-1]
     if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
         return

@@ -17,8 +17,8 @@ MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Return pdc (T,) of a file in counts; None if unknown how. unit : counts that an electrode's 1 there means
-    warnings : extended by what was assumed; sensor : whose PDC this is"""
+    """Convert pdc (T,), as a file has it, to counts; None if its unit of measurement cannot be told.
+    unit : counts that 1 means in the file's electrodes; warnings : extended by what was assumed; sensor : whose PDC"""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -32,7 +32,8 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return the counts that 1 in pdc (T,) means (0: unknown) and its pressure unit or ""; unit : as of electrodes"""
+    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the pressure unit that it is in, "" for counts.
+    unit : counts that 1 means in the file's electrodes"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
     if not len(values):
