@@ -24,7 +24,7 @@ CONVERTERS = {f"lerobot.scripts.{CONVERTER}": ".", f"lerobot.datasets.v30.{CONVE
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Install, export and check; returns the exit status."""
+    """Install LeRobot, then ``check`` what `tactile export` writes; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--venv", type=Path, metavar="DIR", help="environment to use, or to make and keep")
     parser.add_argument("--train", type=Path, metavar="DATASET", help=argparse.SUPPRESS)  # what runs in there
@@ -108,7 +108,7 @@ def run(*command: object) -> int:
 
 
 def call(*command: object) -> None:
-    """Run a command that must not fail."""
+    """Run a command; ends this script where the command fails."""
     if run(*command):
         raise SystemExit(1)
 

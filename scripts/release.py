@@ -40,7 +40,7 @@ class ReleaseError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Build, try and hash the release; returns the exit status."""
+    """Build wheel, sdist and zips, convert with the wheel alone, print hashes; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--no-zips", action="store_true", help="leave out the extension's zips")
     parser.add_argument("--out", type=Path, default=ROOT / "dist", metavar="DIR", help="new or empty (default: dist)")

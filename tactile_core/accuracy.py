@@ -136,7 +136,7 @@ def line(row: Row) -> str:
 
 
 def failed(rows: list[Row]) -> list[Row]:
-    """Return the rows of errors that miss their target."""
+    """Return the rows that miss their target, but for those of time and memory."""
     return [found for found in rows if found["ok"] is False and found["unit"] not in COSTS]
 
 

@@ -32,7 +32,7 @@ def leds_of(gel: bpy.types.Object) -> dict[str, bpy.types.Object]:
 
 
 def camera_of(gel: bpy.types.Object) -> bpy.types.Object | None:
-    """The gel's camera, if any."""
+    """Return the camera object among the gel's parts, None without one."""
     return next((thing for thing in parts_of(gel) if thing.type == "CAMERA"), None)
 
 

@@ -6,7 +6,7 @@ import bpy
 
 
 class Nodes:
-    """Adds nodes to a tree."""
+    """Builder of a tree of nodes: each method adds a node and links it."""
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
         self.tree = tree
@@ -39,7 +39,7 @@ class Nodes:
 
 
 class NodeGroup(Nodes):
-    """A geometry-node group under construction."""
+    """Builder of a new geometry-node group, ``label``, whose input and output are a geometry."""
 
     def __init__(self, label: str) -> None:
         super().__init__(bpy.data.node_groups.new(label, "GeometryNodeTree"))

@@ -20,7 +20,7 @@ _MM = 1e3
 
 
 def add_parts(thing: bpy.types.Object) -> None:
-    """Add the parts that a sensor has, and under a gel the window."""
+    """Add a sensor's parts, as of ``sensor_bodies.toml``, and under a gel its window, as children of its surface."""
     sensor = properties.sensor_name(thing)
     known = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     is_gel = thing.tactile.role == "DIGIT"

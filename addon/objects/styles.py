@@ -20,7 +20,7 @@ _ONLY = {"CONTACT_PATCH": "DIGIT", "ELECTRODES": "BIOTAC"}  # style -> the one r
 
 
 def can_show(thing: bpy.types.Object, style: str) -> bool:
-    """Return true where a sensor has what a style shows."""
+    """Return true if a style suits a sensor: a contact patch needs a gel, electrodes need a skin."""
     return _ONLY.get(style, thing.tactile.role) == thing.tactile.role
 
 

@@ -20,7 +20,7 @@ _failed = ""  # why the last frame could not be drawn; shown in the panel
 
 
 def is_on() -> bool:
-    """Return true while the toggle is on."""
+    """Return true while Live Picture is on."""
     return _live
 
 
@@ -84,7 +84,7 @@ def _keep_images(*_: object) -> None:
 
 
 def switch_off() -> None:
-    """End the toggle, and the worker."""
+    """Switch Live Picture off, and end the workers that draw for it."""
     global _live
     _live = False
     tracer_process.close_all()
@@ -115,7 +115,7 @@ class TACTILE_OT_live_picture(TactileOperator):
 
 
 def unregister() -> None:
-    """Stop drawing; the package calls it."""
+    """Switch Live Picture off when Blender switches the extension off."""
     switch_off()
 
 

@@ -140,7 +140,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Take back what `register` did."""
+    """Take the engine off Blender's own panels, and stop looking for idle workers."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     bpy.app.timers.unregister(_end_idle_workers)

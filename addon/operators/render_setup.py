@@ -28,7 +28,7 @@ PRESETS = (_FAST, *(_MITSUBA if TRACED else ()))
 
 
 class TactileRender(bpy.types.PropertyGroup):
-    """Render settings of each scene."""
+    """Settings that the add-on stores with each scene: preset, calibration, bounds on the error."""
 
     preset: bpy.props.EnumProperty(
         name="Preset", description="How exactly the picture is made", items=PRESETS,

@@ -50,7 +50,7 @@ def sensors_in(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def read(folder: Path) -> Result:
-    """Read the result in a job's folder."""
+    """Read the result that the simulation wrote into a job's folder."""
     with np.load(folder / "result.npz") as stored:
         moved = {name.removeprefix(MOVED): stored[name] for name in stored.files if name.startswith(MOVED)}
         picked = tuple(str(text) for text in stored["picked"])

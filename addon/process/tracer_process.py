@@ -31,7 +31,7 @@ def write_unit(folder: Path, unit: Calibration) -> None:
 
 
 class Stopped(Exception):
-    """The user has pressed Esc."""
+    """Error that ends a drawing once the user has stopped it, as by Esc."""
 
 
 class Tracer:
@@ -91,7 +91,7 @@ class Tracer:
         np.savez(self._folder.path / "bodies.npz", **arrays)
 
     def close(self) -> None:
-        """End the worker."""
+        """End the worker process and remove its folder."""
         self._job.cancel()
         self._folder.close()
 
@@ -148,6 +148,6 @@ def close_idle() -> None:
 
 
 def close_all() -> None:
-    """End the workers."""
+    """End the workers of all presets."""
     while _kept:
         _kept.popitem()[1].close()

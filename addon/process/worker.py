@@ -41,7 +41,7 @@ def main(folder: Path) -> int:
 
 
 def say(**message: Any) -> None:
-    """Print one line for Blender."""
+    """Print a message as one line of JSON, for the Blender that started this process."""
     sys.stdout.write(json.dumps(message) + "\n")
     sys.stdout.flush()
 

@@ -84,7 +84,7 @@ class RecordingOptions:
 
 
 class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
-    """Properties of each object."""
+    """Properties that the add-on stores with each object: its role, its sensor, and how its recording was read."""
 
     role: bpy.props.EnumProperty(name="Role", description="What this object is to the Tactile add-on", items=ROLES)
     format: bpy.props.IntProperty(name="Format", description="Of these properties, to tell older files", default=0)

@@ -59,7 +59,7 @@ def require(*names: str) -> None:
 
 
 class Refused(Exception):
-    """An operator has reported why it cannot go on."""
+    """Error raised after an operator has reported why it cannot go on."""
 
 
 @contextmanager

@@ -40,7 +40,7 @@ FRAMES = 100, 25  # between those drawn of the long recording, and of the short 
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print and write the parts."""
+    """Measure, print and write the rows of the parts that the command line names; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("data", type=Path, metavar="DATA")
     parser.add_argument("--parts", default=",".join(PARTS), help="which, by commas")
@@ -55,19 +55,19 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def own_unit(data: Path) -> Photographs:
-    """Read the 14 photographs of the unit that ships. Here and below, data : the folder that the module calls DATA"""
+    """Read the 14 photographs of the unit that ships from the folder ``data``."""
     return read_photographs(data / "digit_real" / "presses")
 
 
 def deeper(data: Path, known: Photographs) -> Photographs:
-    """Read two presses of another day, deeper and of another ball, beside the untouched gel of ``known`` ones."""
+    """Read two deeper presses of another ball and day from the folder ``data``; background : that of ``known`` ones"""
     files = sorted((data / "digit_real" / "deeper").glob("*.png"))
     found = (press_of(file.name, read_photograph(file), known.background) for file in files)
     return dataclasses.replace(known, presses=tuple(press for press in found if press is not None))
 
 
 def other_unit(data: Path) -> Photographs:
-    """Read ten photographs of Taxim's unit, with its untouched gel."""
+    """Read ten photographs of another unit (Taxim's), and its untouched gel, from the folder ``data``."""
     folder = data / "digit_other_unit"
     return read_photographs(folder, folder / "untouched.jpg")
 
@@ -103,7 +103,7 @@ def thirds(data: Path) -> Iterator[Row]:
 
 
 def five(data: Path) -> Iterator[Row]:
-    """Yield rows of the unit that ships on the five photographs that it was not fitted to, and on another unit's."""
+    """Yield rows of the shipped calibration on five photographs in ``data`` kept apart, and on another unit's."""
     unit, known = load_calibration(), own_unit(data)
     apart = [press.name for press in known.presses if press.name not in unit.fit.photographs]
     for of, each in (("5 not fitted", chosen(known, apart)), ("another unit", other_unit(data))):
@@ -119,7 +119,7 @@ def fifths(data: Path) -> Iterator[Row]:
 
 
 def levels(data: Path) -> Iterator[Row]:
-    """Yield ``level_rows`` of photographs, and of pictures of real recordings."""
+    """Yield ``level_rows`` of photographs in the folder ``data``, and of pictures of real recordings there."""
     known, other = own_unit(data), other_unit(data)
     for of, each in (("14 photographs", known), ("2 deeper", deeper(data, known)), ("another unit", other)):
         shown = np.stack([press.picture for press in each.presses])
@@ -130,7 +130,7 @@ def levels(data: Path) -> Iterator[Row]:
 
 
 def recordings(data: Path) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the gel's displacement (T, n, 3) m on real recordings: a finger on a force sensor, and a slide."""
+    """Yield name and gel displacement (T, n, 3) m of recordings in ``data``: a finger on a force sensor, a slide."""
     folder = data / "biotac_force"
     rest, pressed = (np.loadtxt(folder / f"finger1_{name}.txt") for name in ("rest", "counts"))
     counts = np.concatenate([rest, pressed])

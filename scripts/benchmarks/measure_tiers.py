@@ -53,7 +53,7 @@ SAYS = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Solve by each tier, compare and write the table."""
+    """Solve contacts by each tier, compare them, write the table of errors and times; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("--work", type=Path, metavar="DIR", help="where contacts that were solved are kept")
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} random contacts, few test contacts")

@@ -42,7 +42,7 @@ FORCES = 0.5, 2.0  # N
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Make, compare and print; returns the exit status."""
+    """Run the commands, hash what they write, compare with ``--than``'s hashes; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, metavar="FILE", help="write the digests here (JSON)")
     parser.add_argument("--than", type=Path, metavar="FILE", help="digests of the commit before")

@@ -110,7 +110,7 @@ class FramePass:
         return heights
 
     def pictures(self, arrays: dict[str, np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
-        """Return the pictures (H, W, 3) uint8 of some rows of the arrays, drawn unless the arrays hold them."""
+        """Return the pictures (H, W, 3) uint8 of rows (n,) of the arrays, drawn unless the arrays hold them."""
         if "image" in arrays:
             return [arrays["image"][row] for row in rows]
         moved = arrays["displacement_digit"][rows]

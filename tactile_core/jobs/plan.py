@@ -35,13 +35,13 @@ class Part(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Parts of a command's work, in their order. Of several matrices' memory one counts: they are built one by one."""
+    """Cost of a command, part by part. Memory for building matrices counts once: they are built one by one."""
 
     parts: Sequence[Part]
 
     @property
     def seconds(self) -> float:
-        """Time of all parts together, s."""
+        """CPU time of all parts together, s."""
         return sum(part.seconds for part in self.parts)
 
     @property

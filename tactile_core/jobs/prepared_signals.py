@@ -159,7 +159,7 @@ class Prepared:
         return self._read(lambda file: len(file["time"]))
 
     def about(self) -> About:
-        """Return the facts reported of the recording."""
+        """Read the facts of the whole recording: layout, kind, warnings, number of frames and the like."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:

@@ -157,7 +157,7 @@ class Pictures:
     exr: bool
 
     def begin(self, folder: Path) -> None:
-        """Make the folders of the files."""
+        """Make the folders of the pictures and, where asked for, of the EXR files, in ``folder``."""
         (folder / results.IMAGES).mkdir()
         if self.exr:
             (folder / EXR).mkdir()

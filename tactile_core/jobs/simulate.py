@@ -42,7 +42,8 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """List all combinations, the last name's values changing fastest. Raises TactileError for bad or repeated words."""
+    """List all combinations of the values in ``NAME=...`` words, each a dict by name; the last name changes fastest.
+    Raises TactileError for bad or repeated words."""
     axes: dict[str, list[Value]] = {}
     for word in words:
         name, mark, text = word.partition("=")

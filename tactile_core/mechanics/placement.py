@@ -37,12 +37,12 @@ _SAME = 1e-12  # m, sideways, of poses that differ in depth alone
 
 
 def same_place(first: Pose, second: Pose) -> bool:
-    """Return true if two poses are equal."""
+    """Return true if two poses have the same apex and axes."""
     return np.array_equal(first.apex, second.apex) and np.array_equal(first.axes, second.axes)
 
 
 def same_line(first: Pose, second: Pose) -> bool:
-    """Return true if two poses differ in depth alone."""
+    """Return true if two poses have the same axes and differ along their direction of motion alone."""
     apart = second.apex - first.apex
     sideways = apart - (apart @ first.direction) * first.direction
     return bool(np.abs(sideways).max() < _SAME and np.array_equal(first.axes, second.axes))

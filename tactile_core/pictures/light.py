@@ -104,7 +104,7 @@ def open_light(surface: Surface, unit: Calibration) -> np.ndarray:
 
 
 class Lamps:
-    """The LEDs of one camera's gel. Raises TactileError for LEDs that ``ShadowCaster`` refuses."""
+    """Light of LEDs on a camera's gel, with shadows. Raises TactileError for LEDs that ``ShadowCaster`` refuses."""
 
     def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
         self._casters = [ShadowCaster(camera, led) for led in leds]

@@ -57,7 +57,7 @@ class Polarity:
 
     @property
     def sure(self) -> bool:
-        """Return true if the recording shows it, or it is known."""
+        """Return true if the recording shows the polarity or it is known, false if it is assumed or contradicted."""
         return self.basis is Basis.SURE
 
     @property
@@ -78,7 +78,7 @@ class Polarity:
 
     @property
     def warnings(self) -> list[Doubt]:
-        """Return the doubt for the user, if there is one."""
+        """Return the doubt for the user, one or none, in a list."""
         if self.basis is Basis.CONTRADICTED:
             return [Doubt(Reason.POLARITY_CONTRADICTED, name=self.name, found=self.found)]
         return [] if self.sure else [Doubt(Reason.POLARITY_ASSUMED, found=self.found)]

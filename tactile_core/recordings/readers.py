@@ -210,7 +210,7 @@ def _holds_hands(layout: ModuleType) -> bool:
 
 
 def names(store: Store) -> set[str]:
-    """Return the names from which an HDF5 file's layout is detected."""
+    """Return the names from which an HDF5 file's layout is detected: of its arrays, and ``format=...``."""
     return {*store.shapes, f"format={store.attributes.get('format', '')}"}
 
 

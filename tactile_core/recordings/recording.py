@@ -54,13 +54,13 @@ class Truth(Summary):
 
     @property
     def displacements(self) -> dict[str, np.ndarray]:
-        """Displacements (T, n, 3) m that the file was made with, by sensor."""
+        """Displacements (T, n, 3) m of all sensors whose displacement the file has, by the sensor's name."""
         held = {SOURCE: self.displacement_biotac, TARGET: self.displacement_digit, **self.displacement}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
     @property
     def tractions(self) -> dict[str, np.ndarray]:
-        """Tractions (T, n, 3) Pa that the file was made with, by sensor."""
+        """Tractions (T, n, 3) Pa of all sensors whose traction the file has, by the sensor's name."""
         held = {SOURCE: self.traction_biotac, TARGET: self.traction_digit, **self.traction}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
@@ -136,7 +136,7 @@ class Recording(Summary):
 
     @property
     def row_word(self) -> str:
-        """Word for a frame's row in messages."""
+        """Word for a frame's row in messages: line of a text file, frame of others."""
         return "line" if self.layout.startswith("CSV") else "frame"
 
 

@@ -103,7 +103,7 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
 
 
 def silence_rows(measure: Measure) -> list[Row]:
-    """Make rows of the means of `silence`; their baseline is 0."""
+    """Make report rows of the means of `silence`, um and N; their baseline is 0."""
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]

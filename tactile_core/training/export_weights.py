@@ -117,7 +117,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
 
 
 def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
-    """Return the sizes of a surface's lattice, window and bases."""
+    """Return, for the card, the sizes of a surface's lattice, window and bases, by name."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
     lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
     return {**lattice, "wide": wide, "near": near}
@@ -184,7 +184,7 @@ def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dic
 
 
 def pairs_entry(contacts: Contacts) -> dict[str, object]:
-    """Return the origin of the training data, and its split."""
+    """Return, for the card, the origin of the training data, and numbers of contacts and presses in each part."""
     pairs, split = contacts.pairs, contacts.split
     parts = {"train": split.train, "validation": split.validation, "test": split.test}
     return {

@@ -116,17 +116,17 @@ class Vae(nn.Module):
         self.encoder, self.decoder = encoder, decoder
 
     def posterior(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Map x to mean (B, L) and log variance (B, L) of the latent."""
+        """Map x (B, inputs) to mean (B, L) and log variance (B, L) of the latent."""
         mean, logvar = self.encoder(x).chunk(2, -1)
         return mean, logvar.clamp(-12.0, 6.0)  # keeps exp() finite in the first steps; trained values lie well inside
 
     def mean(self, x: Tensor) -> Tensor:
-        """Map x to the mean (B, L) of the posterior, which is used at inference."""
+        """Map x (B, inputs) to the mean (B, L) of the posterior, which is used at inference."""
         return self.posterior(x)[0]
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Draw a latent from the posterior of x (reparameterised); also return its KL divergence from N(0, 1), mean
-        over B (Kingma and Welling 2014, appendix B)."""
+        """Draw a latent (B, L) from the posterior of x (B, inputs), reparameterised; also return its KL divergence from
+        N(0, 1), mean over B (Kingma and Welling 2014, appendix B)."""
         mean, logvar = self.posterior(x)
         noise = torch.randn(mean.shape, generator=generator).to(mean.device)  # the same numbers on any device
         divergence = 0.5 * (mean**2 + logvar.exp() - 1.0 - logvar).sum(-1).mean()

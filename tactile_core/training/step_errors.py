@@ -61,7 +61,7 @@ def parts(count: int) -> list[slice]:
 
 
 def joined(columns: Iterator[Columns]) -> Columns:
-    """Join the tables of parts into one."""
+    """Join the columns (B,) of consecutive parts of contacts, by name, into columns of all."""
     found = list(columns)
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 

@@ -205,7 +205,7 @@ def run_stage(
 
 
 def share_done(options: Options, state: checkpoint.State) -> float:
-    """Return the epochs done over all epochs."""
+    """Return the share, 0 to 1, of the epochs of all stages that a training's state has done."""
     lengths = [options.epochs(stage.name) for stage in STAGES]
     return (sum(lengths[: state.stage]) + state.epoch) / sum(lengths)
 

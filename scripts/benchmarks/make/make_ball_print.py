@@ -33,7 +33,7 @@ FADE = 0.8  # the table's last part goes to zero
 
 
 def main() -> int:
-    """Press balls, fit their prints and write the table."""
+    """Press balls into a flat layer, tabulate the gel's rise around them, write the table; returns the exit status."""
     content = io.BytesIO()
     tables = {}
     for k, (radius, shares) in enumerate(DEPTHS.items()):

@@ -27,14 +27,14 @@ HEADER = "x_mm,theta_deg,r_outer_mm,r_inner_mm,r_core_mm"
 
 
 def main() -> int:
-    """Compute and write the profile."""
+    """Compute the table of the BioTac SP's radii and write it beside its descriptor; returns the exit status."""
     skin = skin_of("biotac_sp").descriptor
     atomic.write_bytes(skin.folder / skin.skin.profile, table().encode())
     return 0
 
 
 def table(name: str = "biotac_sp") -> str:
-    """Return the table as text, with the skin's thickness and middle from the descriptor of sensor ``name``."""
+    """Return the table of radii, CSV; the skin's thickness and middle are of the descriptor of sensor ``name``."""
     skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
     outer, core = 1e3 * RESTING, 1e3 * CORE

@@ -70,7 +70,7 @@ def solved(sensor: str, balls: list[tuple[Sphere, Placement, float]]) -> Solutio
 
 
 def main() -> int:
-    """Make the file; returns the exit status."""
+    """Draw and solve the double contacts and write their file; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", required=True, metavar="FILE")
     parser.add_argument("--count", type=int, default=100)

@@ -29,7 +29,7 @@ COLORS = "viridis"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Draw the figure; returns the exit status."""
+    """Draw docs/overview.png, or the file of ``--out``; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "overview.png")
     out = parser.parse_args(arguments).out

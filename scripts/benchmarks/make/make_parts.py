@@ -30,7 +30,7 @@ from tactile_core.translation.card import PARTS
 
 
 def main() -> int:
-    """Train and write; returns the exit status."""
+    """Train the network that separates two contacts on a file of pairs, and write its weights; returns the status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairs", metavar="PAIRS", help="HDF5 file of `tactile pairs`")
     path, folder, options = parser.parse_args().pairs, networks.WEIGHTS_FOLDER, Options()

@@ -44,7 +44,7 @@ Contact = tuple[Solution, Solution]
 
 
 def main() -> int:
-    """Draw the sequences, solve and write them."""
+    """Draw sequences of contacts, solve them on both sensors, write the test set; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=pathlib.Path, default=OUT, help="the file to write (%(default)s)")
     parser.add_argument("--each", type=int, default=20, help="sequences of each motion (20)")

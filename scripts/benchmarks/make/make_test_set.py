@@ -95,7 +95,7 @@ def _numbers(text: str) -> range:
 
 
 def main() -> int:
-    """Solve the presses, merge and report them."""
+    """Solve presses by the full tier on both sensors, merge them into the test set; returns the exit status."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--out", type=pathlib.Path, required=True, help="the HDF5 file to write")

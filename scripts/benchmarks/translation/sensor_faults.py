@@ -102,7 +102,7 @@ def drifting(count: int, by: float) -> Fault:
 
 
 def noisy(count: int, counts: float) -> Fault:
-    """Return a fault: ``count`` electrodes have noise of ``counts`` counts."""
+    """Return a fault: ``count`` electrodes get normal noise; counts : its standard deviation, counts"""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[:, _drawn(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))

@@ -87,7 +87,7 @@ MISSING, BROKEN = "missing", "broken"  # in place of a version
 
 
 def report() -> Iterator[str]:
-    """Yield the lines to print; raises nothing."""
+    """Yield lines on this machine: versions, each library, and the variant of Mitsuba in use; raises nothing."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -55,6 +55,6 @@ class SceneForm:
 
 @functools.cache
 def forms() -> dict[str, SceneForm]:
-    """Find the forms of all shapes in this folder, by kind."""
+    """Return the ``SceneForm`` of each shape in this folder, by its kind."""
     found = [getattr(module, "SCENE", None) for module in modules_of(__name__.rpartition(".")[0]).values()]
     return {form.kind: form for form in found if form is not None}

@@ -36,7 +36,7 @@ class Collected:
     unfit: dict[str, str]
 
     def units(self) -> dict[str, list[File]]:
-        """Return the files of each unit."""
+        """Return the files of each unit, by the unit's name."""
         found: dict[str, list[File]] = {}
         for file in self.files:
             found.setdefault(file.unit, []).append(file)

@@ -23,7 +23,7 @@ Progress = Callable[[int, int], None]
 
 
 class Place(Protocol):
-    """Executor of tasks; a context manager."""
+    """Executor of tasks, such as local processes or a cluster's; a context manager."""
 
     def submit(self, task: Task) -> None:
         """Submit a task; `results` gives its reply."""

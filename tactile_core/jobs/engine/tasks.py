@@ -33,11 +33,11 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @classmethod
     def from_error(cls, error: TactileError) -> Failure:
-        """Return an error's fields."""
+        """Return the failure with the fields of an error."""
         return cls(error.found, error.where, error.expected, error.advice)
 
     def error(self, task: str) -> TactileError:
-        """Return the error; task : its name, for an empty `where`"""
+        """Return the failure as an error to raise; task : name of the failed task, in place of an empty `where`"""
         return TactileError(self.where or task, self.found, self.expected, self.advice)
 
     def __str__(self) -> str:

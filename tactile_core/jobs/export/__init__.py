@@ -16,7 +16,7 @@ NOTE = "note.json"
 
 
 def layouts() -> dict[str, ModuleType]:
-    """Name -> module of ``formats/``."""
+    """Return the modules of ``formats/`` by the layouts' names."""
     return modules_of(formats.__name__)
 
 

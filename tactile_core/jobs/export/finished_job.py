@@ -52,7 +52,8 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield blocks of frames: arrays (n, ...) by the names of a BioTac and a DIGIT; without : names to leave out"""
+        """Yield blocks of frames, arrays (n, ...) by name, called biotac and digit whatever the sensors are.
+        without : names to leave out"""
         import h5py
 
         for path in self.shards:
@@ -73,11 +74,11 @@ class Recorded:
         raise IndexError(frame)
 
     def arrays(self) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-        """Name -> shape of one frame, and type."""
+        """Return, by name, the shape of one frame's array and its type."""
         return {self._plain(name): kind for name, kind in _kinds(self.shards[0]).items()}
 
     def stored(self, name: str) -> str:
-        """Return the name under which the shards hold an array."""
+        """Return the name in the shards, ending in this pair's sensor, of an array called after biotac or digit."""
         return named(name, self.pair)
 
     def _plain(self, name: str) -> str:

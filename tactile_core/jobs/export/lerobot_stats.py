@@ -76,5 +76,5 @@ def _together(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def listed(stats: Stats) -> dict[str, dict[str, Any]]:
-    """Return the statistics with lists in place of arrays, for JSON."""
+    """Return the statistics of features, by feature and statistic, with lists in place of arrays, for JSON."""
     return {name: {key: value.tolist() for key, value in one.items()} for name, one in stats.items()}

@@ -94,7 +94,7 @@ class View:
         return translator.decode(signals, evidence, state)
 
     def describe_latency(self) -> str:
-        """Describe the latencies of the last pictures."""
+        """Return a sentence: median and 99 % of the last pictures' latency, median of computing, frames passed over."""
         if not self.latencies:
             return "no picture yet: waiting for a quiet part"
         (middle, work), (late, _) = 1e3 * np.percentile(np.array(self.latencies), [50, 99], axis=0)

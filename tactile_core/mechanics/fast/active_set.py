@@ -23,7 +23,7 @@ class UnsolvedError(ArithmeticError):
 
 
 class ExhaustedError(UnsolvedError):
-    """The ``Work`` that contacts may cost is used up."""
+    """Error of a contact that needs more than is left of the ``Work`` that it may cost."""
 
 
 @dataclasses.dataclass

@@ -123,7 +123,7 @@ class _Supports(NamedTuple):
 
 
 def squares(features: np.ndarray) -> np.ndarray:
-    """Sums (n,) of the squares of scaled features (n, f)."""
+    """Sums (n,) of the squares of scaled features (n, f), which ``kernel`` takes."""
     return (features**2).sum(axis=1)
 
 

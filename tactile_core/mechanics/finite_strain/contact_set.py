@@ -50,7 +50,7 @@ class ContactSet:
 
     @classmethod
     def none(cls) -> ContactSet:
-        """Return the state without contact."""
+        """Return a set without candidates, as of a body that nothing can touch."""
         flags = np.zeros(0, bool)
         return cls(np.empty(0, int), flags, flags, _NO_WAY, np.empty(0), _NO_WAY, _NO_WAY)
 
@@ -258,7 +258,7 @@ _SHARE_STEP = 1 / 64
 
 
 class Obstacle(Protocol):
-    """A rigid body in the sensor's frame."""
+    """A rigid body in the sensor's frame that a surface may touch: an indenter, or a skin's core."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
@@ -269,7 +269,7 @@ class Obstacle(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class PlacedIndenter:
-    """An indenter at a pose."""
+    """An indenter at a pose, as an ``Obstacle``."""
 
     indenter: Indenter
     pose: Pose

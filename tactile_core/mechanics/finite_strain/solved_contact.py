@@ -55,8 +55,8 @@ EXACT = Tolerance(1e-9, 1e-8, 1e-13)
 
 
 class NoEquilibriumError(TactileError):
-    """A path has ended: no contact was found beyond it."""
+    """Error of a path of load steps that ends early: no equilibrium was found beyond its last contact."""
 
 
 class NotConvergedError(Exception):
-    """A load step is too large."""
+    """Error of a load step whose iterations find no equilibrium: smaller steps are tried."""

@@ -62,7 +62,7 @@ class GradedMesh:
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Interpolate flags (n_surface,) of the mesh's surface nodes to the lattice's (n,) bool, true from 1/2 up."""
+        """Interpolate flags (n_surface,) of the mesh's surface nodes to the lattice's (n,) bool, true above 1/2."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 

@@ -144,7 +144,7 @@ class DampedFactor:
         self.stiffness = float(solid.law.bulk * 0.05 * spacing)
 
     def relax(self) -> None:
-        """Reduce the damping for the next matrix."""
+        """Reduce the damping for the next matrix, once a step has succeeded."""
         self.damping = self.damping / 4 if self.damping > _LEAST else 0.0
 
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:

@@ -29,7 +29,7 @@ class Tracer(abc.ABC):
         self.values = self.mi.traverse(self.scene)
 
     def around(self) -> dict[str, Any]:
-        """Return the objects of the scene besides the gel."""
+        """Return the objects of the scene besides the gel, by name, as Mitsuba's ``load_dict`` takes them."""
         return {}
 
     def load(self, height: np.ndarray) -> None:

@@ -38,7 +38,7 @@ for file in sorted(files):
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The variant to use, and a sentence why."""
+    """The name of the variant of Mitsuba to use, and why, in a sentence."""
 
     name: str
     why: str

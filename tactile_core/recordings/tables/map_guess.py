@@ -123,7 +123,7 @@ def _alike(name: str, other: str) -> int:
 
 
 def is_time(name: str) -> bool:
-    """Return true for a name that time may have."""
+    """Return true for a column's name that looks like that of time, such as ``time`` or ``stamp``."""
     return bool(TIME.search(name.lower().rpartition("/")[2]))
 
 
