@@ -61,7 +61,7 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """Return the error (C,) of the depth of the deepest node, as a share of the true depth; NaN without contact.
+    """Return the absolute error (C,) of the deepest node's depth, as a share of the true one; NaN without contact.
     predicted, true : (C, n, 3) m; depth : `height` on the DIGIT, `lengths` on the BioTac"""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):

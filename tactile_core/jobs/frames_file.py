@@ -92,7 +92,7 @@ def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
-    """Return the datasets of a file that keeps these words, with unit and meaning; a shard has the pictures, too."""
+    """Return (unit, meaning) of each dataset, by name, of a file that keeps words of KEPT; shards have pictures too."""
     kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 

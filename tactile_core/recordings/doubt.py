@@ -69,5 +69,5 @@ def reason_of(warning: str) -> Reason | None:
 
 
 def without(warnings: Iterable[str], reasons: Collection[Reason]) -> tuple[str, ...]:
-    """Return the warnings but for doubts of some reasons."""
+    """Return the warnings without those that are a `Doubt` for one of the reasons."""
     return tuple(one for one in warnings if reason_of(one) not in reasons)

@@ -67,7 +67,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Return the errors of `Model.directly`, one network from signal to gel, which the chain of networks must beat."""
+    """Return `mesh_columns`, named "direct", of `Model.directly`, the one network that the chain of several must beat."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:
@@ -121,8 +121,8 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, signed and rectified
-    separately. Rectified signals scatter more, and would hide unusual signed ones."""
+    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, as kind ("signed",
+    "rectified") -> distance -> quantiles. Rectified signals scatter more, and would hide unusual signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
         signal = contacts.read(
@@ -134,7 +134,8 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `card.fit_bounds` on the validation presses, signed and rectified separately; silence : the card's."""
+    """Fit `card.fit_bounds` on validation presses; return kind ("signed", "rectified") -> surface -> numbers.
+    silence : `silence_quantiles`"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():

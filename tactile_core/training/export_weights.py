@@ -95,7 +95,7 @@ def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndar
 
 
 def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
-    """Return the sizes in the card, from which `card.tensor_shapes` knows every shape."""
+    """Return the sizes in the card, network -> name -> number, from which `card.tensor_shapes` knows every shape."""
     options = contacts.options
     head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}
@@ -170,7 +170,7 @@ def versions(device: torch.device) -> dict[str, str]:
 
 
 def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, object]]:
-    """Write the files; returns the card's entries: file, sha256, sizes, shapes."""
+    """Write each network's file; returns the card's entries by network: file, sha256, sizes, shapes."""
     return {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()}
 
 

@@ -48,8 +48,8 @@ def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
 def exact_layer(
     depth: float, radius: float, thickness: float, youngs: float, poisson: float
 ) -> tuple[float, float, float]:
-    """Return contact radius m, depth m and force N of a rigid paraboloid, whose tip has ``radius`` m, at ``depth`` m in
-    a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
+    """Return contact radius, m, ``depth``, m, as it was solved, and force, N, of a rigid paraboloid of tip radius
+    ``radius`` m, at ``depth`` in a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
 
     With p = integral of phi(t) cos(xi t) the pressure's Hankel transform, the dual integral equations become
     pi/2 phi(x) - integral of K(x, t) phi(t) dt = E / (2 (1 - nu^2)) (d - x^2 / R), where phi vanishes at the contact's

@@ -83,7 +83,8 @@ def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: fl
 
 
 def judged(found: Translation, truth: Truth) -> Errors:
-    """Return errors of a sequence's frames that press with over 0.1 N; a contact that is lost is infinitely far."""
+    """Return errors of a sequence's frames of over 0.1 N, by name: place mm, infinite for a lost contact, force % and
+    peak %; and iou, the overlap of contact patches, NaN for small true ones."""
     on = truth["force"] > TOUCHED
     surface = sensors.digit_surface()
     patch = np.unpackbits(truth["patch"][on], axis=1, count=len(surface.rest)).astype(bool)

@@ -42,7 +42,8 @@ PLAIN = {
 
 
 class Layout(Protocol):
-    """File layout of a version; version : as info.json names it; picture : type of its pictures"""
+    """Writer of the files of one version of LeRobot's layout, called for each episode by ``write_set``.
+    version : as info.json names it; picture : type of its pictures"""
 
     version: str
     picture: Literal["image", "video"]

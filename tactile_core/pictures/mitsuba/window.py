@@ -21,7 +21,7 @@ _SINES = np.linspace(0, 0.999, 2000)  # of rays in air, for the table that inver
 
 
 def window_height(camera: Camera) -> float:
-    """Return the height of the window's far side, m over the plane of height zero."""
+    """Return the height of the window's outer side, toward the camera: m over the plane of height zero."""
     return shape_of(camera.sensor).back_y - camera.height_zero_y + ACRYLIC
 
 
