@@ -246,7 +246,7 @@ def make_venv(folder: Path) -> Path:
 
 
 def is_foreign(folder: Path) -> bool:
-    """Return true if a folder holds files but no virtual environment, so that making one there would destroy them."""
+    """Return true if a folder holds other files than a virtual environment's, which making one there would destroy."""
     return any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists()
 
 

@@ -36,7 +36,7 @@ ZIPS += [("linux-x64", "3.13", True), ("linux-x64", "3.14", True)]  # Debian's
 
 
 class ReleaseError(Exception):
-    """What keeps this tree from being released; the message says what to do."""
+    """Error for a checkout that cannot be released; the message says what to do."""
 
 
 def main(arguments: list[str] | None = None) -> int:

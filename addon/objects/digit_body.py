@@ -27,7 +27,7 @@ def has_body(gel: bpy.types.Object) -> bool:
 
 
 def leds_of(gel: bpy.types.Object) -> dict[str, bpy.types.Object]:
-    """The gel's LEDs by colour; renamed ones are known by their role."""
+    """Return the gel's LED objects by colour, whatever their names."""
     return {thing.tactile.colour: thing for thing in parts_of(gel) if thing.tactile.role == "LED"}
 
 
@@ -37,7 +37,7 @@ def camera_of(gel: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
-    """The gel's coating: the first of its materials that is one; None without any."""
+    """Return the gel's coating, the first of its materials that holds a coating's numbers; None without one."""
     materials = (slot.material for slot in gel.material_slots)
     return next((each for each in materials if each and digit_materials.is_coating(each)), None)
 

@@ -62,7 +62,7 @@ class Writer:
         self._patch += [] if patch is None else [patch]
 
     def motion(self, file: Path) -> Motion:
-        """Return the movement that was written; file : where it lies, once it is whole."""
+        """Return the movement that was written; file : path to name in it, at which the file is once it is complete"""
         patch = np.concatenate(self._patch) if self._patch else None
         return Motion(np.concatenate(self._dent), patch, file=file)
 
@@ -109,7 +109,7 @@ def stop(thing: bpy.types.Object) -> None:
 
 
 def check(*things: bpy.types.Object | None) -> None:
-    """Raise TactileError where the file that moves one of these objects is not where the .blend looks for it."""
+    """Raise TactileError if the mesh cache that moves one of these objects is missing at the path in the .blend."""
     for thing in filter(None, things):
         for modifier in thing.modifiers:
             path = Path(bpy.path.abspath(modifier.filepath)) if modifier.type == "MESH_CACHE" else None

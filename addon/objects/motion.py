@@ -47,7 +47,7 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
 def played(thing: bpy.types.Object) -> tuple[float, float] | None:
     """Return the first and last frame at which an object's surface moves; None where it may move at any.
 
-    Keyframes of its place, and F-curves that go on beyond their keys or are repeated, say nothing of that."""
+    None is returned for F-curves that are extrapolated or repeated; keyframes of the object's place do not count."""
     keys = thing.data.shape_keys
     owner, path = (keys, "eval_time") if keys else (thing, '["dent_um"]')
     moves = owner.animation_data

@@ -45,7 +45,7 @@ def input_of(tree: bpy.types.NodeTree, name: str) -> str:
 
 
 def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.types.bpy_struct, str]:
-    """Return what holds the value of a group's input in a modifier, and its name there, as layouts take them.
+    """Return the data and the property, for ``UILayout.prop``, that hold the value of a group's input in a modifier.
 
     Blender 5.2 holds inputs as properties, not by their keys.
     """

@@ -100,7 +100,7 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Start the worker of a preset of Mitsuba's, in a window, so that it has compiled before its first picture.
 
-    What stands in the way of a picture is no error here: ``draw`` raises it.
+    Raises nothing where no picture can be drawn: ``draw`` will.
     """
     gel = properties.gel_of(scene)
     if bpy.app.background or gel is None or reports.missing("mitsuba"):
@@ -152,6 +152,6 @@ def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def forget() -> None:
-    """Forget what the picture was drawn of, as another file is open: ``follow`` then draws it again."""
+    """Forget the state that the picture was drawn of, so that ``follow`` draws again: another file was opened."""
     global _drawn
     _drawn = None

@@ -105,7 +105,7 @@ def _fingers(path: str, _changed: int) -> list[str]:
 
 
 def fingers(path: str) -> list[str]:
-    """List the recordings that a file holds, as ``hand.mat#1``; the file itself where it is one, or none."""
+    """List the recordings that a file holds, as ``hand.mat#1``; the path itself for a file of one, and for no file."""
     return _fingers(path, _changed(path)) if os.path.isfile(path) else [path]
 
 

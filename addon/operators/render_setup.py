@@ -145,7 +145,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 
 def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the DIGIT's LEDs and coating, and what puts them back or keeps them; nothing without a DIGIT."""
+    """Draw the gel's LEDs and coating, and buttons to reset and save them, in a panel; nothing without a gel."""
     gel = properties.gel_of(context.scene, context.object)
     if gel is None:
         return

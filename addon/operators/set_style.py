@@ -72,7 +72,7 @@ def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: flo
 
 
 def take_over(thing: bpy.types.Object, other: bpy.types.Object) -> None:
-    """Give a new sensor the style of another one, over its own range."""
+    """Give a new sensor the style of another sensor, if it suits; colours cover the new sensor's own values."""
     style = styles.style_of(other)
     if style != "NONE" and styles.can_show(thing, style):
         _give(thing, style, 0.0, 1.0)

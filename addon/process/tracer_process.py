@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 
 class Tracer:
-    """A worker that draws height maps by one preset, until closed; unit, and what is around it, may change between."""
+    """A worker that draws height maps by one preset, until closed; each may have another unit and surroundings."""
 
     def __init__(self, preset: str) -> None:
         self._folder, self._count, self._unit = JobFolder(), 0, ""

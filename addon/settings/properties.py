@@ -49,7 +49,7 @@ POLARITIES = (
 
 
 class RecordingOptions:
-    """How a recording is read and translated: of the operator that imports it, and kept by its skin."""
+    """Settings by which a recording is read and translated; the importing operator and the imported skin have them."""
 
     tare: bpy.props.StringProperty(
         name="Tare", description="Frames without contact as A:B, auto to find them, none to keep the file's own zero",
@@ -221,7 +221,7 @@ def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
 
 
 def home_of(thing: bpy.types.Object) -> bpy.types.Collection:
-    """Return the collection that shows an object in a scene, not one that Blender keeps for light linking."""
+    """Return an object's first collection that is in a scene, as those that Blender keeps for light linking are not."""
     shown = {group for scene in bpy.data.scenes for group in (scene.collection, *scene.collection.children_recursive)}
     return next((group for group in thing.users_collection if group in shown), thing.users_collection[0])
 
@@ -236,7 +236,7 @@ def check_format(thing: bpy.types.Object) -> None:
 
 
 def check_own(*things: bpy.types.Object | None) -> None:
-    """Raise TactileError for an object that a library holds, which Blender lets nobody change here."""
+    """Raise TactileError for an object linked from another .blend, which Blender does not let change here."""
     for thing in things:
         if thing is not None and thing.library is not None:
             raise TactileError(

@@ -198,7 +198,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def one_thread(variant: str) -> None:
-    """Limit the variant to one thread: the targets are for one core."""
+    """Limit a variant of Mitsuba to one thread, as the targets of time are for one core."""
     if variant == LLVM:
         import drjit
         import mitsuba

@@ -28,7 +28,7 @@ def cache_folder() -> Path:
 
 
 def entries() -> list[Path]:
-    """List the cache's folders that hold this package's arrays; missing ones are computed again."""
+    """List the cache's folders of arrays; if one is deleted, its arrays are computed again when needed."""
     return sorted(file.parent for file in cache_folder().glob(f"*/{HASHES}"))
 
 

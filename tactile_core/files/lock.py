@@ -56,8 +56,8 @@ def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
 
 
 def take(descriptor: int, *, shared: bool = False) -> None:
-    """Take the lock of an open file, its descriptor, without waiting; raises OSError where another process holds it.
-    shared : others may hold it too, if they share it"""
+    """Lock an open file, given by its descriptor, without waiting; raises OSError where another process holds its lock.
+    shared : true allows other processes that share the lock, too"""
     if os.name == "nt":
         import msvcrt
 

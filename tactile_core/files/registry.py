@@ -10,6 +10,6 @@ from types import ModuleType
 
 @cache
 def modules_of(package: str) -> dict[str, ModuleType]:
-    """Import all modules of a package, by its full name; return them by their own names, in their order."""
+    """Import all modules of a package, given by its full name; return name -> module, in the order of names."""
     names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
     return {name: importlib.import_module(f"{package}.{name}") for name in names}

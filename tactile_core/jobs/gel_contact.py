@@ -62,7 +62,7 @@ class GelContact(Summary):
 
 
 def too_far(before: Pose | None, pose: Pose) -> bool:
-    """Return true if pose is so far from the one before, or turned so far, that the contact is another; None: false."""
+    """Return true if a pose is too far from the one before, or turned too far, to continue its contact; None: false."""
     if before is None:
         return False
     turn = np.arccos(np.clip((np.trace(pose.axes.T @ before.axes) - 1) / 2, -1, 1))

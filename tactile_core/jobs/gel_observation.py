@@ -26,7 +26,8 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 
 
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return the last contact as force (3,) N, motion (rows, columns, 2) m of the markers along x, z, and picture."""
+    """Return, by name, the last contact's force (3,) N, markers (rows, columns, 2) m, their motion along x and z, and
+    picture; markers : (rows, columns) int, of ``marker_nodes``"""
     moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
     seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}
     return seen | {"picture": gel.picture()} if picture else seen

@@ -154,7 +154,7 @@ def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
 
 
 def check_unit(calibration: str | None, sha256: str) -> None:
-    """Raise TactileError for a calibration that is not the one, of this sha256, that the job was made with."""
+    """Raise TactileError if the calibration in a file has another hash than ``sha256``, the one a job was made with."""
     if calibration is not None and unit_hash(Path(calibration)) != sha256:
         advice = "Use the calibration that the job was made with"
         raise TactileError(calibration, "another content", f"sha256 {sha256[:12]}..., as in the job", advice)

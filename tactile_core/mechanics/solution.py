@@ -31,7 +31,7 @@ class Step:
 
 @dataclasses.dataclass(frozen=True)
 class OnDemand:
-    """Functions that compute the costly parts of a ``Solution``: its properties of the same names."""
+    """Functions that compute a ``Solution``'s costly properties, each that of the same name, when first asked for."""
 
     electrode_gaps: Callable[[], np.ndarray]
     films: Callable[[], np.ndarray]

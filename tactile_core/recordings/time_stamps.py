@@ -48,7 +48,7 @@ def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
 
 
 def unit_of(stamps: np.ndarray) -> Unit:
-    """Return the unit of stamps (T,): that which gives a likely rate, else that which makes them unix time."""
+    """Return the time unit of stamps (T,), such as "ms": one that gives a likely rate, else one that fits unix time."""
     steps = np.diff(stamps)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     likely = [unit for unit, length in SECONDS.items() if LIKELY[0] <= 1 / max(step * length, 1e-12) <= LIKELY[1]]

@@ -30,7 +30,7 @@ def _folders() -> dict[str, Path]:
 
 
 def passed_over(name: str) -> tuple[Path, ...]:
-    """Return the user's folder, one or none, that is ignored because the shipped sensor ``name`` is called the same."""
+    """Return the user's folder of a sensor, one or none, that is ignored as a shipped sensor has the same ``name``."""
     own, ships = os.environ.get(OWN), FOLDER / name
     folder = Path(own or FOLDER) / name
     return (folder,) if (folder / FILE).is_file() and (ships / FILE).is_file() and not folder.samefile(ships) else ()

@@ -49,7 +49,7 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """Return signed signals (C, 19) counts of contacts ``rows`` (C,) as a sensor reads them; stream : of noise"""
+        """Return signed signals (C, 19) counts of contacts ``rows`` (C,) with noise; stream : number that seeds it"""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
@@ -67,7 +67,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Return `mesh_columns`, named "direct", of `Model.directly`, the one network that the chain of several must beat."""
+    """Return `mesh_columns`, named "direct", of `Model.directly`, a single network, which the chain must beat."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:

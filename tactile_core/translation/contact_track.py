@@ -134,7 +134,7 @@ class Tracker:
 
 
 class ForwardTracker:
-    """Contact in a recording that grows: ``track`` without what comes later. Call it once per frame, in order."""
+    """Contact in a recording that grows: ``track`` from past frames alone. Call it once per frame, in order."""
 
     def __init__(self) -> None:
         self._time, self._score, self._frame = -np.inf, np.zeros(0), _Frame(*(np.zeros(0),) * 3)  # of the frame before

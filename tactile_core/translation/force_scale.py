@@ -50,7 +50,7 @@ class ForceScale:
         return self.scaled < self.without and self.correlation >= TOGETHER
 
     def describe(self) -> str:
-        """Describe what was found, with the numbers that decide whether it is kept."""
+        """Describe the scale in words, with the errors that decide whether it is kept."""
         said = (
             f"measured over translated force {self.scale:.2f} (to {self.error:.0%}), lag {1e3 * self.lag:.0f} ms, "
             f"correlation {self.correlation:.2f} on the first half; mean error on the second half {self.scaled:.2f} N "

@@ -50,7 +50,7 @@ def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
 
 
 def wanted_contacts(arguments: argparse.Namespace) -> list[tuple[int, float]]:
-    """List what to solve, (press, friction): all presses without friction, then the first ones with it.
+    """List (press, coefficient of friction) to solve: all presses without friction, then the first ones with it.
     arguments : the command line's, here and in ``learn_all``"""
     rubbing = [(number, FRICTION) for number in range(min(arguments.rubbing, arguments.presses))]
     return [(number, 0.0) for number in range(arguments.presses)] + rubbing

@@ -32,7 +32,7 @@ STEPS = 4  # of the way in, for friction
 
 
 def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
-    """Draw two balls, and for each its place, at which it is pressed alone, and force, N."""
+    """Draw two balls; return, for each, the ball, its place, and the force, N, that sets its depth there alone."""
     while True:
         places = random.uniform([-17e-3, -6e-3], [1e-3, 6e-3], (2, 2))
         forces = np.exp(random.uniform(*np.log(FORCES), 2))

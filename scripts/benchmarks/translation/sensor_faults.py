@@ -237,7 +237,8 @@ def wrong(found: Translation, true: Translation) -> np.ndarray:
 
 
 def measured(recordings: list[Base]) -> list[Row]:
-    """Measure shares of frames, %: of unbroken ones that are guesses, of broken ones that are wrong and confident."""
+    """Return rows of % of frames: of each unbroken recording the guesses; of each fault, mean over recordings, the
+    frames that are wrong and confident."""
     true = [base.translated(np.asarray(base.recording.electrodes, float)) for base in recordings]
     kept = [(base, found) for base, found in zip(recordings, true, strict=True) if found is not None]
     rows = []

@@ -90,7 +90,7 @@ def reporting(folder: str | os.PathLike) -> list[Path]:
 
 
 def beside(path: Path, topic: str) -> Path:
-    """Return the path of the file that holds another topic of a recording, beside it."""
+    """Return the path of the file of another topic, WRENCH or POSE (endings of names), beside a recording's file."""
     return path.with_name(path.name.removesuffix(BIO) + topic)
 
 

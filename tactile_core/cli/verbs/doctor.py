@@ -50,8 +50,8 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Library that is tried. module : to import; package : in the index; use : what needs it
-    extra : the one of this package's that brings it, "" for a library that always comes along"""
+    """Library to try. module : its name in Python; package : its name in the package index; use : what needs it
+    extra : extra of this package that installs it, "" if every installation has it"""
 
     module: str
     package: str

@@ -74,7 +74,7 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
 
 
 def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
-    """Return a function from the job's folder to its executor: this process where no others are asked for."""
+    """Return a function from a job's folder to the executor that the options ask for, by default this process."""
     if options.cluster is None and (options.workers or 1) == 1:
         from ...jobs.engine.local import InProcess
 

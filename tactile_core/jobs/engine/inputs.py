@@ -171,8 +171,8 @@ def check_unchanged(one: Input) -> None:
 
 
 def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
-    """Return a scene, its text, its meshes' hashes, and, before these, an input for each of names, each of this scene.
-    Raises TactileError for a bad one."""
+    """Return a scene, its text, a list of inputs, one for each of ``names``, all of this scene, and its meshes' hashes.
+    Raises TactileError for a bad scene."""
     from ...simulation.scene import load_scene
 
     scene, text = load_scene(scene_path)

@@ -74,7 +74,7 @@ def exists(folder: Path) -> bool:
 
 
 def read_to_run(folder: Path) -> Job:
-    """Read a job that this version began. Raises TactileError like `read`, and for one that another version began."""
+    """Read a job in order to run it. Raises TactileError like `read`, and if another version of the package made it."""
     job = read(folder)
     if job.recipe.version != __version__:
         found = f"made by version {job.recipe.version}"

@@ -53,7 +53,7 @@ class Contact:
         return surface_motion(self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force)
 
     def at_depth(self, depth: float) -> Contact:
-        """Return the same contact with ``depth``, m, as its depth, counted from another first touch."""
+        """Return this contact with its ``depth``, m, restated: counted from first touch at another place."""
         moved = dataclasses.replace(self, depth=depth)
         if "displacement" in vars(self):  # is known already, and does not depend on it
             vars(moved)["displacement"] = self.displacement

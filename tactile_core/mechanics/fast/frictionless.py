@@ -71,7 +71,7 @@ class _Model(NamedTuple):
 
 
 class Pace:
-    """Length of each step: nodes at edges and in creases may swing from one side to the other."""
+    """Lengths of a solver's steps: shorter while errors hardly fall, as nodes at edges swing from side to side."""
 
     def __init__(self) -> None:
         self._trust, self._last, self._calls = 1.0, np.inf, 0

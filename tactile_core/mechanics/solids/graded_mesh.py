@@ -41,8 +41,8 @@ class Footprint:
 class GradedMesh:
     """A graded solid, its matrix's sparsity pattern and solver, and its lines.
     rows (i,), columns (j,) : places of the mesh's lines of nodes, in real-valued rows and columns of the lattice
-    to_rows (rows, i), to_columns (columns, j) : matrices from values on the mesh's lines to values on the lattice's; a
-        skin's last column is its first, and has none"""
+    to_rows (rows, i), to_columns (columns, j) : matrices from values on the mesh's lines to values on the lattice's,
+        without a skin's last line, which is its first"""
 
     mesh: HexMesh
     pattern: BlockPattern

@@ -135,7 +135,7 @@ def missing_mitsuba() -> str:
 
 
 class MitsubaPictures:
-    """Render units one after the other in one scene, which LLVM compiles once."""
+    """Function from a unit to its ``BallPictures`` by a preset of Mitsuba's; all units share a scene, compiled once."""
 
     def __init__(self, preset: Preset) -> None:
         self.preset = preset

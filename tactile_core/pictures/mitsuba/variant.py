@@ -74,8 +74,7 @@ def fitting(error: float, variant: str | None = None) -> str:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """Return one variant for all workers of a job, so that pictures agree; "" for the preset ``fast``, which needs
-    none.
+    """Return one variant of Mitsuba for all workers of a job, so that pictures agree; "" for the preset ``fast``.
     wanted : the variant to use, None for the faster one that works here"""
     return "" if preset == "fast" else choose_variant(wanted).name
 

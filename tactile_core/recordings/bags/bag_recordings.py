@@ -38,7 +38,7 @@ class Finger:
 
 @dataclass(frozen=True)
 class Stream:
-    """The messages of one finger. hand : all fingers of its topic, of which it has the index `number`"""
+    """One finger in a topic's messages. number : its index in hand, the list of all fingers of the topic"""
 
     topic: Topic
     number: int

@@ -66,7 +66,7 @@ def _is_time(kind: Any) -> bool:
 
 
 def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, Any]]:
-    """Return the sensors of a decoded message that lie at these fields."""
+    """Return the sensors in a decoded message, each a dictionary by field, at the path of ``fields``."""
     found = [message]
     for name in fields.path:
         found = [each for one in found for each in (one[name] if isinstance(one[name], list) else [one[name]])]

@@ -57,19 +57,19 @@ class Words:
         self._numbers: dict[str, int] = {}
 
     def number(self, cell: str) -> float:
-        """Return the index of a cell's text, a new one where it is new; beyond `MOST_WORDS` that of `MORE`."""
+        """Return the index of a cell's text, a new index for a new text; after `MOST_WORDS` texts, that of `MORE`."""
         word = cell.strip().translate(OUTSIDE)
         if word not in self._numbers and len(self._numbers) >= MOST_WORDS:
             word = MORE
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object; numbers : (T,) float, their indices, NaN where there is no such cell: empty"""
+        """Return the texts (T,) object of indices ``numbers`` (T,) float; the empty text for NaN, a missing cell."""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
     def values(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts as numbers (T,) float, NaN where they are none; numbers : (T,) float, the texts' indices"""
+        """Return the numbers (T,) float that texts of indices ``numbers`` (T,) float spell; NaN for other texts."""
         known = [value if (value := number(word)) is not None else np.nan for word in (*self._numbers, "")]
         return np.array(known)[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 

@@ -116,7 +116,7 @@ class Table:
         return self.columns([name])[:, 0]
 
     def essential(self, names: Iterable[str], also: Iterable[str] = ()) -> list[Problem]:
-        """Return the problems in columns `names`, and those in `also`, others that are read, marked not essential."""
+        """Return the problems in columns `names`, marked essential, and those in `also`, marked not essential."""
         keep, read = {*names, "row"}, {*names, "row", *also}
         return [replace(p, essential=p.field in keep) for p in self.problems if p.field in read]
 
