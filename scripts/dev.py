@@ -296,7 +296,7 @@ def environment() -> dict[str, str]:
 
 
 def read_stamp(folder: Path) -> dict:
-    """Read what is installed in an environment, {} when nothing is known of it."""
+    """Read the record that `write_stamp` left in an environment of what is installed; {} without one."""
     try:
         found = json.loads((folder / STAMP).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -325,7 +325,7 @@ def python_version() -> str:
 
 
 def relative(path: Path) -> str:
-    """Return a path as text, from the checkout's folder where it lies in it."""
+    """Return a path as text, relative to the checkout if it lies there."""
     try:
         return str(path.relative_to(ROOT))
     except ValueError:

@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measured(name: str, quick: bool) -> Iterator[Row]:
-    """Yield the rows of the check ``name``; where it breaks off, a last row that says so, instead of an error."""
+    """Yield the rows of the check ``name``; an error in it becomes a last row, so that other checks go on."""
     try:
         yield from CHECKS[name][0](quick)
     except Exception:  # whatever it was, the other checks are still worth their rows

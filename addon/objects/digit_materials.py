@@ -37,10 +37,8 @@ def new_coating(coating: Coating) -> bpy.types.Material:
 
 
 def keep_leds_inside(material: bpy.types.Material) -> None:
-    """Tilt the normals of a lit gel's outer side up, so that LEDs below its rim do not colour it.
-
-    The body throws no shadow on that side. Normals of the inner side stay.
-    """
+    """Tilt the normals of a gel's outer side up in its material, so that LEDs below its rim do not colour that side,
+    on which the body throws no shadow. Normals of the inner side stay."""
     nodes = Nodes(material.node_tree)
     lit = nodes.add("ShaderNodeAttribute", attribute_name=LIT).outputs["Fac"]
     own = nodes.add("ShaderNodeTexCoord").outputs["Normal"]

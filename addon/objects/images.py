@@ -75,7 +75,7 @@ def show_picture(gel: bpy.types.Object, picture: np.ndarray) -> bpy.types.Image:
 
 
 def show_heights(gel: bpy.types.Object, heights: np.ndarray) -> bpy.types.Image:
-    """Show a gel's heights (H, W) m in its sensor's image datablock, in millimetres, and return that."""
+    """Write a gel's heights (H, W) m into its sensor's image datablock, in millimetres, and return the image."""
     image = new_image(_HEIGHTS.format(_title(gel)), heights.shape[1], heights.shape[0], floats=True)
     image.use_fake_user = True
     fill(image, 1e3 * heights)

@@ -82,7 +82,7 @@ def material() -> bpy.types.Material:
 
 
 def legend_material() -> bpy.types.Material:
-    """Return the material that shows the attribute's colours as they are, whatever the light."""
+    """Return the material that shows the colours of the attribute ``Tactile colour`` unlit, for legends."""
     made = _material(LEGEND, "Emission Color")
     shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value, shader.inputs["Emission Strength"].default_value = (0, 0, 0, 1), 1.0

@@ -151,9 +151,9 @@ def fit_timeline(context: bpy.types.Context) -> None:
 
 
 def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Sequence[bpy.types.Object] = ()) -> None:
-    """Select `things`, the first active, colour solid views by object, and frame them, their parts and those `beside`.
+    """Select `things`, make the first active, colour Solid views by object, and frame things, their parts and `beside`.
 
-    Views that show a style's colours go on. Without a window, select only.
+    Views that show a style's colours keep them. Without a window, things are only selected.
     """
     for thing in context.view_layer.objects:
         thing.select_set(thing in things)

@@ -55,13 +55,13 @@ class Job:
         return self.done / self.total
 
     def tell(self, message: dict) -> None:
-        """Send a line to a worker that listens; one that has died says why in the next ``poll``."""
+        """Send a message to a listening worker; if it has died, the next ``poll`` raises its error."""
         with contextlib.suppress(OSError), _alive_on_broken_pipe():
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()
 
     def poll(self, wait: float = 0.0) -> bool:
-        """Take in what the worker has said, waiting up to ``wait`` s; true if it is over. TactileError if it failed."""
+        """Read the worker's messages, waiting up to ``wait`` s; return true if it ended. TactileError if it failed."""
         error = None
         for message in self._messages(wait):
             error = message.get("error", error)

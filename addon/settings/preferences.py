@@ -21,7 +21,7 @@ def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences 
 
 
 def default_calibration(context: bpy.types.Context) -> str:
-    """Return the file of scenes that name none; empty for the calibration that ships."""
+    """Return the calibration file for scenes that name none, set in the preferences; "" for the one that ships."""
     chosen = addon_preferences(context)
     return "" if chosen is None else chosen.calibration
 

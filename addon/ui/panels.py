@@ -89,10 +89,8 @@ def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.t
 
 
 def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str, bool]:
-    """Return the contact sheet's words on the current frame, of the gel once there is one, and whether it is a guess.
-
-    No words for sensors that were simulated.
-    """
+    """Return how far to trust the current frame, in the contact sheet's words, and whether it is a guess; "" for
+    simulated sensors. gel : whose values are used, None for the skin's"""
     shown = gel if gel is not None and "expected_error_um" in gel else skin
     if "expected_error_um" not in shown:
         return "", False

@@ -84,7 +84,7 @@ def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
 
 
 def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], list[dict]]:
-    """Measure every tier of one sensor; also return the contacts that the reference tier solved. See ``table``."""
+    """Measure every tier of one sensor: return tier -> its entry of ``table``, and the reference tier's contacts."""
     full = FULL[sensor]
     contacts = list(random_contacts(QUICK if quick else full, SEED))
     kept = {tier: [keep(work, sensor, tier, i, contact) for i, contact in enumerate(contacts[:count])]

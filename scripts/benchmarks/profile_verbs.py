@@ -169,7 +169,7 @@ def run(case: Case, folder: Path) -> Cost:
 
 
 def verbs(folder: Path) -> list[Row]:
-    """Yield CPU time and peak memory of each verb, or its exit status where that is not the case's; folder : scratch"""
+    """Return rows of CPU time and peak memory of each verb; of its exit status if it is wrong. folder : scratch"""
     for case in CASES:
         cost = run(case, folder)
         if cost.status != case.status:

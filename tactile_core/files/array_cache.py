@@ -33,7 +33,7 @@ def entries() -> list[Path]:
 
 
 class DamagedError(Exception):
-    """A file of the cache that is missing or is not what was stored, in words."""
+    """Error for a file of the cache that is missing or is not what was stored."""
 
 
 def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:

@@ -51,7 +51,7 @@ def _teach_numba() -> None:
 class Loop:
     """A function that is compiled when that pays; other threads may run during the compilation.
 
-    waits : false to compile it at its first call, as one whose time the size of its arrays does not bound
+    waits : false to compile it at its first call: for loops that may run long whatever the size of their arrays
     The function must hold no ``**``: compiled code rounds powers otherwise.
     """
 

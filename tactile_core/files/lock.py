@@ -14,9 +14,9 @@ FILE = ".tactile-batch-lock"
 
 @contextlib.contextmanager
 def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
-    """Hold the folder; with `part` (i, n) share it with the other parts of an array, but not with the same part. Raises
-    TactileError where another job, or the same part of it, is running. On a network file system the lock works only if
-    that forwards locks (NFS 4 and Lustre with flock do)."""
+    """Hold the lock of a job's folder; with `part` (i, n) share it with the job's other parts, as in a queue's array.
+    Raises TactileError where another job, or the same part, is running. On a network file system the lock works only
+    if that forwards locks (NFS 4 and Lustre with flock do)."""
     with contextlib.ExitStack() as stack:
         if part is None:
             stack.enter_context(_lock(folder / FILE, folder, shared=False))

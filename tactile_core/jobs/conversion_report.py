@@ -52,7 +52,7 @@ class ConversionReport:
         self._shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def take(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Add the next translated frames: their rising indices (n,), and their arrays by the names of frames.h5."""
+        """Add translated frames: frames (n,), ascending indices after those before; arrays : by names of frames.h5"""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
         self._pressure.append(arrays["pressure"])

@@ -24,7 +24,7 @@ class Budget:
         return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
 
     def only(self, unit: str, advice: str) -> float:
-        """Return the bound in ``unit``. TactileError, with advice, for a bound in the other unit, meaningless here."""
+        """Return the bound in ``unit``, um or levels. TactileError, with advice, for a bound stated in the other."""
         other = "levels" if unit == "um" else "um"
         if getattr(self, other) is not None:
             raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", advice)

@@ -21,7 +21,7 @@ _LEAST_SHARE = 1e-3  # of the interval between two depths: the smallest step of 
 
 
 class UnreachableError(TactileError):
-    """A depth beyond the limit, or a force that no depth within it gives."""
+    """Error for a depth beyond the limit, or a force that no depth within the limit gives."""
 
 
 _Found = TypeVar("_Found", bound=Any)  # a contact at a ``depth``, m, under a ``force`` (3,) N

@@ -40,7 +40,7 @@ SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area
 
 @contextlib.contextmanager
 def folds_counted() -> Iterator[list[int]]:
-    """Yield a list that takes, of each map made inside the block, how many places are folded; these are not logged."""
+    """Yield a list; each height map made inside the block appends its number of folded places instead of logging it."""
     folded: list[int] = []
     token = _folded.set(folded)
     try:

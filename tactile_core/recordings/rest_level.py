@@ -66,7 +66,7 @@ class Changes:
         return found
 
     def then(self, function: Callable[[np.ndarray], np.ndarray]) -> Changes:
-        """Return these changes after a function (n, e) -> (n, e) that treats each frame by itself."""
+        """Return changes that apply a function (n, e) -> (n, e), frame by frame, to these when they are read."""
         return Changes(self._count, lambda frames: function(self._of(frames)))
 
 

@@ -246,7 +246,7 @@ class Calibration:
 
     @property
     def ambient_unit(self) -> np.ndarray:
-        """Radiance (3,), levels, that 1 in ``ambient`` means: a LED's on a coating facing it at AMBIENT_DISTANCE."""
+        """Radiance (3,), levels, that 1 in ``ambient`` means: of a coating that faces its LED at AMBIENT_DISTANCE."""
         return self._lit([AMBIENT_DISTANCE**2] * 3)
 
     def _lit(self, squares: list[float]) -> np.ndarray:

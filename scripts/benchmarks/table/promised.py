@@ -44,7 +44,7 @@ class Promise:
         return float((held if among is None else held[among]).mean())
 
     def row(self) -> Row:
-        """Return the row of the coverage, with its target where there are enough contacts."""
+        """Return a report row of the share of contacts within their bounds, with a target if there are enough."""
         share = self.covered()
         if len(self.found) < FEWEST:
             return row(f"promised_{self.name}_covered", share, "1", of=self.of)

@@ -78,10 +78,8 @@ def rows(
 
 
 def reporting(folder: str | os.PathLike) -> list[Path]:
-    """List the ``*_bio.csv`` of a folder and of the folders in it by which nothing is chosen, by name.
-
-    All but sample 7 of each material, or all of one. Raises TactileError where there is none.
-    """
+    """List the ``*_bio.csv`` in a folder and its folders, by name, without sample 7 of each material, by which
+    parameters were chosen; all if there is nothing else. Raises TactileError where there is none."""
     folder = Path(folder)
     paths = sorted([*folder.glob(f"*{BIO}"), *folder.glob(f"*/*{BIO}")], key=lambda path: path.name)
     if not paths:
@@ -95,7 +93,7 @@ def beside(path: Path, topic: str) -> Path:
 
 
 def load(path: Path) -> Slide:
-    """Read a recording and what lies beside it. Raises TactileError: unreadable, no PDC, under 100 common frames."""
+    """Read a recording with the wrench and pose files beside it. TactileError: no PDC, under 100 common frames."""
     recording, wrench, pose = read(path), _table(beside(path, WRENCH), 7), _table(beside(path, POSE), 4)
     time = recording.start_time + recording.time
     even = np.arange(wrench[0, 0], wrench[-1, 0], 1 / WRENCH_RATE)

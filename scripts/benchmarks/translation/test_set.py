@@ -39,7 +39,7 @@ GAIN = 0.1  # standard deviation per channel (assumed: docs/sources.md, BioTac r
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
     """Measure all contacts: metrics with their targets, subsets without targets, and how good expected errors are.
-    bodies : the gel's surface and the skin's unrolled places (``our_bodies``), here and in this folder's other files"""
+    bodies : the gel's surface and the skin's unrolled places, of ``our_bodies``"""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
     columns = translation_metrics(translator.nets, pairs, rows, change, bodies)

@@ -25,8 +25,8 @@ FORMAT = "tactile-batch-1"
 @dataclasses.dataclass
 class Status:
     """Progress of a job.
-    recordings, prepared : numbers of them; shards : of the prepared recordings, of which `there` exist
-    frames : of the prepared recordings; bytes : estimate of their shards, 0 if unknown
+    recordings, prepared : number of recordings, and of prepared ones; shards, there : number of the prepared ones'
+        shards, and of shards that exist; frames : of the prepared ones; bytes : of their shards, estimated, 0 unknown
     aside : task -> why it could not be done"""
 
     recordings: int

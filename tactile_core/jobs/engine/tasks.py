@@ -17,7 +17,7 @@ _one_thread_once = functools.cache(one_thread)
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Work on the job's input of index `recording`: to prepare it (shard None), or to make its shard of that number."""
+    """Work on the job's input of index `recording`: to prepare it, if `shard` is None, or to make that shard of it."""
 
     recording: int
     shard: int | None = None

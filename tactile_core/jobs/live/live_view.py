@@ -49,7 +49,8 @@ class Shown:
 
 class View:
     """Translates arriving rows to pictures: always the newest row; older ones that arrived meanwhile are skipped.
-    signals : rest and polarity so far; frames, passed : numbers of rows that arrived and that were skipped"""
+    signals : `LiveSignals`, rest and polarity so far; frames, passed : number of rows that arrived, and of skipped ones
+    """
 
     def __init__(
         self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None

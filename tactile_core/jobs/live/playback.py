@@ -30,7 +30,7 @@ FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that 
 
 class Growing:
     """A CSV recording that another program is writing, in any of the text layouts.
-    rows, bad : numbers of rows that came, and of those passed over as bad"""
+    rows, bad : number of rows read so far, and of bad rows left out"""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
         """Follow a file, or ``path#1``, its finger 1; columns, sensor : as of `recordings.read`. Raises

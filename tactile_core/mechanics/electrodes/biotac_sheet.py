@@ -215,7 +215,7 @@ def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.n
 
 @functools.cache
 def rest_counts(sensor: str) -> np.ndarray:
-    """Return the raw counts (e,) at rest of a typical unit; where they are not known, those of its conducting sheet."""
+    """Return the raw counts (e,) of a typical unit at rest: the descriptor's or, without any, the sheet's."""
     known = sensors.places_of(sensor).rest_counts
     if np.isfinite(known).all():
         return known

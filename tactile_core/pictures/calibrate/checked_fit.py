@@ -198,8 +198,8 @@ def cross_validated(
 
 
 def check_worth(tried: list[Evaluation]) -> None:
-    """Raise TactileError for a calibration that leaves over 0.8 (``WORTH``) of what the background alone leaves of its
-    presses. tried : its evaluations, on presses held out"""
+    """Raise TactileError for a calibration whose error is over 0.8 (``WORTH``) times that of the background alone.
+    tried : its evaluations, on presses held out"""
     ours, baseline = mean_metrics(tried)
     if not ours["roi_l1"] <= WORTH * baseline["roi_l1"]:
         found = (

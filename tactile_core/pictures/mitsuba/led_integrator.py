@@ -59,9 +59,10 @@ def direct(
 def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
-    """Return the radiance (n, 3) of n surface interactions by light that other places have reflected onto them, once.
-    meet : function that intersects rays; scene : occluders; emitters : lights; hit : each DIRECTIONS times
-    phase : 0..1 of each, rotates its directions; lobe : cosine beyond which light is left out there, or None"""
+    """Return the radiance (n, 3) of n surface interactions by light that other places reflect onto them, once.
+    meet : function that intersects rays; scene : occluders; emitters : lights
+    hit : the interactions, each DIRECTIONS times; phase : 0..1 of each, rotates its directions
+    lobe : cosine of the half vector at the reflecting place beyond which light is left out, or None"""
     import drjit as dr
 
     number = dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS

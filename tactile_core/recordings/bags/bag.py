@@ -51,7 +51,7 @@ class Bag:
 
 
 def is_bag_folder(path: str) -> bool:
-    """Return true for a ROS 2 bag's folder. Raises TactileError for files packed one by one, and links out of it."""
+    """Return true for a ROS 2 bag's folder. TactileError for a bag of compressed files, or one with links out of it."""
     if not os.path.isfile(os.path.join(path, MARK)):
         return False
     with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:

@@ -31,7 +31,7 @@ class Finger:
 
     @property
     def silence(self) -> str:
-        """Return why no recording is made of this finger unless it is asked for."""
+        """Return in words why a finger is taken for silent: an unknown number of electrodes, or zeros alone."""
         known = sensor_with(self.electrodes)
         return f"{self.electrodes} electrodes" if not known else "all zeros at the start and in the middle"
 
@@ -115,8 +115,8 @@ def _hand(bag: Bag, topic: Topic) -> list[Finger]:
 def read_bag(
     bag: Bag, chosen: Chosen, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Yield recordings, each with the number of its first frames, at most `context`, that repeat the one before, and
-    up to `frames` new ones.
+    """Yield a stream's frames as recordings of up to `frames` new ones, each with how many frames it first repeats of
+    the recording before, at most `context`.
     Reads the chosen topic and finger, or the first with signals; a warning names the others. Raises TactileError for
     messages that do not fit their type."""
     first, *others = streams_of(bag, chosen)

@@ -19,8 +19,9 @@ PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SensorFields:
-    """Names of a sensor's fields. path : to the sensor or a list of them, from the message; others : not read
-    slow : of pdc, tac, tdc, "" for one that is not there; pac : of its samples, none or more"""
+    """Names of a sensor's fields in a message. path : fields that lead to the sensor, or to a list of sensors
+    electrodes : field of all electrodes; slow : of pdc, tac, tdc, "" for a missing one; pac : of its samples
+    others : fields that are not read"""
 
     path: tuple[str, ...]
     electrodes: str

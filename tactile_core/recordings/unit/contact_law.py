@@ -147,7 +147,7 @@ def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURC
 
 
 def limit(contacts: int) -> float:
-    """Return the unexplained share above which a recording of this number of different contacts is doubted."""
+    """Return the unexplained share above which a recording is doubted; contacts : number of its different contacts"""
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
