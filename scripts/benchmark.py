@@ -7,8 +7,8 @@
 Stages: contact mechanics by tier and sensor; translation; conditions that are hard for it; pictures by preset; the
 whole chain from signals to pictures; pictures by others' programs, where they are installed.
 Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
-beside that of doing nothing. Then the errors that are promised are held against those that are found: exits with 1
-where a bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
+beside that of doing nothing. Then stated bounds on the error are compared with measured errors: exits with 1 where a
+bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
 named. Needs the extras [fem] and [render].
 """
 

@@ -1,4 +1,4 @@
-"""Hold contact mechanics against known answers, and its fast tier against its reference tier.
+"""Compare contact mechanics with known answers, and its fast tier with its reference tier.
 
     python scripts/validate_mechanics.py                       every row; tables of docs/mechanics.md
     python scripts/validate_mechanics.py --quick --json FILE   under five minutes; writes FILE alone

@@ -48,9 +48,9 @@ def fingerprint(thing: bpy.types.Object) -> str:
 
 
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
-    """Raise TactileError for what no indenter can be: mirrored, or a spec's body that is scaled or turned.
+    """Raise TactileError for an object that cannot press: mirrored, or a spec's body scaled, turned or edited.
 
-    relative : (3, 3) of the object's axes in those of the sensor
+    relative : (3, 3), the object's axes in those of the sensor
     """
     if np.linalg.det(relative) <= 0:
         raise TactileError(

@@ -137,7 +137,7 @@ def _stand_back() -> None:
 
 
 def unregister() -> None:
-    """Take back what `open_tab` did; the package calls it."""
+    """Remove the panel that `open_tab` adds in older Blenders, when Blender switches the extension off."""
     if bpy.app.timers.is_registered(_stand_back):
         bpy.app.timers.unregister(_stand_back)
     _stand_back()

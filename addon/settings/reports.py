@@ -1,4 +1,4 @@
-"""Turn errors of the library into Blender's own error reports; the scene is left as it was."""
+"""Turn errors of the library into Blender's own error reports, in the words of its buttons."""
 
 from __future__ import annotations
 

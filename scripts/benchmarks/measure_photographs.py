@@ -1,4 +1,4 @@
-"""Hold pictures against photographs of DIGITs, and write the rows to docs/calibration.csv.
+"""Compare pictures with photographs of DIGITs, and write the rows to docs/calibration.csv.
 
     python scripts/benchmarks/measure_photographs.py DATA                  DATA holds digit_real, biotac_force ...
     python scripts/benchmarks/measure_photographs.py DATA --parts levels   that part alone; the file's others stay

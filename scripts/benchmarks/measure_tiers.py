@@ -4,10 +4,10 @@
                                                                    reference tier's contacts
     python scripts/benchmarks/measure_tiers.py --quick --json FILE   a few contacts, no reference tier
 
-The fast tier is held against the full tier on the test contacts that ship, with friction, and on random contacts
-without. The full tier is held against the reference tier on the first of these random contacts, and on the presses of a
-7 mm ball at one place that scripts/validate_mechanics.py left in docs/mechanics.csv. What the reference tier itself is
-off is a third of the full tier's error (assumed: halving cells of order 2 leaves a quarter; the rest a margin). Times
+The fast tier is compared with the full tier on the test contacts that ship, with friction, and on random contacts
+without. The full tier is compared with the reference tier on the first of these random contacts, and on the presses of
+a 7 mm ball at one place that scripts/validate_mechanics.py left in docs/mechanics.csv. The reference tier's own error
+is taken as a third of the full tier's (assumed: halving cells of order 2 leaves a quarter; the rest is a margin). Times
 are CPU time on one core of a contact from rest, its mesh included, without friction: the median.
 Stop it at any time: what the finite-strain tiers solved stays in DIR and is not solved again. Needs the extra [fem].
 """

@@ -55,7 +55,7 @@ def bounded_memory(more: int) -> Iterator[None]:
 
 @contextmanager
 def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
-    """Open for reading. Raises h5py's errors, and TactileError for a file that could take more memory than it declares.
+    """Open an HDF5 file to read. Raises h5py's errors, and TactileError where it may take more memory than it declares.
 
     Refused: datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters other
     than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. Reading a row then takes at

@@ -101,7 +101,7 @@ class Store:
 
 @contextmanager
 def open_hdf5(path: str) -> Iterator[Store]:
-    """Open for reading; arrays are named by their full path without the first slash."""
+    """Open an HDF5 file to read; arrays are named by their full path without the first slash."""
     import h5py
 
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]] = {}

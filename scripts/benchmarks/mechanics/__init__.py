@@ -1,1 +1,1 @@
-"""Contact mechanics held against known answers: one file per check, each a generator of report rows."""
+"""Contact mechanics compared with known answers: one file per check, each a generator of report rows."""

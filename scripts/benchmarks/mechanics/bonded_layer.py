@@ -1,4 +1,4 @@
-"""A flat elastic disc bonded below, a ball pressed into its middle: the solvers are held against known answers here."""
+"""A ball pressed into the middle of a flat elastic disc that is bonded below: its mesh, and the exact solution."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hold the finite-strain solver against the golden forces of docs/sources.md: a ball pressed into a bonded layer."""
+"""Compare the finite-strain solver with the golden forces of docs/sources.md: a ball pressed into a bonded layer."""
 
 from __future__ import annotations
 

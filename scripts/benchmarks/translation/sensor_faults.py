@@ -5,7 +5,7 @@
 Each fault is put into the shipped recording, into an idle finger with that recording's rest, and into grips of
 ``--phac`` (trials 01 to 03), whose rest ``tactile adapt`` found (``--sensor``). A frame is wrong where its force is not
 that of the unbroken recording, by half of it or, where there is none, by `NOTHING`; it counts where it is confident and
-unflagged all the same. The rows ``clean_..._guesses`` are the shares of unbroken frames that are not.
+unflagged all the same. The rows ``clean_..._guesses`` are the shares of unbroken frames that are called guesses.
 """
 
 from __future__ import annotations

@@ -88,8 +88,8 @@ class Pace:
         return self.after_wrong(max(-gap.min(), np.abs(gap[active]).max(initial=0.0)))
 
     def after_wrong(self, wrong: float) -> float:
-        """Return the share, 0 to 1, of the next step to take; wrong : m, the largest gap or penetration now. The share
-        falls while that hardly falls, after the first four calls, and grows again."""
+        """Return the share, 0 to 1, of the next step to take; wrong : m, the largest gap or penetration now. From the
+        fifth call on, the share shrinks whenever ``wrong`` has hardly fallen since the call before, and else grows."""
         self._calls += 1
         if wrong > max(_PROGRESS * self._last, GAP_TOLERANCE) and self._calls > _FREE_ITERATIONS:
             self._trust = max(_SHRINK * self._trust, _LEAST_TRUST)

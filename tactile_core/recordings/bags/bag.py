@@ -72,7 +72,7 @@ def kind_of(start: bytes) -> str | None:
 
 @contextmanager
 def open_bag(path: str, file: BinaryIO) -> Iterator[Bag]:
-    """Open for reading; raises TactileError for damage, for a bag without a BioTac, and without the extra [ros].
+    """Open a bag to read; raises TactileError for damage, for a bag without a BioTac, and without the extra [ros].
     file : the opened file, from its start; an empty one where the bag is a folder that `is_bag_folder` has passed"""
     with installed.needing("ros"):
         from rosbags.rosbag1 import Reader as Reader1
