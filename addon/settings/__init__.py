@@ -1,1 +1,1 @@
-"""What is set in a .blend and in the preferences, and how errors are reported."""
+"""Settings in a .blend and in the preferences, and reports of errors."""

@@ -1,4 +1,4 @@
-"""Preferences > Add-ons > Tactile: what is there, what is missing and what to do; cache, LLVM, default calibration."""
+"""Preferences > Add-ons > Tactile: installed and missing libraries, advice; cache, LLVM, default calibration."""
 
 import os
 import shutil

@@ -49,7 +49,7 @@ class Options:
 
 @dataclasses.dataclass(frozen=True)
 class ToolOptions:
-    """What translates and draws all recordings of a command.
+    """Options of the networks, the gel and its pictures, for all recordings of a command.
 
     weights : folder of networks, None for those that ship; source : the sensor they must translate, None for any
     calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``

@@ -1,4 +1,4 @@
-"""What pixels show of gel under a body whose shape, pose and texture are known.
+"""Heights and reflectance that pixels show of gel under a body whose shape, pose and texture are known.
 
 Contact is solved at nodes; between them the surface's spline dips into a body finer than their spacing, as an edge, a
 letter or a groove. No gel is inside a rigid body: there its heights are the body's own, at each pixel."""

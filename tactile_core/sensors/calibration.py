@@ -172,7 +172,7 @@ class Calibration:
     ambient_rise : of each LED, relative growth of the ambient light's unit of measurement per metre of the gel's height
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, assumed equal
-    dome_scale : height of the resting gel over its lowest point, times that of the public mesh
+    dome_scale : heights of the resting gel over its lowest point, as a multiple of the public mesh's
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
     markers : dots printed on the gel; None for none
     photographed : LEDs and albedo of the photograph, if they have changed since; None for the calibration's own

@@ -1,4 +1,4 @@
-"""How much of a label survives the translation: the best support vector machine on signals, numbers and pictures."""
+"""Measure how well labels can be predicted from signals, estimates and pictures, by support vector machines."""
 
 from __future__ import annotations
 

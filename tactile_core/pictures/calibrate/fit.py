@@ -34,7 +34,8 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
-    """Result. calibration : of the unit; tried : the presses it was fitted on, with it; warnings : sentences"""
+    """Result of `calibrate`. calibration : of the unit; tried : evaluations of it on the presses it was fitted to
+    warnings : sentences"""
 
     calibration: Calibration
     tried: list[Evaluation]

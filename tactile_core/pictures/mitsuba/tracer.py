@@ -1,4 +1,4 @@
-"""Where pixels' rays meet the gel, and which light points are visible from there, by Mitsuba.
+"""Trace, by Mitsuba, where pixels' rays meet the gel, and which light points are visible from there.
 
 One persistent scene per tracer; only the gel's vertices change. Both variants trace one mesh with the same rays, so
 they agree but for rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
