@@ -17,15 +17,7 @@ from pathlib import Path
 
 import numpy as np
 from benchmarks.measured_rows import finished, parser_of, printed
-from benchmarks.translation import (
-    body_rows,
-    grips,
-    made_up_units,
-    sequence_rows,
-    slides,
-    test_set,
-    two_contact_rows,
-)
+from benchmarks.translation import body_rows, grips, made_up_units, sequence_rows, slides, test_set, two_contact_rows
 from benchmarks.translation.model_card import renew_model_card
 
 from tactile_core.accuracy import Row

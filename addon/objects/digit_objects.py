@@ -17,10 +17,7 @@ BESIDE = 35.1e-3  # m between skin and gel: a legend's width, and a gap
 
 
 def add_gel(
-    group: bpy.types.Collection,
-    per_metre: float,
-    beside: bpy.types.Object | None = None,
-    sensor: str = sensors.TARGET,
+    group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None, sensor: str = sensors.TARGET
 ) -> bpy.types.Object:
     """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin
     if given, and toward -x of the collection's gels."""

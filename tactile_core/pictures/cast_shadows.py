@@ -91,10 +91,7 @@ class ShadowCaster:
         sight = sight[shadow]
         first_row, first_column = rows.start + shadow[0].start, columns.start + shadow[1].start
         polar = slice(first_row, first_row + sight.shape[0]), slice(first_column, first_column + sight.shape[1])
-        pixels = (
-            _span(self.pixel_row[polar], self._shape[0] - 1),
-            _span(self.pixel_column[polar], self._shape[1] - 1),
-        )
+        pixels = (_span(self.pixel_row[polar], self._shape[0] - 1), _span(self.pixel_column[polar], self._shape[1] - 1))
         row = np.clip(self.row[pixels] - np.float32(first_row), 0, sight.shape[0] - 1)
         column = np.clip(self.column[pixels] - np.float32(first_column), 0, sight.shape[1] - 1)
         return bilinear(sight, row, column), pixels

@@ -96,13 +96,7 @@ class ComplianceBlock:
     matrix : (3 k + c, 3 k + c) float32, m/N: x, y, z of each node in turn, then the inner points' motion off the core
     """
 
-    def __init__(
-        self,
-        compliance: Compliance,
-        nodes: np.ndarray,
-        inner: np.ndarray,
-        rows: Rows,
-    ) -> None:
+    def __init__(self, compliance: Compliance, nodes: np.ndarray, inner: np.ndarray, rows: Rows) -> None:
         self.nodes, self.inner = nodes, inner
         self.k, self.c = len(nodes), len(inner)
         self.keys = np.concatenate([axes_of(nodes), _INNER + inner])  # (3 k + c,), sorted: the same in every block

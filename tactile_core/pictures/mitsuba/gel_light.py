@@ -30,12 +30,7 @@ class GelLight:
     surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers"""
 
     def __init__(
-        self,
-        unit: Calibration,
-        preset: Preset,
-        rest: np.ndarray,
-        seed: int,
-        surroundings: Surroundings = NOTHING,
+        self, unit: Calibration, preset: Preset, rest: np.ndarray, seed: int, surroundings: Surroundings = NOTHING
     ) -> None:
         self.unit, self.preset, self._seed = unit, preset, seed
         self._mesh = GelMesh(unit.camera, preset.spacing)
