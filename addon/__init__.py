@@ -9,7 +9,6 @@ from typing import Any
 import bpy
 
 from .operators import (
-    calibration_objects,
     check_llvm,
     import_recording,
     preview,
@@ -39,7 +38,6 @@ PARTS = (
     preview,
     render_engine,
     render_setup,
-    calibration_objects,
     add_menu,
     snap_to_gel,
     simulate,

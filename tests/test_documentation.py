@@ -82,7 +82,7 @@ ELSEWHERE = {
     "tactile dataset phac2": ("tests/jobs/dataset/test_dataset.py", '"phac2"'),
     "tactile simulate scenes/press --keep electrodes --grid": ("tests/jobs/engine/test_batch_kinds.py", "--grid"),
     "tactile dataset mine.toml": ("tests/jobs/dataset/test_dataset.py", "own.toml"),
-    "tactile dataset --new mine.toml": ("tests/jobs/dataset/test_dataset.py", "guess.write"),
+    "tactile dataset --new mine.toml": ("tests/jobs/dataset/test_dataset.py", "recipes.write"),
     "python docs/learn_from_pictures.py": ("tests/jobs/dataset/test_dataset.py", "learn_from_pictures.py"),
     "tactile adapt pressed.csv": ("tests/translation/test_force_scale.py", '"--force"'),
     "tactile adapt slips/": ("tests/recordings/test_biotac_sp.py", '["adapt"'),

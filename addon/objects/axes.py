@@ -1,4 +1,4 @@
-"""Convert between the sensors' frame in metres and Blender's axes in the scene's units.
+"""Convert between the sensors' or a picture's frame in metres and Blender's axes in the scene's units.
 
 The sensors' frame (``tactile_core.sensors``): x along the finger, y normal to the pad with the contact side at -y, z
 lateral. In Blender the pad looks up: X = x, Y = z, Z = -y, a rotation. Lengths follow the scene: one Blender unit is
@@ -13,6 +13,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.sensors.camera import Camera
 
 _SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
 
@@ -46,3 +47,18 @@ def use_millimetres(scene: bpy.types.Scene) -> None:
     """Make one Blender unit a millimetre, shown as such."""
     units = scene.unit_settings
     units.system, units.scale_length, units.length_unit = "METRIC", 1e-3, "MILLIMETERS"
+
+
+def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
+    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes, ``per_metre`` units a metre."""
+    right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
+    x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
+    return to_blender(np.stack([x, camera.height_zero_y + toward, z], -1), per_metre)
+
+
+def from_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
+    """Convert places (..., 3) in the gel object's axes and units, ``per_metre`` in a metre, to the image frame, float64
+    m: the inverse of ``to_gel``."""
+    x, y, z = np.moveaxis(to_sensor(places, per_metre), -1, 0)
+    right, down = camera.right_z * (z - camera.centre_z), camera.down_x * (x - camera.centre_x)
+    return np.stack([right, down, y - camera.height_zero_y], -1)

@@ -10,7 +10,7 @@ from ...tactile_core import sensors
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from ...tactile_core.sensors.camera import Camera, Led
 from ..settings import properties
-from . import digit_materials, held_light, image_frame, sensor_bodies
+from . import axes, digit_materials, held_light, sensor_bodies
 
 _INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
@@ -132,7 +132,7 @@ def watts_per_brightness(per_metre: float) -> float:
 def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) -> None:
     """Put the camera object ``lens`` where a calibration's ``camera`` seems to be, with its angle of view."""
     per_metre, high = gel.tactile.per_metre, camera.apparent_height
-    lens.location = image_frame.to_gel([[0, 0, high]], camera, per_metre)[0]
+    lens.location = axes.to_gel([[0, 0, high]], camera, per_metre)[0]
     # It looks up into the gel, its own -Z along the scene's Z; the fingertip, -X, is up in the picture.
     lens.rotation_mode, lens.rotation_euler = "XYZ", (math.pi, 0.0, -math.pi / 2 * camera.down_x)
     lens.scale = (1, 1, 1)
@@ -158,7 +158,7 @@ def _add_led(gel: bpy.types.Object, led: Led) -> bpy.types.Object:
 def _place_led(thing: bpy.types.Object, gel: bpy.types.Object, led: Led, unit: Calibration) -> None:
     per_metre = gel.tactile.per_metre
     thing.matrix_parent_inverse.identity()
-    thing.location = image_frame.to_gel([led.position], unit.camera, per_metre)[0]
+    thing.location = axes.to_gel([led.position], unit.camera, per_metre)[0]
     lamp = thing.data
     lamp.color = _COLOURS[led.colour]
     lamp.shadow_soft_size, lamp.use_soft_falloff = led.radius * per_metre, False

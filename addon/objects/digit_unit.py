@@ -12,7 +12,7 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
 from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
-from . import axes, digit_body, digit_materials, image_frame, motion, surfaces
+from . import axes, digit_body, digit_materials, motion, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
@@ -53,7 +53,7 @@ def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.nd
     """World points (n, 3) in the image frame, m."""
     inverse = np.array(axes.from_world(gel.evaluated_get(depsgraph)))
     own = np.asarray(points, float) @ inverse[:3, :3].T + inverse[:3, 3]
-    return image_frame.from_gel(own, camera, gel.tactile.per_metre)
+    return axes.from_gel(own, camera, gel.tactile.per_metre)
 
 
 def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, ANN202
@@ -199,7 +199,7 @@ def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camer
         raise TactileError(thing.name, found, "a camera that looks straight at the gel, turned by 0 or 180", advice)
     sign = 1 if right[1] * camera.right_z > 0 else -1
     right_z, down_x = camera.right_z * sign, camera.down_x * sign
-    place = image_frame.from_gel(np.array(relative.translation), camera, gel.tactile.per_metre)
+    place = axes.from_gel(np.array(relative.translation), camera, gel.tactile.per_metre)
     scale = camera.height * camera.pixel_size[1] / (2 * math.tan(lens.angle_y / 2) * place[2])
     new = dataclasses.replace(
         camera, apparent_height=float(place[2]), right_z=right_z, down_x=down_x,

@@ -1,4 +1,5 @@
-"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them.
+"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them. A spec's
+mesh is made in its own frame and in metres.
 
 `thing` is an indenter's object; `depsgraph` holds the scene on this frame, keys and modifiers applied.
 """
@@ -8,26 +9,29 @@ from __future__ import annotations
 import hashlib
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import bmesh
 import bpy
 import numpy as np
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.geometry.indenters import mesh_file
+from ...tactile_core.geometry.indenters.indenter import Surface
 from ..settings import properties
 from . import axes, surfaces
 
 COLOUR = (0.85, 0.55, 0.2, 1.0)
 _LOWEST = 1e-7  # m: vertices this near to the lowest one belong to one flat, as mesh_file has it
+_DIRECTIONS = 4000  # hull points of a body: edges of 0.5 mm round then look round
 
 
 def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bpy.types.Object:
     """Add the object of a spec of ``indenter_specs``, whose origin is where the body touches, and return it.
     per_metre : Blender units in a metre"""
     import msgspec
-
-    from .indenter_shapes import shape_of
 
     nodes, faces = shape_of(spec)
     # Own frame and Blender's axes agree where the pad looks up: z out of the sensor, x along the finger.
@@ -125,3 +129,33 @@ def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray
     """Return the point where the indenter touches, (3,) m in the sensor's frame. foot : (3,), of ``foot_of``"""
     origin = np.array((axes.from_world(sensor) @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)
+
+
+def shape_of(spec: Any) -> Surface:
+    """Return the nodes (n, 3) m and triangles (m, 3) of a spec's body; its own z points out of the sensor."""
+    from ...tactile_core.simulation.indenter_specs import MeshSpec  # needs msgspec
+
+    if isinstance(spec, MeshSpec):
+        mesh = mesh_file.solid(mesh_file.read_bytes(spec.file), spec.file, spec.unit_mm * 1e-3, spec.up)
+        return np.asarray(mesh.vertices) * 1e-3, np.asarray(mesh.faces)
+    return spec.build().preview(_hull)
+
+
+def _hull(support: Callable[[np.ndarray], np.ndarray]) -> Surface:
+    """Return the convex hull of a body's farthest points in evenly spread directions (Fibonacci's spiral).
+    support : returns the body's point (3,) m that lies farthest along a unit vector (3,)"""
+    k = np.arange(_DIRECTIONS) + 0.5
+    polar, turn = np.arccos(1 - 2 * k / _DIRECTIONS), np.pi * (1 + 5**0.5) * k
+    directions = np.stack([np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], -1)
+    points = np.unique(np.round([support(direction) for direction in directions], 7), axis=0)
+    shape = bmesh.new()
+    for point in points * 1e3:  # in mm: bmesh's tolerances are absolute
+        shape.verts.new(point)
+    bmesh.ops.convex_hull(shape, input=shape.verts)
+    loose = [vertex for vertex in shape.verts if not vertex.link_faces]
+    bmesh.ops.delete(shape, geom=loose, context="VERTS")
+    shape.verts.index_update()
+    nodes = np.array([vertex.co[:] for vertex in shape.verts]) * 1e-3
+    faces = np.array([[vertex.index for vertex in face.verts] for face in shape.faces])
+    shape.free()
+    return nodes, faces

@@ -1,19 +1,22 @@
-"""Set Up Render: all that makes a rendered file hold the camera's own 8-bit values; the scene's settings, their panel.
+"""Set Up Render: all that makes a rendered file hold the camera's own 8-bit values; the scene's settings, their panel;
+and LEDs, coating and camera reset to a calibration, or saved as one.
 
 A choice of preset or calibration acts on the gels and workers at once.
 """
 
+import dataclasses
 import importlib.util
 
 import bpy
+from bpy_extras.io_utils import ExportHelper
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.sensors import calibration_file
 from ...tactile_core.sensors.camera import COLOURS
 from ..objects import digit_body, digit_materials, digit_unit
 from ..settings import properties, render_settings, reports
 from ..settings.reports import TactileOperator
 from . import pictures
-from .calibration_objects import OnGel
 from .render_engine import ID
 
 _FAST = ("fast", "Fast", "Direct light and soft shadows, with numpy alone")
@@ -60,6 +63,53 @@ def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
     """Let the worker of the preset that was chosen get ready."""
     if settings.id_data == context.scene:
         pictures.prepare(context.scene, context.evaluated_depsgraph_get())
+
+
+class OnGel:
+    """Operators that need a gel"""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Return true where there is a gel."""
+        return properties.can(cls, lambda: properties.needed_gel(context.scene))
+
+
+class TACTILE_OT_reset_to_calibration(OnGel, TactileOperator):
+    """Put LEDs, coating and camera back to the calibration; their keyframes and drivers are removed"""
+
+    bl_idname = "tactile.reset_to_calibration"
+    bl_label = "Reset to Calibration"
+
+    def work(self, context: bpy.types.Context) -> None:
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+        gel = properties.gel_of(context.scene, context.object)
+        properties.check_own(gel)
+        gel.tactile.object_reflectance = 0.0
+        digit_body.reset(gel, render_settings.calibration_of(context.scene, properties.sensor_name(gel)))
+
+
+class TACTILE_OT_save_as_calibration(OnGel, TactileOperator, ExportHelper):
+    """Write LEDs, coating and camera as they are on this frame as a calibration file, for every `tactile` command"""
+
+    bl_idname = "tactile.save_as_calibration"
+    bl_label = "Save as Calibration"
+    bl_options = {"REGISTER"}  # noqa: RUF012 (changes no scene)
+
+    filename_ext = ".toml"
+    filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
+
+    def work(self, context: bpy.types.Context) -> None:
+        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+        gel = properties.gel_of(context.scene, context.object)
+        base = render_settings.calibration_of(context.scene, properties.sensor_name(gel))
+        shown = digit_unit.shown_unit(gel, context.evaluated_depsgraph_get(), base)
+        path = bpy.path.abspath(self.filepath)
+        unit = dataclasses.replace(shown.unit, unit=f"{base.unit}, changed in Blender") if shown.unit != base else base
+        calibration_file.write_calibration(path, unit)
+        if shown.around:
+            self.report({"WARNING"}, "A calibration holds three LEDs of one colour each: lamps, bodies and other"
+                        " colours in this scene are not in it")  # fmt: skip
+        self.report({"INFO"}, f"{path}: {unit.unit}")
 
 
 class TACTILE_OT_set_up_render(OnGel, TactileOperator):
@@ -173,5 +223,8 @@ def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.operator("tactile.save_as_calibration", text="Save As", icon="FILE_TICK")
 
 
-CLASSES = (TactileRender, TACTILE_OT_set_up_render, TACTILE_PT_render)
+CLASSES = (
+    TactileRender, TACTILE_OT_set_up_render, TACTILE_OT_reset_to_calibration, TACTILE_OT_save_as_calibration,
+    TACTILE_PT_render,
+)  # fmt: skip
 POINTERS = ((bpy.types.Scene, "tactile_render", TactileRender),)

@@ -1,4 +1,5 @@
-"""Convert a recording to a gel's pictures and deformations, with a note, in a folder of its own."""
+"""Convert a recording to a gel's pictures and deformations, with a note, in a folder of its own; and the reverse: from
+a gel's deformation to the BioTac's skin, its force, and its electrodes' counts."""
 
 from __future__ import annotations
 
@@ -13,23 +14,33 @@ import numpy as np
 from .. import recordings
 from ..errors import TactileError
 from ..files import atomic, provenance
+from ..files.hdf5_writer import new_hdf5
 from ..files.png_writer import pack_png
 from ..files.stopwatch import Stopwatch
 from ..pictures.presets import FAST
-from ..recordings import PrepareOptions, labels
+from ..recordings import PrepareOptions, Recording, labels
 from ..sensors import SOURCE, TARGET
 from ..translation.answer import Answer
-from ..translation.translate import PreparedRows, load_translator
+from ..translation.translate import CHUNK, PreparedRows, load_translator
+from ..translation.translator import Translator
 from . import results
 from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
+from .gel_frames import read_displacement
 from .results import SOLVED, TRANSLATED, GelKind, frames_text, select
 
 if TYPE_CHECKING:
-    from ..recordings import Recording
     from ..recordings.electrode_gains import SensorFile
-    from ..translation.translator import Translator
+
+REVERSE_FORMAT = "tactile-reverse-1"
+# dataset -> (unit, meaning); T is the number of frames
+REVERSED = {
+    "frame": ("1", "index of the frame in the input"),
+    "displacement": ("m", "(T, N, 3) of the skin's nodes, attribute sensor: whose"),
+    "force": ("N", "(T, 3) of the object on the sensor; 0 where the gel is at rest"),
+    "electrodes": ("count", "(T, e) changes against rest, as raw readings have them"),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -221,3 +232,36 @@ def weights_entry(translator: Translator) -> dict:
     found = chain_error(translator.card)
     errors = {} if found is None else {"kept_apart_rms_um": found[0], "baseline_rms_um": found[1]}
     return {"sha256": translator.sha256, **errors}
+
+
+def reverse(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    translator: Translator,
+    frames: slice = slice(None),
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``REVERSED``.
+    translator : its networks lead from the skin to that gel; frames : slice of the input's; overwrite : true replaces
+     `out`; progress : called with (frames done, frames in all)
+    Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
+    if os.path.lexists(out) and not overwrite:
+        raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
+    held = read_displacement(path, translator.target)
+    rows = select(frames, len(held.numbers))
+    writable = atomic.writing(out, "a file in a writable folder", "Name another --out")
+    about = {"format": REVERSE_FORMAT, "sensor": translator.source, "weights": translator.sha256}
+    with writable, atomic.new_file(out) as unfinished, new_hdf5(unfinished, about) as (file, disk):
+        for start in range(0, len(rows), CHUNK):
+            some = rows[start : start + CHUNK]
+            gel = np.stack(list(held.iterate_rows(some))).astype(np.float32)
+            arrays = {"frame": held.numbers[some].astype(np.int32), **translator.reverse(gel)}
+            for name, values in arrays.items():
+                if start == 0:
+                    data = file.create_dataset(name, (len(rows), *values.shape[1:]), values.dtype, track_times=False)
+                    data.attrs.update(dict(zip(("unit", "description"), REVERSED[name], strict=True)))
+                file[name][start : start + len(some)] = values
+            disk.check()
+            progress(start + len(some), len(rows))

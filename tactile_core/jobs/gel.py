@@ -24,7 +24,7 @@ from ..mechanics.penetration import PenetrationError
 from ..mechanics.placement import DEPTH_LIMIT, FRICTION, first_touch_on_line, friction_of, same_line, thickness_under
 from ..pictures.height_map import folds_counted, gel_mapper
 from ..pictures.known_body import out_of_body, reflectance_on
-from ..pictures.object_light import checked_reflectance
+from ..pictures.light import checked_reflectance
 from ..pictures.presets import FAST, NAMES
 from ..pictures.renderer import Renderer
 from ..sensors.calibration import Calibration

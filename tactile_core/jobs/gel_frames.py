@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,13 +16,10 @@ from ..errors import TactileError
 from ..files import outside
 from ..files.exr_file import read_height
 from ..files.hdf5_checked import SIGNATURE
-from ..recordings.array_store import open_hdf5, open_npz
+from ..recordings.array_store import Store, open_hdf5, open_npz
 from ..recordings.simulated import FORMAT as SIMULATED
 from ..sensors import TARGET
 from .frames_file import FORMAT as CONVERTED
-
-if TYPE_CHECKING:
-    from ..recordings.array_store import Store
 
 CONVERT = "Of a recording: `tactile convert` it first, and render its frames.h5"
 EXPECTED = "frames.h5, a simulated recording (.h5), a height map (.npz, .exr), or a scene's folder"

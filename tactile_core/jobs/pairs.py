@@ -14,14 +14,14 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from ..files import array_pack, atomic, checksummed
+from ..files import atomic, checksummed
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
 from ..sensors.gel_sensor import GelSensor
+from ..simulation.pair_sampling import RANDOM_BODY
 from ..simulation.pairs_writer import Made, card, card_path, merge
-from ..simulation.random_bodies import NAME
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import run as runs
@@ -86,7 +86,7 @@ def plan(
     surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
     job = jobs.make(inputs, Pairs(count, seed, surfaces, files, source, target, list(keep)), None)
     names = [spec.name for spec in scene.indenters]
-    return job, names + [NAME] * (scene.pairs.random_bodies > 0), text
+    return job, names + [RANDOM_BODY] * (scene.pairs.random_bodies > 0), text
 
 
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:
@@ -109,7 +109,7 @@ def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
     way = (recipe.source, recipe.target), recipe.keep
     rows = [row for press in presses for row in press_rows(scene, recipe.seed, press, *way)]
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
-    array_pack.write(file, columns | {COUNT: np.array(len(rows))})
+    checksummed.write(file, columns | {COUNT: np.array(len(rows))})
     return True
 
 
@@ -158,7 +158,7 @@ def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
 def _count(file: Path) -> int:
     """Return the number of contacts in a block; 0 for a damaged one, until it is made again."""
     try:
-        return int(array_pack.read(file, names=(COUNT,))[COUNT])
+        return int(checksummed.read(file, names=(COUNT,))[COUNT])
     except (TactileError, KeyError):
         return 0
 

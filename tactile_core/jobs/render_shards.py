@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..files import array_pack, atomic, checksummed
+from ..files import atomic, checksummed
 from ..pictures.mitsuba.variant import variant_for
 from ..sensors.calibration_file import load_calibration
 from . import results
@@ -79,7 +79,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
         made.begin(partial)
         made.write_rest(partial)
         for number in range(count(folder, job)):
-            array_pack.unpack(jobs.shard_file(folder, name, number), partial)
+            checksummed.unpack(jobs.shard_file(folder, name, number), partial)
         note = note_of(job.inputs[0].path, words, frames, made.renderer, recipe.preset, options)
         atomic.write_json(partial / results.NOTE, note)
 
@@ -95,7 +95,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
         rows = select(parse_frames(job.recipe.frames), len(frames.numbers))
         arrays = {NUMBERS: frames.numbers[rows], VALUES: np.stack(list(frames.iterate_rows(rows)))}
         kind = np.frombuffer(frames.kind.encode(), np.uint8)
-        array_pack.write(file, arrays | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
+        checksummed.write(file, arrays | {KIND: kind, HEIGHTS: np.bool_(frames.heights is not None)})
     return count(folder, job), made
 
 
@@ -113,7 +113,7 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
         pictures.begin(Path(name))
         for frame, values in zip(found[NUMBERS], found[VALUES], strict=True):
             pictures.write_frame(Path(name), int(frame), values)
-        array_pack.write_files(file, Path(name))
+        checksummed.write_files(file, Path(name))
     return True
 
 
@@ -141,7 +141,7 @@ def _frames(folder: Path, job: Job[Render]) -> int:
 
 def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> dict[str, np.ndarray]:
     """Read arrays of the prepared input by names; rows : of those that have rows"""
-    return array_pack.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
+    return checksummed.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
 
 
 @functools.lru_cache(maxsize=2)

@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from ..errors import TactileError
-from ..files import array_pack, atomic, checksummed
+from ..files import atomic, checksummed
 from ..mechanics.fast.compliance import compliance_of
 from ..sensors import PAIR
 from ..simulation.scene import Scene, check, to_toml
@@ -186,7 +186,7 @@ def _put_together(folder: Path, job: Job[Simulate], out: Path) -> None:
     advice = "Make room, then give the command again"
     with atomic.writing(out, "room for it", advice), atomic.new_folder(out) as partial:
         for index, one in enumerate(job.inputs):
-            array_pack.unpack(jobs.shard_file(folder, one.name, 0), partial)
+            checksummed.unpack(jobs.shard_file(folder, one.name, 0), partial)
             rows.append({
                 "file": f"{one.name}.h5", "seed": job.recipe.seed + index, "values": job.recipe.values[index]
             })  # fmt: skip
@@ -214,7 +214,7 @@ def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
     with tempfile.TemporaryDirectory() as name:
         out, seed = Path(name) / f"{one.name}.h5", job.recipe.seed + index
         simulate_recording(one.path, out, seed, keep=job.recipe.keep, loaded=(scene, to_toml(varied)))
-        array_pack.write_files(file, Path(name))
+        checksummed.write_files(file, Path(name))
     return True
 
 

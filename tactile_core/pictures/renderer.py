@@ -17,13 +17,12 @@ from .background import correction, raised_light, resting_picture
 from .camera_curve import bent, ends
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
-from .light import Lamps
+from .light import Lamps, checked_reflectance, object_light
 from .marker_field import MarkerField
 from .mitsuba.gel_light import GelLight
 from .mitsuba.gel_scene import NOTHING, Surroundings
 from .mitsuba.matte_light import MatteLight
 from .mitsuba.variant import LLVM, choose_variant
-from .object_light import checked_reflectance, object_light
 from .perspective import Perspective
 from .presets import DEFAULT, FAST, preset_named
 

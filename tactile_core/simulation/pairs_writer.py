@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import sensors
 from ..errors import TactileError
-from ..files import array_pack, atomic
+from ..files import atomic, checksummed
 from ..files.hdf5_writer import new_hdf5
 from ..files.provenance import sha256
 from ..files.version import __version__
@@ -113,7 +113,7 @@ def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) 
         with atomic.new_file(out) as partial, new_hdf5(partial, about) as (file, disk):
             done, unit_of = 0, units(*made.pair, made.keep)
             for path in files:
-                block = array_pack.read(path)
+                block = checksummed.read(path)
                 take = min(int(block["count"]), count - done)
                 for name in unit_of if take else ():
                     _append(file, name, unit_of[name], block[name][:take], count, done)

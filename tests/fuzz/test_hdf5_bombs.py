@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from tactile_core import recordings
-from tactile_core.files import array_pack, hdf5_checked
+from tactile_core.files import checksummed, hdf5_checked
 from tactile_core.jobs import prepared_signals
 from tactile_core.simulation import pairs_file
 
@@ -131,7 +131,7 @@ def endless_list_of_names(path):
 @pytest.mark.parametrize(
     "load",
     [
-        prepare, pairs_file.read_pairs, array_pack.read,
+        prepare, pairs_file.read_pairs, checksummed.read,
     ],
 )  # fmt: skip
 def test_hdf5(make, words, load, tmp_path):
@@ -165,7 +165,7 @@ def test_groups_within_groups(tmp_path):
         group = file
         for _ in range(3000):
             group = group.create_group("g")
-    for load in (prepare, pairs_file.read_pairs, array_pack.read):
+    for load in (prepare, pairs_file.read_pairs, checksummed.read):
         refused(load, tmp_path / "a.h5", "deep")
 
 

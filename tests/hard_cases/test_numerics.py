@@ -7,7 +7,7 @@ import functools
 
 import numpy as np
 from benchmarks.mechanics.axisymmetric import disc_mesh, pressed
-from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
+from benchmarks.mechanics.golden import GOLDEN_BALL, GOLDEN_RADIUS, GOLDEN_THICKNESS, exact_layer
 from slab import slab_compliance
 
 from hard_cases.case import HEIGHT_MAP, MECHANICS_FAST, MECHANICS_FULL, TIERS, TRANSLATION, Found, case, refusal

@@ -23,7 +23,7 @@ SCENE = ROOT / "scenes" / "training"
 
 from benchmarks.make import full_pairs  # noqa: E402
 from benchmarks.measured_rows import in_processes  # noqa: E402
-from tactile_core.files import array_pack, atomic  # noqa: E402
+from tactile_core.files import atomic, checksummed  # noqa: E402
 from tactile_core.simulation import pairs_writer  # noqa: E402
 from tactile_core.simulation.pairs_writer import Made, card, card_path  # noqa: E402
 from tactile_core.simulation.scene import load_scene  # noqa: E402
@@ -47,7 +47,7 @@ def solve_one(job: Job) -> str:
     rows, record = full_pairs.full_rows(scene, press)
     columns = {name: np.stack([row[name] for row in rows]) for name in rows[0]} if rows else {}
     why = np.frombuffer(str(record["lost"]).encode(), np.uint8)
-    array_pack.write(path, {**columns, **record, "lost": why, "count": np.int32(len(rows))})
+    checksummed.write(path, {**columns, **record, "lost": why, "count": np.int32(len(rows))})
     what = f"{scene.indenters[press.which].name} {press.depth * 1e3:.2f} mm, {len(rows)} of {record['wanted']} contacts"
     return f"{path.name}: {what}, {record['seconds']:.1f} s {record['lost']}"
 
@@ -58,7 +58,7 @@ def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
     files = sorted(folder.glob(f"press_{seed}_*.h5"))
     counts, wanted, lost = [], 0, {}
     for path in files:
-        record = array_pack.read(path, names=("count", "wanted", "lost"))
+        record = checksummed.read(path, names=("count", "wanted", "lost"))
         counts.append(int(record["count"]))
         wanted += int(record["wanted"])
         if len(record["lost"]):

@@ -158,7 +158,7 @@ def reverse(options: argparse.Namespace) -> int:
     """Translate one gel's frames back for --reverse; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import results
-    from ...jobs.reverse import reverse as translate_back
+    from ...jobs.convert import reverse as translate_back
     from ...translation.translate import load_translator
 
     if len(options.recordings) > 1:

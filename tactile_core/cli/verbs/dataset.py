@@ -86,9 +86,9 @@ def _new(options: argparse.Namespace) -> int:
     """Write a recipe guessed from a folder."""
     if not options.name:
         raise TactileError("--new", "given alone", "--new FILE FOLDER", "Name the folder of your recordings")
-    from ...jobs.dataset import guess
+    from ...jobs.dataset import recipe
 
-    guess.write(Path(options.new), Path(options.name))
+    recipe.write(Path(options.new), Path(options.name))
     tell(options.new)
     next_step(f"fill it in, then tactile dataset {options.new} {options.name} --out DIR")
     return 0

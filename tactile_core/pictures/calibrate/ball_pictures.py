@@ -17,10 +17,9 @@ from ...sensors.gel_shape import shape_of
 from ..background import raised_light
 from ..coating_spread import CoatingSpread
 from ..height_map import check_covered
-from ..light import Lamps
+from ..light import Lamps, contact_share
 from ..mitsuba.gel_light import GelLight
 from ..mitsuba.variant import llvm_trouble
-from ..object_light import contact_share
 from ..perspective import Perspective
 from ..presets import FAST, Preset, preset_named
 from .ball_print import deepest, print_on

@@ -13,7 +13,7 @@ from benchmarks.make.full_pairs import REGION_X, draw_press, full_rows
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
-from tactile_core.files import array_pack
+from tactile_core.files import checksummed
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.electrodes.biotac_sheet import film_floor
 from tactile_core.mechanics.fast.compliance import compliance_of
@@ -182,14 +182,14 @@ def test_solved_presses_are_kept_and_merge_to_the_same_bytes(script, tmp_path):
         assert file.attrs["unseen_region_x"] == REGION_X
         stored, scale = file["displacement_digit"][0], file["displacement_digit"].attrs["scale"]
     (solved,) = (tmp_path / "one").glob("*.h5")
-    found = array_pack.read(solved)["displacement_digit"][0] * pairs_file.SCALE
+    found = checksummed.read(solved)["displacement_digit"][0] * pairs_file.SCALE
     assert scale == script.STEP and stored.any()
     np.testing.assert_allclose(stored * scale, found, atol=0.5 * scale * (1 + 1e-6))  # rounded to the nearest step
 
 
 def test_what_a_press_lost_is_told(script, tmp_path):
     nothing = {"wanted": np.int32(4), "lost": np.frombuffer(b"no equilibrium", np.uint8), "count": np.int32(0)}
-    array_pack.write(script.file_of(tmp_path, 1, 4), nothing)
+    checksummed.write(script.file_of(tmp_path, 1, 4), nothing)
     script.solve_one((tmp_path, 1, 0))
     card = script.merge(tmp_path, 1, tmp_path / "set.h5")
     assert card["contacts"] == 1 and card["contacts_wanted"] == 5 and card["presses_solved"] == 2

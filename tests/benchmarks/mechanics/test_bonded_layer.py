@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.mechanics.bonded_layer import exact_layer
+from benchmarks.mechanics.golden import exact_layer
 
 BALL, YOUNGS = 1.0, 1e6
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmarks.mechanics import golden
 from benchmarks.mechanics.axisymmetric import AxisymmetricSolid, disc, graded, pressed
-from benchmarks.mechanics.bonded_layer import GOLDEN_FORCE, quarter_disc
+from benchmarks.mechanics.golden import GOLDEN_FORCE, quarter_disc
 
 from tactile_core.geometry.indenters import Sphere, pose_on
 from tactile_core.mechanics.finite_strain.newton import FiniteStrainContact

@@ -16,10 +16,9 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs.dataset import collected, guess, survival
+from tactile_core.jobs.dataset import collected, summary
 from tactile_core.jobs.dataset import recipe as recipes
-from tactile_core.jobs.dataset.summary import ARRAYS, PICTURE, RAW, Summary
-from tactile_core.jobs.dataset.survival import ALWAYS, rows
+from tactile_core.jobs.dataset.summary import ALWAYS, ARRAYS, PICTURE, RAW, Summary, survival_rows
 from tactile_core.jobs.export.finished_job import Recorded
 
 DATA = Path(os.environ.get("TACTILE_TEST_DATA", Path(__file__).parents[4] / "shared" / "data"))
@@ -37,8 +36,8 @@ FRAMES = 30  # of a recording: every second of 60
 def few_fits():
     """Two folds and two random maps: what tells the labels apart is told by any number of them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(survival, "FOLDS", 2)
-        patch.setattr(survival, "MAPS", 2)
+        patch.setattr(summary, "FOLDS", 2)
+        patch.setattr(summary, "MAPS", 2)
         yield
 
 
@@ -171,7 +170,7 @@ def test_links_out_of_the_folder_are_no_rest(recipe, tmp_path):
 
 
 def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_path):
-    guess.write(tmp_path / "new.toml", folder)
+    recipes.write(tmp_path / "new.toml", folder)
     recipe = recipes.read(str(tmp_path / "new.toml"))
     assert recipe.files[0] == "{label1}_{label2}.npz"
     found = collected.collect(recipe, folder, tmp_path / "out")
@@ -193,13 +192,13 @@ def test_labels_that_differ_in_case_alone_are_named(recipe, tmp_path, capsys):
     ("2024.01.05_a.csv", ["2024", "01", "05"]),
 ])  # fmt: skip
 def test_dots_between_numbers_are_no_decimal_points(name, numbers):
-    assert [piece for piece in guess.PIECE.findall(name) if piece[-1].isdigit()] == numbers
+    assert [piece for piece in recipes.PIECE.findall(name) if piece[-1].isdigit()] == numbers
 
 
 def test_a_guessed_recipe_takes_a_number_as_one_label(folder, tmp_path):
     for number, force in enumerate(("-1.5", "2", "10")):
         shutil.copy(folder / "ball_0.npz", tmp_path / f"{number}_force_n-{force}.npz")
-    guess.write(tmp_path / "new.toml", tmp_path)
+    recipes.write(tmp_path / "new.toml", tmp_path)
     assert recipes.read(str(tmp_path / "new.toml")).files == ["{label1}_force_n-{label2}.npz"]
 
 
@@ -356,7 +355,7 @@ def examples(told: str, count: int = 40) -> list[Summary]:
 @pytest.mark.parametrize("told", [RAW, PICTURE])
 def test_survival_tells_labels_by_what_holds_them_and_by_nothing_else(told):
     pytest.importorskip("sklearn", reason="scikit-learn is not installed")
-    by = {row.by: row for row in rows("side", examples(told), "session", lambda done, total: None)}
+    by = {row.by: row for row in survival_rows("side", examples(told), "session", lambda done, total: None)}
     assert by[told].right > 0.9 and by[ALWAYS].right == 0.5
     others = [row for name, row in by.items() if name in (*ARRAYS, PICTURE) and name != told]
     assert all(row.right < 0.5 + 4 * row.error for row in others)

@@ -11,7 +11,7 @@ from ball_scene import ball_scene
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.files import array_pack, checksummed
+from tactile_core.files import checksummed
 from tactile_core.jobs.engine import job as jobs
 
 
@@ -134,12 +134,12 @@ def test_packs_are_sealed_and_leave_no_folder(tmp_path):
     (tmp_path / "in" / "deep").mkdir(parents=True)
     (tmp_path / "in" / "deep" / "a").write_bytes(b"abc")
     (tmp_path / "in" / "b").write_bytes(b"")
-    array_pack.write_files(tmp_path / "pack.h5", tmp_path / "in")
-    array_pack.write_files(tmp_path / "again.h5", tmp_path / "in")
+    checksummed.write_files(tmp_path / "pack.h5", tmp_path / "in")
+    checksummed.write_files(tmp_path / "again.h5", tmp_path / "in")
     assert (tmp_path / "pack.h5").read_bytes() == (tmp_path / "again.h5").read_bytes()
     assert checksummed.verified_checksum(tmp_path / "pack.h5")
-    array_pack.unpack(tmp_path / "pack.h5", tmp_path / "out")
+    checksummed.unpack(tmp_path / "pack.h5", tmp_path / "out")
     assert tree(tmp_path / "out") == {"deep/a": b"abc", "b": b""}
-    array_pack.write(tmp_path / "bad.h5", {"..": np.zeros(1, np.uint8)})
+    checksummed.write(tmp_path / "bad.h5", {"..": np.zeros(1, np.uint8)})
     with pytest.raises(TactileError, match="inside the folder"):
-        array_pack.unpack(tmp_path / "bad.h5", tmp_path / "out")
+        checksummed.unpack(tmp_path / "bad.h5", tmp_path / "out")

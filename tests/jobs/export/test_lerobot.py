@@ -17,7 +17,7 @@ from tactile_core.errors import TactileError
 from tactile_core.files import checksummed
 from tactile_core.jobs import export
 from tactile_core.jobs.engine import job as jobs
-from tactile_core.jobs.export.lerobot_stats import EpisodeStats, aggregate
+from tactile_core.jobs.export.lerobot_set import EpisodeStats, aggregate
 
 pq = pytest.importorskip(
     "pyarrow.parquet", reason="pyarrow is absent, or newer than this numpy: pip install tactile-core[batch]",

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from benchmarks.mechanics.bonded_layer import GOLDEN_FORCE
+from benchmarks.mechanics.golden import GOLDEN_FORCE
 from benchmarks.mechanics.random_contacts import random_contacts
 from slab import slab_compliance
 

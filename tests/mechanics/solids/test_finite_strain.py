@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.mechanics.bonded_layer import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
+from benchmarks.mechanics.golden import GOLDEN_BALL, GOLDEN_FORCE, GOLDEN_RADIUS, GOLDEN_THICKNESS, quarter_disc
 from slab import assemble, slab_mesh
 
 from tactile_core.geometry.indenters import Sphere, pose_on

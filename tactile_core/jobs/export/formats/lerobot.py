@@ -12,8 +12,7 @@ from typing import Any, Literal
 from ....files import atomic
 from ....files.png_writer import pack_png
 from ..finished_job import Finished
-from ..lerobot_set import CHUNK, PICTURE, TASK, Features, Rows, table, write_set
-from ..lerobot_stats import Stats, aggregate, listed
+from ..lerobot_set import CHUNK, PICTURE, TASK, Features, Rows, Stats, aggregate, listed, table, write_set
 
 BRIEF = "LeRobot v3.0: Parquet with pictures, meta/info.json"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"

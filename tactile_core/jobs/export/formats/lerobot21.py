@@ -17,9 +17,9 @@ from typing import Any, Literal
 
 from ....errors import TactileError
 from ....files import atomic
+from .. import lerobot_set
 from ..finished_job import Finished
-from ..lerobot_set import ACTION, CHUNK, CONTACT, PICTURE, STATE, TASK, Features, Rows, table, write_set
-from ..lerobot_stats import Stats, aggregate, listed
+from ..lerobot_set import ACTION, CHUNK, CONTACT, PICTURE, STATE, TASK, Features, Rows, Stats
 
 BRIEF = "LeRobot v2.1, which GR00T reads too: a Parquet file and a video an episode, meta/info.json"
 DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
@@ -28,7 +28,7 @@ VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
     """Write the data set, see `formats`. Raises TactileError where OpenCV cannot write the video."""
-    write_set(source, folder, progress, _Apart(folder))
+    lerobot_set.write_set(source, folder, progress, _Apart(folder))
 
 
 class _Apart:
@@ -46,7 +46,7 @@ class _Apart:
         """Add rows to the episode's files."""
         import pyarrow.parquet as pq
 
-        added = table(rows, features)
+        added = lerobot_set.table(rows, features)
         if self._data is None:
             self._data = pq.ParquetWriter(self._path(DATA, episode), added.schema, compression="snappy")
         self._data.write_table(added)
@@ -66,9 +66,10 @@ class _Apart:
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
         """Write the lists of episodes, statistics and tasks, and GR00T's own files; returns entries of info.json."""
-        meta, whole, drawn = self._folder / "meta", listed(aggregate(stats)), PICTURE in stats[0]
+        meta, drawn = self._folder / "meta", PICTURE in stats[0]
+        whole = lerobot_set.listed(lerobot_set.aggregate(stats))
         _write_lines(meta / "episodes.jsonl", episodes)
-        found = [{"episode_index": index, "stats": listed(one)} for index, one in enumerate(stats)]
+        found = [{"episode_index": index, "stats": lerobot_set.listed(one)} for index, one in enumerate(stats)]
         _write_lines(meta / "episodes_stats.jsonl", found)
         _write_lines(meta / "tasks.jsonl", [{"task_index": 0, "task": TASK}])
         atomic.write_json(meta / "modality.json", _modality(drawn))
