@@ -238,7 +238,7 @@ def note_of(
 
 
 def background_of(renderer: Renderer) -> dict[str, Any] | str:
-    """Describe the source of the resting picture, and by how much a photograph corrects the modelled one."""
+    """Return, for the note, "lights" for a modelled resting picture, else its photograph and the correction by it."""
     photograph = renderer.calibration.photograph
     if not photograph:
         return "lights"

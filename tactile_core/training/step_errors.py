@@ -109,7 +109,7 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Return columns (B,): largest node errors, m, of BioTac and DIGIT meshes from signals, and the head's estimates.
+    """Return columns (B,) of BioTac and DIGIT meshes from signals: largest node errors, m, and those expected, m.
     rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)

@@ -1,9 +1,9 @@
-"""The contact that signals are answered with, and the posterior it is taken from, on contacts of known truth.
+"""Measure the contact estimated from signals, and the posterior that it is taken from, on contacts of known truth.
 
-Medians a blurred answer cannot win: place, force, depth of the deepest node, overlap of the patches. Beside the most
-plausible contact stand the mean of the posterior, the same contact solved on the DIGIT (``convert --gel solved``), and
-as baseline the nearest example: what the contact of another press of the test set with the most similar signals, each
-less its size, did, as strong as this signal says.
+Median errors of place, force, depth of the deepest node and overlap of patches, of three answers: the most plausible
+contact, the mean of the posterior, and the most plausible contact solved on the DIGIT (``convert --gel solved``). The
+baseline is the nearest example: the contact of another press of the test set whose signals have the most similar
+pattern, scaled to the size of these signals.
 """
 
 from __future__ import annotations

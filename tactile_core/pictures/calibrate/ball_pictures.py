@@ -125,7 +125,7 @@ def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
 
 
 def missing_mitsuba() -> str:
-    """Describe why Mitsuba cannot draw pictures; "" where it can."""
+    """Describe why Mitsuba cannot draw pictures by LLVM, as a fit needs: it or LLVM is missing; "" where it can."""
     try:
         import mitsuba  # noqa: F401
     except ModuleNotFoundError:

@@ -78,9 +78,8 @@ class MatteLight:
 def direct_light(
     hits: Surface, seen: np.ndarray, points: Sequence[np.ndarray], unit: Calibration, *, soften: bool
 ) -> np.ndarray:
-    """Return the radiance (H, W, L) float32, levels, of L LEDs on a matte coating.
-    seen : (H, W) uint32, one bit for each visible point; points : (n, 3) m of each LED, n <= 8, in the order of the
-        bits
+    """Return the radiance (H, W, L) float32, levels, of L LEDs on a matte coating; hits : the surface that pixels see
+    seen : (H, W) uint32, one bit for each visible point; points : (n, 3) m of each LED, n <= 8, in the bits' order
     soften : true smooths the steps of few points in a shadow's edge, over 3 x 3 pixels"""
     positions, bit = np.array([led.position for led in unit.leds]), 0
     lit, radiance = lambert(hits, positions), np.empty((*hits.height.shape, len(positions)), np.float32)
