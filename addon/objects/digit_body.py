@@ -39,7 +39,8 @@ def camera_of(gel: bpy.types.Object) -> bpy.types.Object | None:
 def coating_of(gel: bpy.types.Object) -> bpy.types.Material | None:
     """Return the gel's coating, the first of its materials that holds a coating's numbers; None without one."""
     materials = (slot.material for slot in gel.material_slots)
-    return next((each for each in materials if each and digit_materials.is_coating(each)), None)
+    trees = ((each, each.node_tree) for each in materials if each)
+    return next((each for each, tree in trees if tree is not None and digit_materials.ALBEDO in tree.nodes), None)
 
 
 def add_body(gel: bpy.types.Object, unit: Calibration) -> None:

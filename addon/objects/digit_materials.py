@@ -16,11 +16,6 @@ ALBEDO, ROUGHNESS, GLOSS = "Albedo", "Roughness", "Gloss"
 _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
 
 
-def is_coating(material: bpy.types.Material) -> bool:
-    """Return true for a material that holds a coating's numbers."""
-    return material.node_tree is not None and ALBEDO in material.node_tree.nodes
-
-
 def new_coating(coating: Coating) -> bpy.types.Material:
     """Make the paint on the gel: albedo, roughness and gloss are nodes, which can be keyed and driven."""
     material, shader = _new("DIGIT coating", (0.75, 0.75, 0.78, 1.0))

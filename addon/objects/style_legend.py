@@ -69,17 +69,12 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
     legend.data.materials.append(style_nodes.legend_material())
     modifier = legend.modifiers.new(style_nodes.LEGEND, "NODES")
     modifier.node_group = bpy.data.node_groups.get(style_nodes.LEGEND) or _facing()
-    low, high = _box(thing)
+    body = [thing, *(part for part in thing.children if part.tactile.role == "BODY")]
+    corners = np.concatenate([np.array(part.bound_box) for part in body])
+    low, high = corners.min(0), corners.max(0)
     style_nodes.set_input(modifier, _MIDDLE, tuple((low + high) / 2))
     style_nodes.set_input(modifier, _HALF, tuple((high - low) / 2 + _GAP * unit))
     return legend
-
-
-def _box(thing: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner (3,) of a sensor with its body, in its own axes and units."""
-    parts = [thing, *(part for part in thing.children if part.tactile.role == "BODY")]
-    corners = np.concatenate([np.array(part.bound_box) for part in parts])
-    return corners.min(0), corners.max(0)
 
 
 def _facing() -> bpy.types.NodeTree:

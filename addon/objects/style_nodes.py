@@ -130,7 +130,9 @@ def _surface(style: str) -> bpy.types.NodeTree:
     _fill(ramp.color_ramp, style)
     colour = ramp.outputs["Color"]
     if style == "ELECTRODES":
-        colour = _near_electrodes(nodes, colour)
+        # Grey far from electrodes; distances are in metres in any file.
+        near = nodes.output("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0)
+        colour = _over_grey(nodes, near, colour)
     elif style == "DISPLACEMENT":
         colour = _above_error(nodes, colour, again, given.outputs[ERROR])
     shown = nodes.store(kept, COLOUR, colour, "FLOAT_COLOR")
@@ -144,20 +146,10 @@ def _moved(nodes: NodeGroup, largest: bpy.types.NodeSocket, moved: bpy.types.Nod
     return nodes.math("DIVIDE", length, largest)
 
 
-def _touched(nodes: NodeGroup, _largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    return nodes.attribute(frame_attribute.PATCH)
-
-
 def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
     """Return 0 where the reading falls by the largest change, 1 where it rises by it; _moved is unused."""
     share = nodes.math("DIVIDE", nodes.attribute(frame_attribute.COUNTS), largest)
     return nodes.math("MULTIPLY_ADD", share, 0.5, 0.5)
-
-
-def _near_electrodes(nodes: NodeGroup, colour: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """The colour near an electrode, grey elsewhere; distances are in metres in any file."""
-    near = nodes.output("ShaderNodeMapRange", nodes.attribute(electrode_markers.DISTANCE), *_EDGE, 1.0, 0.0)
-    return _over_grey(nodes, near, colour)
 
 
 def _above_error(
@@ -173,7 +165,10 @@ def _over_grey(nodes: NodeGroup, share: bpy.types.NodeSocket, colour: bpy.types.
     return nodes.output("ShaderNodeMix", share, (*STILL, 1.0), colour, data_type="RGBA")
 
 
-_SHARE: dict[str, Callable] = {"DISPLACEMENT": _moved, "CONTACT_PATCH": _touched, "ELECTRODES": _changed}
+_SHARE: dict[str, Callable] = {
+    "DISPLACEMENT": _moved, "ELECTRODES": _changed,
+    "CONTACT_PATCH": lambda nodes, *_: nodes.attribute(frame_attribute.PATCH),
+}  # fmt: skip
 
 
 def _fill(ramp: bpy.types.ColorRamp, style: str) -> None:

@@ -15,8 +15,7 @@ class TACTILE_OT_check_llvm(TactileOperator):
     bl_label = "Check"
     bl_options = {"REGISTER"}  # noqa: RUF012 (no part of the file)
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("mitsuba")
         close_all()  # workers that draw keep the library they began with
         with JobFolder() as folder:

@@ -73,7 +73,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         name="Set Frame Rate and Range", description="Let the scene play the recording in its own time", default=True
     )
 
-    def work(self, context: bpy.types.Context) -> None:
+    def _work(self, context: bpy.types.Context) -> None:
         """Import the files; of several, the good ones are imported, and each bad one is reported."""
         done, paths, timed = 0, self._paths(), False
         for path in paths:

@@ -29,7 +29,7 @@ class JobOperator(TactileOperator):
         """Put the result into the scene; raises TactileError."""
         raise NotImplementedError
 
-    def work(self, context: bpy.types.Context) -> None:
+    def _work(self, context: bpy.types.Context) -> None:
         """Run the job and wait for its end: without a window, or from a script."""
         try:
             self.begin(context)

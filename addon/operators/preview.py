@@ -102,8 +102,7 @@ class TACTILE_OT_live_picture(TactileOperator):
         """Return true where there is a gel to look at, or the picture is on: it can always be switched off."""
         return is_on() or properties.can(cls, lambda: properties.needed_gel(context.scene))
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         global _live
         if is_on():
             switch_off()

@@ -143,17 +143,8 @@ def load(
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)
     files = [(file, _changed(file)) for file in (split(path).file, _absolute(asked.columns), _absolute(asked.unit))]
-    key = (
-        path,
-        *files,
-        asked.tare,
-        asked.frames,
-        asked.polarity,
-        known.answer,
-        known.sha256,
-        per_metre,
-        kept_files.folder(kept_files.CACHE),
-    )
+    options = asked.tare, asked.frames, asked.polarity, known.answer, known.sha256
+    key = (path, *files, *options, per_metre, kept_files.folder(kept_files.CACHE))
     if key not in _KEPT or not _KEPT[key].fits(motion):
         found = _translated(known, path, asked, progress, motion, key)
         _KEPT.clear()
@@ -192,7 +183,9 @@ def _translated(
     pair = translator.source, translator.target
     if in_files(motion, len(chosen)):
         return Translated(*about, *_in_files(pair, parts, len(chosen), recording.name, key))
-    return Translated(*about, *_in_memory(pair, parts))
+    whole = Translation.joined(list(parts))
+    skin, gel = (mesh_cache.in_memory(getattr(whole, name), sensor) for name, sensor in zip(_MOVED, pair, strict=True))
+    return Translated(*about, whole, skin, gel)
 
 
 def _with_progress(
@@ -204,13 +197,6 @@ def _with_progress(
         yield part
         done += len(part.force)
         progress(done / frames)
-
-
-def _in_memory(pair: tuple[str, str], parts: Iterator[Translation]) -> tuple[Translation, Motion, Motion]:
-    """Join a translation; returns the movements of skin and gel too. pair : names of the two sensors"""
-    whole = Translation.joined(list(parts))
-    skin, gel = (mesh_cache.in_memory(getattr(whole, name), sensor) for name, sensor in zip(_MOVED, pair, strict=True))
-    return whole, skin, gel
 
 
 def _in_files(

@@ -80,8 +80,7 @@ class TACTILE_OT_reset_to_calibration(OnGel, TactileOperator):
     bl_idname = "tactile.reset_to_calibration"
     bl_label = "Reset to Calibration"
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         gel = properties.gel_of(context.scene, context.object)
         properties.check_own(gel)
         gel.tactile.object_reflectance = 0.0
@@ -98,8 +97,7 @@ class TACTILE_OT_save_as_calibration(OnGel, TactileOperator, ExportHelper):
     filename_ext = ".toml"
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         gel = properties.gel_of(context.scene, context.object)
         base = render_settings.calibration_of(context.scene, properties.sensor_name(gel))
         shown = digit_unit.shown_unit(gel, context.evaluated_depsgraph_get(), base)
@@ -118,8 +116,7 @@ class TACTILE_OT_set_up_render(OnGel, TactileOperator):
     bl_idname = "tactile.set_up_render"
     bl_label = "Set Up Render"
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         scene = context.scene
         gel = properties.needed_gel(scene, context.object)
         properties.check_own(gel)

@@ -31,15 +31,14 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
     filename_ext = ".toml"
     filter_glob: bpy.props.StringProperty(default="*.toml", options={"HIDDEN"})
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("msgspec")
         from ...tactile_core.simulation.scene import load_scene
 
         path = bpy.path.abspath(self.filepath)
         found = load_scene(path)[0]
-        shapes = [_shape_needs(spec) for spec in found.indenters]
-        require(*(name for needed in shapes for name in needed))
+        if any(hasattr(spec, "file") for spec in found.indenters):
+            require("trimesh", "rtree", "scipy")
         scene = context.scene
         view.hide_untouched(scene)
         axes.use_millimetres(scene)
@@ -54,10 +53,6 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
         chosen = _set_motion(scene, found, things)
         view.show(context, [chosen, skin, gel])
         self.report({"INFO"}, f"{found.name}: {found.description}")
-
-
-def _shape_needs(spec) -> tuple[str, ...]:  # noqa: ANN001
-    return ("trimesh", "rtree", "scipy") if hasattr(spec, "file") else ()
 
 
 def _set_motion(scene: bpy.types.Scene, found, things: list[bpy.types.Object]) -> bpy.types.Object:  # noqa: ANN001
@@ -102,8 +97,7 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
         self.filepath = "//scene.toml" if bpy.data.is_saved else "scene.toml"
         return super().invoke(context, event)
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("msgspec")
         from ...tactile_core.simulation.scene import write_scene
 
@@ -130,8 +124,7 @@ class TACTILE_OT_export_mitsuba(TactileOperator, ExportHelper):
     filename_ext = ".xml"
     filter_glob: bpy.props.StringProperty(default="*.xml", options={"HIDDEN"})
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("OpenEXR")
         gel = properties.needed_gel(context.scene, context.object)
         shown, moved = pictures.shown_state(gel, context.evaluated_depsgraph_get())

@@ -38,8 +38,7 @@ class TACTILE_OT_set_style(TactileOperator):
         " each sensor", default=0.0, min=0.0,
     )  # fmt: skip
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         sensors = _sensors(context)
         if self.style == "ELECTRODES" and not any(map(_counts, sensors)):
             raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
@@ -136,8 +135,7 @@ class TACTILE_OT_force_arrow(TactileOperator):
         name="Length a Newton", description="Length of an arrow of 1 N, mm", default=8.0, min=0.1, soft_max=50
     )
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         sensors = [thing for thing in _sensors(context) if "force" in thing]
         if not sensors:
             raise TactileError("Tactile", "no force", "a recording or a simulation", "Import, translate or simulate")

@@ -73,8 +73,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
             return False
         return any(properties.of_role(scene, role) for role in ("DIGIT", "BIOTAC"))
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("msgspec")
         thing, sensor = indenter_of(context), sensor_of(context)
         properties.check_own(thing)

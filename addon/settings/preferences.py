@@ -37,8 +37,7 @@ class TACTILE_OT_clear_cache(TactileOperator):
         """Ask first."""
         return context.window_manager.invoke_confirm(self, event)
 
-    def work(self, _context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, _context: bpy.types.Context) -> None:
         known = array_cache.entries()
         size = sum(map(size_of, known))
         for folder in known:

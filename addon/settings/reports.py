@@ -83,7 +83,7 @@ def reported(operator: bpy.types.Operator) -> Iterator[None]:
 
 
 class TactileOperator(bpy.types.Operator):
-    """Base of the add-on's operators: ``work`` does the work, and its errors are reported."""
+    """Base of the add-on's operators: ``_work`` does the work, and its errors are reported."""
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads plain class attributes)
 
@@ -91,7 +91,7 @@ class TactileOperator(bpy.types.Operator):
         """Do the work and report its errors; Blender calls it."""
         try:
             with reported(self):
-                return self.work(context) or {"FINISHED"}
+                return self._work(context) or {"FINISHED"}
         except Refused:
             return {"CANCELLED"}
 

@@ -28,8 +28,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
         name="Scene in Millimetres", description="Set the scene's unit to 1 mm; else its own unit is kept", default=True
     )
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         scene = context.scene
         name = self.sensor.lower()
         role = properties.role_of(name)
@@ -85,8 +84,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
             if size.slider:
                 self.layout.prop(self, size.slider)
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         require("msgspec")
         import msgspec
 
@@ -96,7 +94,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
         sizes = {}
         for size in FORMS[self.shape].sizes.values():
             if size.slider:
-                value = _as_typed(getattr(self, size.slider))
+                value = round(getattr(self, size.slider), 5)  # as typed: float32 makes 0.4 to 0.4000000059604645
                 sizes[size.field] = value if size.count == 1 else [value] * size.count
         names = {thing.name for thing in context.scene.objects}
         name = next(n for n in (self.shape, *(f"{self.shape}_{k}" for k in range(2, 1000))) if n not in names)
@@ -105,11 +103,6 @@ class TACTILE_OT_add_indenter(TactileOperator):
         thing.parent = sensor
         thing.location = (_MIDDLE * sensor.tactile.per_metre, 0, _ABOVE * sensor.tactile.per_metre)
         view.show(context, [thing], beside=[sensor])
-
-
-def _as_typed(value: float) -> float:
-    """Return a size as it was typed, from the value that Blender stores: float32 makes 0.4 to 0.4000000059604645."""
-    return round(value, 5)
 
 
 class TACTILE_OT_use_as_indenter(TactileOperator):
@@ -127,8 +120,7 @@ class TACTILE_OT_use_as_indenter(TactileOperator):
             return False
         return True
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         thing, sensor = context.object, sensor_of(context)
         indenter_objects.check_pose(thing, indenter_objects.world_axes(thing, sensor))
         about = properties.set_up(thing, "INDENTER", sensor.tactile.per_metre)

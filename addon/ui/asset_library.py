@@ -75,8 +75,7 @@ class TACTILE_OT_install_styles(TactileOperator):
     bl_label = "Write Style Library"
     bl_options = {"REGISTER"}  # noqa: RUF012 (changes preferences, not the file)
 
-    def work(self, _context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, _context: bpy.types.Context) -> None:
         install()
         self.report({"INFO"}, f'Asset library "{NAME}": {folder()}')
 

@@ -30,8 +30,7 @@ class TACTILE_OT_open_workspace(TactileOperator):
         """Return true in a window."""
         return context.window is not None and not bpy.app.background
 
-    def work(self, context: bpy.types.Context) -> None:
-        """Run the operator; ``TactileOperator`` calls this and reports its errors."""
+    def _work(self, context: bpy.types.Context) -> None:
         if NAME in bpy.data.workspaces:
             context.window.workspace = bpy.data.workspaces[NAME]
             return

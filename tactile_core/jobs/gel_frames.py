@@ -48,18 +48,13 @@ class Frames:
             yield from (self.displacement[row] * self.scale for row in rows)
 
 
-def is_scene(path: Path) -> bool:
-    """Return true if an input is a scene, which is simulated first."""
-    return path.is_dir() or path.suffix == ".toml"
-
-
 def read_frames(
     path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
     gel : whose displacement is read, or solved. Raises TactileError for anything else, or an unreadable file."""
     path = Path(path)
-    if is_scene(path):
+    if path.is_dir() or path.suffix == ".toml":  # a scene, which is simulated first
         return _of_scene(path, progress, gel)
     if not path.is_file():
         raise TactileError(path, "there is no such file", EXPECTED)

@@ -190,7 +190,8 @@ def run_stage(
     ]
     optimiser = torch.optim.AdamW(groups, lr=options.rate, fused=True)
     checkpoint.restore_optimiser(state, optimiser)
-    epochs, saved = options.epochs(stage.name), time.monotonic()
+    lengths, saved = [options.epochs(each.name) for each in STAGES], time.monotonic()
+    epochs = lengths[state.stage]
     while state.epoch < epochs:
         steps = epoch_losses(stage, model, contacts, seed, state.stage, state.epoch)
         training = train_epoch(steps, optimiser, state.epoch, epochs, options.rate)
@@ -198,16 +199,10 @@ def run_stage(
         state.log.append([stage.name, state.epoch, training, validation])
         state.epoch += 1
         text = f"{stage.name} {state.epoch}/{epochs}: loss {training:.4f}, validation {validation:.4f}"
-        progress(share_done(options, state), text)
+        progress((sum(lengths[: state.stage]) + state.epoch) / sum(lengths), text)
         if time.monotonic() - saved >= options.checkpoint_seconds and state.epoch < epochs:
             checkpoint.save(path, state, model, optimiser)
             saved = time.monotonic()
-
-
-def share_done(options: Options, state: checkpoint.State) -> float:
-    """Return the share, 0 to 1, of the epochs of all stages that a training's state has done."""
-    lengths = [options.epochs(stage.name) for stage in STAGES]
-    return (sum(lengths[: state.stage]) + state.epoch) / sum(lengths)
 
 
 def epoch_losses(

@@ -28,7 +28,8 @@ class ThinSheet:
             nodes, faces, finer = _halved(nodes, faces)
             self.prolong = finer @ self.prolong
         self.nodes, self.faces = nodes, faces
-        size = _longest_edges(nodes[faces])
+        corners = nodes[faces]
+        size = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)  # of the longest edge, m
         self.patches = np.stack([_disc(nodes, faces, size, center, radius) for center in centers], 1)
         self._prepare_matrix()
 
@@ -118,11 +119,6 @@ def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarra
     half = scipy.sparse.csr_matrix((values, (rows - len(nodes), edges.ravel())), shape=(len(edges), len(nodes)))
     finer = scipy.sparse.vstack([scipy.sparse.identity(len(nodes)), half]).tocsr()
     return finer @ nodes, cut, finer
-
-
-def _longest_edges(corners: np.ndarray) -> np.ndarray:
-    """Return the longest edge (m,) m of each triangle with corners (m, 3, 3) m."""
-    return np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
 
 
 def _disc(nodes: np.ndarray, faces: np.ndarray, size: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:

@@ -198,7 +198,8 @@ def condensed(solid: Solid) -> tuple[Half, Half]:
     try:
         loads = sensing_points_of(name, mesh).matrix(3 * len(mesh.nodes), kept_loads(solid)[0])
         if len(mesh.inner):
-            loads = sparse.hstack([loads, _volume_gradient(mesh)[:, None]], format="csc")
+            volume = FluidCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)  # m2, of the fluid, at rest
+            loads = sparse.hstack([loads, volume[:, None]], format="csc")
         half, touched = kept_nodes(solid)
         even, odd = (condense(mesh, material, mesh.surface[half], touched, loads, parity) for parity in (1, -1))
     except MemoryError as error:
@@ -274,8 +275,3 @@ def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -
     """Return the nodes (r,) with z >= 0 to solve for touchable ones (m,): these themselves, or their mirror images.
     image : (n,), each surface node's"""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))
-
-
-def _volume_gradient(mesh: HexMesh) -> np.ndarray:
-    """Gradient d(fluid volume) / d(node) (3 n_nodes,), m2, at rest."""
-    return FluidCavity(inner_faces(mesh), len(mesh.nodes)).gradient(mesh.nodes)

@@ -65,10 +65,14 @@ class Friction:
             gap, turned, off = self._look(displacement, there)
             state = Try(displacement, force.copy(), core, shift, active, iterations=iteration, slipping=slips)
             after = coulomb.Points(force, core, active, slips, normal, lean, gap, self.core_gap + core_moved, off)
-            law = coulomb.Law(self.friction, self._spare(force), GAP_TOLERANCE)
+            axial = float(force.sum(axis=0) @ self.pose.direction)
+            # What a node may bear beyond its friction's limit, N, that alternates between stick and slip.
+            spare = max(WAVERING * self.friction * abs(axial), coulomb.FORCE_NOISE)
+            law = coulomb.Law(self.friction, spare, GAP_TOLERANCE)
             found = coulomb.sort_points(after, turned, stuck_again, law)
             in_place = _in_place(found, may_be_empty=axial_force is None)
-            state.settled = in_place and (axial_force is None or self._bears(force, axial_force))
+            bears = axial_force is None or abs(axial - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
+            state.settled = in_place and bears
             if state.settled:
                 return state
             open_gap = 0.0 if in_place else coulomb.come_back(after, found, turned, left, self.friction)
@@ -126,15 +130,6 @@ class Friction:
             raise UnsolvedError("no node can carry the force")
         step = (axial_force - float(force.sum(axis=0) @ self.pose.direction) - carried) / per_step
         return min(max(float(step), -LARGEST_STEP), LARGEST_STEP)
-
-    def _bears(self, force: np.ndarray, axial_force: float) -> bool:
-        return abs(float(force.sum(axis=0) @ self.pose.direction) - axial_force) <= AXIAL_TOLERANCE * abs(axial_force)
-
-    def _spare(self, force: np.ndarray) -> float:
-        """Return the friction, N, beyond its limit that a node may bear which alternates between stick and slip.
-        force : (k, 3) N, of all nodes"""
-        axial = abs(float(force.sum(axis=0) @ self.pose.direction))
-        return max(WAVERING * self.friction * axial, coulomb.FORCE_NOISE)
 
 
 def _in_place(found: coulomb.Sorted, *, may_be_empty: bool) -> bool:

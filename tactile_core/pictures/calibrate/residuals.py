@@ -141,7 +141,9 @@ class UnitResiduals:
             return np.inf
         lights = [self._lights(bench, ball, sight) for ball, sight in zip(self.balls(x), self._sights, strict=True)]
         self._bench, self._last, self._balls_now = bench, lights, self.balls(x)
-        self._solve_gain()
+        for _ in range(GAIN_STEPS):
+            matrix, gradient = self._gain_equations()
+            self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
         numbers = parameters_of(bench.calibration)
         cost = sum(np.square(missed).sum() for missed, _ in self._missed())
         cost += (self._weight * (numbers - self._numbers) ** 2).sum()
@@ -195,11 +197,6 @@ class UnitResiduals:
             matrix = matrix + bright @ bright.swapaxes(1, 2)
             gradient = gradient + (bright @ missed[..., None])[..., 0]
         return matrix, gradient
-
-    def _solve_gain(self) -> None:
-        for _ in range(GAIN_STEPS):
-            matrix, gradient = self._gain_equations()
-            self.gain = self.gain - np.linalg.solve(matrix, gradient[..., None])[..., 0]
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return Gauss-Newton's matrix (n, n), gradient (n,) at x (n,), gain eliminated (Schur's complement): A - sum
