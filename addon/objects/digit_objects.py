@@ -53,9 +53,8 @@ def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np
     mesh = gel.evaluated_get(depsgraph).data
     vertices = mesh.vertices
     if len(vertices) != len(rest):
-        raise TactileError(
-            gel.name, f"{len(vertices)} vertices", f"the gel's {len(rest)}", "Remove modifiers that add or merge some"
-        )
+        advice = "Remove modifiers that add or merge some"
+        raise TactileError(gel.name, f"{len(vertices)} vertices", f"the gel's {len(rest)}", advice)
     nodes = np.empty(len(rest) * 3, np.float32)
     styled = mesh.attributes.get(DISPLACEMENT)
     if styled is not None:  # a style may draw the dent larger than it is

@@ -57,9 +57,8 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
     relative : (3, 3), the object's axes in those of the sensor
     """
     if np.linalg.det(relative) <= 0:
-        raise TactileError(
-            thing.name, "its scale is negative or zero", "a scale above 0", "Apply the scale (Ctrl A) and flip normals"
-        )
+        advice = "Apply the scale (Ctrl A) and flip normals"
+        raise TactileError(thing.name, "its scale is negative or zero", "a scale above 0", advice)
     if thing.tactile.spec and not np.allclose(relative, np.eye(3), atol=1e-4):
         advice = "Clear its rotation and scale, or choose Press with the Mesh as It Is in the sidebar"
         raise TactileError(thing.name, "turned or scaled", "an upright body of the sizes it was made with", advice)

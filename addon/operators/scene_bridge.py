@@ -62,9 +62,8 @@ def authored(context: bpy.types.Context) -> Authored:
     thing, sensor, scene = indenter_of(context), sensor_of(context), context.scene
     properties.check_format(thing)
     if not thing.visible_get():  # then it does not move
-        raise TactileError(
-            thing.name, "hidden, so that it stands still", "an indenter that is shown", "Show it (Alt H)"
-        )
+        advice = "Show it (Alt H)"
+        raise TactileError(thing.name, "hidden, so that it stands still", "an indenter that is shown", advice)
     if scene.frame_end <= scene.frame_start:
         raise TactileError(
             scene.name, f"frames {scene.frame_start} to {scene.frame_end}", "two frames or more",

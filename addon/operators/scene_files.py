@@ -106,9 +106,8 @@ class TACTILE_OT_export_scene(TactileOperator, ExportHelper):
             raise TactileError(path, "another file name", "scene.toml", "Name a folder for each scene")
         thing = scene_bridge.indenter_of(context)
         if thing.tactile.press_by == "HEIGHT" and not _has_force(thing):
-            raise TactileError(
-                thing.name, "no forces yet", "what a scene file holds of a press", "Simulate first, or press by force"
-            )
+            advice = "Simulate first, or press by force"
+            raise TactileError(thing.name, "no forces yet", "what a scene file holds of a press", advice)
         found = scene_bridge.authored(context)
         write_scene(path.parent, found.scene, found.meshes)
         self.report({"INFO"}, f"{path}: {len(found.scene.recording.points)} points")

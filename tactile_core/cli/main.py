@@ -16,6 +16,7 @@ from ..files.installed import advice
 from ..files.version import __version__
 from .terminal import complain, discard_output, flush, say
 from .verbs import VERBS
+from .verbs.common import NOTHING
 
 NAMES = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 
@@ -143,5 +144,5 @@ def _parser() -> argparse.ArgumentParser:
             allow_abbrev=False,  # of batch, --frames would mean --frames-apart
         )  # fmt: skip
         verb.arguments(sub)
-        sub.set_defaults(run=verb.run, leaves=verb.LEAVES, parser=sub)
+        sub.set_defaults(run=verb.run, leaves=getattr(verb, "LEAVES", NOTHING), parser=sub)
     return parser

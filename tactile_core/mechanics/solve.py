@@ -99,9 +99,8 @@ def solve_path(
 
 def _first_touch(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
     if not isinstance(place, Placement):
-        raise TactileError(
-            "solve, place", f"{place!r:.80}", "a tactile.Placement, or a Pose", "Placement(x=..., z=...)"
-        )
+        advice = "Placement(x=..., z=...)"
+        raise TactileError("solve, place", f"{place!r:.80}", "a tactile.Placement, or a Pose", advice)
     # the part of the pad that unrolls onto it can be touched
     gel = sensor if sensors.is_gel(sensor) else sensors.TARGET
     if not on_gel(place.x, place.z, sensor=gel):

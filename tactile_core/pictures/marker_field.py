@@ -31,9 +31,8 @@ class MarkerField:
         self._x, self._z = (place.ravel() + steps[:, k, None] for k, place in enumerate((x, z)))
         if not self._mapper.covers(self._x, self._z):
             found = f"{markers.rows} x {markers.columns} dots, {1e3 * markers.pitch:g} mm apart"
-            raise TactileError(
-                "calibration, markers", found, "a grid on the even part of the gel", "Take fewer, or closer"
-            )
+            advice = "Take fewer, or closer"
+            raise TactileError("calibration, markers", found, "a grid on the even part of the gel", advice)
         still = np.zeros_like(self._mapper.surface.rest)
         self._dome = self._mapper.follow(still, self._x.ravel(), self._z.ravel())[2]  # of the public mesh
         self.rest = self._in_picture(still)[0]

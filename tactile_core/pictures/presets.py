@@ -54,19 +54,13 @@ class Preset:
 
 FAST = "fast"  # light.Lamps: numpy alone
 STANDARD = Preset(
-    "standard",
-    "4 points an LED, one coarse bounce",
-    points=4,
-    bounce_step=8,
+    "standard", "4 points an LED, one coarse bounce", points=4, bounce_step=8,
     gather=Gather(step=8, azimuths=12, growth=0.3, bounces=1),
-)
+)  # fmt: skip
 QUALITY = Preset(
-    "quality",
-    "6 points an LED, one bounce",
-    points=6,
-    bounce_step=4,
+    "quality", "6 points an LED, one bounce", points=6, bounce_step=4,
     gather=Gather(step=4, azimuths=12, growth=0.3, bounces=1),
-)
+)  # fmt: skip
 REFERENCE = Preset(
     "reference", "Mitsuba's path integrator, 256 paths a pixel, four bounces", points=8, spacing=SPACING / 2, paths=4,
     passes=64, gather=Gather(step=2, azimuths=32, growth=0.1, bounces=4), window=True,

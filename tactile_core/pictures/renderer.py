@@ -173,9 +173,8 @@ class Renderer:
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
         if self.dots is not None and marks is None:
             found = "a picture of heights alone, which do not say where the dots have moved"
-            raise TactileError(
-                "markers", found, "the gel's displacement", "Call Renderer.render, or leave [markers] out"
-            )
+            advice = "Call Renderer.render, or leave [markers] out"
+            raise TactileError("markers", found, "the gel's displacement", advice)
         if noise is None and marks is None and available() and radiance.dtype == self.rest_radiance.dtype == np.float32:
             now, at_rest = np.moveaxis(radiance, -1, 0), np.moveaxis(self.rest_radiance, -1, 0)
             picture, rows = np.empty(self.background.shape, np.uint8), (len(self.background), -1)

@@ -163,9 +163,8 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
                 else:
                     _check_packing(path, member)
                     if member.filename[:-4] in shapes:
-                        raise TactileError(
-                            f"{path}, {member.filename}", "there twice", "each array once", "Save it again"
-                        )
+                        advice = "Save it again"
+                        raise TactileError(f"{path}, {member.filename}", "there twice", "each array once", advice)
                     with archive.open(member) as stream:
                         shapes[member.filename[:-4]] = _npy_header(stream)
 

@@ -218,9 +218,8 @@ def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
         expected = f"(frames, {electrode_count(sensor)})"
         raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", expected)
     if len(electrodes) == 0:
-        raise TactileError(
-            path, "no data rows", "at least one frame", "Check that the recording was written to its end"
-        )
+        advice = "Check that the recording was written to its end"
+        raise TactileError(path, "no data rows", "at least one frame", advice)
     if len(electrodes) > MAX_FRAMES:
         raise TactileError(path, f"{len(electrodes):,} frames", f"at most {MAX_FRAMES:,}", "Split the recording")
     check_electrodes(path, electrodes.shape[1], "electrodes", sensor)

@@ -160,9 +160,8 @@ def _counts(path: Path, name: str, value: np.ndarray, shape: tuple[int, ...]) ->
     _check_shape(path, name, value, shape)
     rounded = np.rint(np.asarray(value, float))
     if not np.all((rounded >= 0) & (rounded <= COUNT_MAX)):  # false for NaN too
-        raise TactileError(
-            f"{path}, {name}", "values outside 12 bits", f"counts 0..{COUNT_MAX}", "Clip as the sensor does"
-        )
+        advice = "Clip as the sensor does"
+        raise TactileError(f"{path}, {name}", "values outside 12 bits", f"counts 0..{COUNT_MAX}", advice)
     return rounded.astype(np.int16)
 
 

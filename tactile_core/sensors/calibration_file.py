@@ -44,9 +44,8 @@ def load_calibration(
     file = Path(path_text(path, "load_calibration, path"))
     found = read_toml(file, lambda content: _calibration(content, file.parent), EXPECTED, ADVICE)
     if sensor not in (None, found.camera.sensor):
-        raise TactileError(
-            f"{os.fspath(path)}, sensor", repr(found.camera.sensor), repr(sensor), "Name one of that gel"
-        )
+        advice = "Name one of that gel"
+        raise TactileError(f"{os.fspath(path)}, sensor", repr(found.camera.sensor), repr(sensor), advice)
     return found
 
 

@@ -120,9 +120,8 @@ def _read_sp(path: Path, rows: list[list[str]]) -> Places:
             raise TactileError(f"{path}, row {at}", ",".join(row), ",".join(SP_COLUMNS)) from error
     sensing, fed = ([places[n] for n in sorted(places, key=abs) if n * sign > 0] for sign in (1, -1))
     if sorted(places) != [*range(-len(fed), 0), *range(1, len(sensing) + 1)] or not (sensing and fed):
-        raise TactileError(
-            path, "numbers that leave some out", "1, 2, ... of those read, -1, -2, ... of the excitation"
-        )
+        expected = "1, 2, ... of those read, -1, -2, ... of the excitation"
+        raise TactileError(path, "numbers that leave some out", expected)
     found = Places(np.array(sensing), np.full(len(sensing), np.nan), np.array(fed))
     if not (np.isfinite(found.sensing).all() and np.isfinite(found.excitation).all()):
         raise TactileError(path, "a place that is no number", "finite places, mm")

@@ -32,9 +32,8 @@ def read_radii(path: Path) -> np.ndarray:
     if not there[between].all():
         station, column = (int(each[0]) for each in np.nonzero(~there[between]))
         where = f"{path}, x_mm {stations[whole[0] + station, 0, 0]:g}, theta_deg {angles[column]:g}"
-        raise TactileError(
-            where, "an open profile: no outer radius", "a closed skin between its first and last whole station"
-        )
+        expected = "a closed skin between its first and last whole station"
+        raise TactileError(where, "an open profile: no outer radius", expected)
     return stations
 
 

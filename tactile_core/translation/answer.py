@@ -87,7 +87,6 @@ def parse_shift(text: str) -> tuple[float, float]:
     x, z = (float(part) for part in found.groups()) if found else (math.inf, math.inf)
     if max(abs(x), abs(z)) > FARTHEST:
         expected = f"X,Z in mm, each from -{FARTHEST:g} to {FARTHEST:g}, such as 4,-1.5"
-        raise TactileError(
-            "--mount-shift", repr(text), expected, "Give it that way; for a negative X --mount-shift=-4,0"
-        )
+        advice = "Give it that way; for a negative X --mount-shift=-4,0"
+        raise TactileError("--mount-shift", repr(text), expected, advice)
     return x, z

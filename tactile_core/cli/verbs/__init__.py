@@ -1,7 +1,8 @@
 """The verbs of ``tactile``, one file each.
 
-A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what an interruption leaves behind), ``arguments``
-(parser) and ``run`` (options -> exit status). It imports its rooms in ``run``, so that help costs nothing."""
+A verb is a module with BRIEF, TEXT and EPILOG (its help), LEAVES (what an interruption leaves behind, if not
+``common.NOTHING``), ``arguments`` (parser) and ``run`` (options -> exit status). It imports its rooms in ``run``, so
+that help costs nothing."""
 
 from importlib import import_module
 

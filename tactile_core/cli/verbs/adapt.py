@@ -7,7 +7,7 @@ from shlex import quote
 
 from ...errors import TactileError
 from ..terminal import next_step, say, tell
-from .common import NOTHING, add, columns_of
+from .common import add, columns_of
 
 BRIEF = "fit rest, gains and offsets of a BioTac unit to its recordings"
 TEXT = """\
@@ -33,7 +33,6 @@ example:
   tactile convert day2/touch.csv --out results --sensor sensor.toml
   tactile adapt pressed.csv --rest untouched.csv --force force.csv --out sensor.toml
   tactile adapt day1/*.csv --force fx,fy,fz --out sensor.toml"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

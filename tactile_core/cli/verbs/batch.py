@@ -50,9 +50,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.set_defaults(keep="latent,displacement")
     verb.add_argument("--shard-frames", type=int, metavar="N", help="frames in a shard (default: 1000)")
     add(verb, *ANSWER)
-    verb.add_argument(
-        "--preset", choices=PRESETS, help="preset of the pictures, as of `tactile render` (default: fast)"
-    )
+    about = "preset of the pictures, as of `tactile render` (default: fast)"
+    verb.add_argument("--preset", choices=PRESETS, help=about)
     add(verb, *PREPARE)
     engine.place_arguments(verb)
     verb.add_argument("--array", metavar="I/N", help="do part I of N alone (from 0), others do the rest")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import bar, next_step, say, tell
-from .common import NOTHING, add
+from .common import add
 
 if TYPE_CHECKING:
     from ...pictures.calibrate.evaluate import Evaluation
@@ -42,7 +42,6 @@ examples:
   tactile calibrate presses.mp4 --ball-diameter 6 --out unit.toml
   tactile calibrate small/ large/ --ball-diameter 4,6 --out unit.toml
   tactile calibrate --test unit.toml more_presses/ --json trial.json"""
-LEAVES = NOTHING
 TRIED = ("fast", "standard", "quality")  # presets
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, complain, next_step, say, tell
-from .common import ANSWER, NOTHING, PREPARE, UNIT, add, prepare_words
+from .common import ANSWER, PREPARE, UNIT, add, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.convert import Options, ToolOptions
@@ -49,14 +49,12 @@ Words of --keep, beside what frames.h5 always holds:
   marker_motion  motion, px, of dots printed on the gel, for a --calibration with [markers]
 
 Size of a 700-frame result, measured: {SIZES}."""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
-    verb.add_argument(
-        "recordings", nargs="+", metavar="RECORDING", help="CSV, HDF5, NPZ, MAT, JSON or bag files, in any known layout"
-    )
+    about = "CSV, HDF5, NPZ, MAT, JSON or bag files, in any known layout"
+    verb.add_argument("recordings", nargs="+", metavar="RECORDING", help=about)
     verb.add_argument("--out", required=True, metavar="DIR", help="folder for the results; may hold other results")
     verb.add_argument(
         "--frames",
@@ -81,9 +79,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     add(verb, "--object-reflectance", whose="what touches the gel (default: the calibration's)")
     add(verb, *ANSWER)
     add(verb, "--error", bound="levels of a picture, such as 0.6levels")
-    verb.add_argument(
-        "--plan", action="store_true", help="print what would be built, and its time, memory and disk, and stop"
-    )
+    about = "print what would be built, and its time, memory and disk, and stop"
+    verb.add_argument("--plan", action="store_true", help=about)
     add(verb, "--progress")
 
 

@@ -15,7 +15,6 @@ from concurrent.futures import ThreadPoolExecutor
 from ...files.installed import advice, checkout
 from ...files.version import __version__
 from ..terminal import tell
-from .common import NOTHING
 
 BRIEF = "check which libraries work here, and how to get more"
 TEXT = """\
@@ -24,7 +23,6 @@ it. Each library is tried in a process of its own, so that a broken one breaks n
 EPILOG = """\
 example:
   tactile doctor"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

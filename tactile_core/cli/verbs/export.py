@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from ..terminal import bar, next_step, say, tell
-from .common import NOTHING, add
+from .common import add
 
 BRIEF = "write a finished batch job as NPZ, PNG, OpenEXR or LeRobot data"
 TEXT = """\
@@ -25,7 +25,6 @@ what is not known is 0, and labels are the strings labels.NAME."""
 EPILOG = """\
 example:
   tactile export job --to lerobot --out dataset"""
-LEAVES = NOTHING
 LAYOUTS = ("npz", "png", "imagefolder", "exr", "lerobot", "lerobot21")
 
 

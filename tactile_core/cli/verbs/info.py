@@ -7,7 +7,7 @@ import os
 
 from ...errors import TactileError
 from ..terminal import complain, say, tell
-from .common import NOTHING, PREPARE, add, prepare_words
+from .common import PREPARE, add, prepare_words
 
 BRIEF = "describe recordings, or a sensor"
 TEXT = """\
@@ -26,16 +26,14 @@ examples:
   tactile info own.csv --columns map.toml
   tactile info slip.csv --sensor rest.toml
   tactile info --sensor gelsight_mini"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("recordings", nargs="*", metavar="FILE", help="recordings, in any known layout")
     add(verb, *PREPARE)
-    verb.add_argument(
-        "--sensor", metavar="FILE|NAME", help="rest and gains of a unit, from `tactile adapt`; or a sensor's name"
-    )
+    about = "rest and gains of a unit, from `tactile adapt`; or a sensor's name"
+    verb.add_argument("--sensor", metavar="FILE|NAME", help=about)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -68,9 +66,8 @@ def _tell_sensor(name: str | None) -> int:
     from ...sensors.about import about
 
     if name is None:
-        raise TactileError(
-            "FILE", "missing", "recordings, or --sensor NAME alone", "`tactile info --help` has examples"
-        )
+        advice = "`tactile info --help` has examples"
+        raise TactileError("FILE", "missing", "recordings, or --sensor NAME alone", advice)
     tell(about(name))
     return 0
 

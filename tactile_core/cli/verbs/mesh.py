@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from ...errors import TactileError
 from ..terminal import next_step, say, tell
-from .common import NOTHING
 
 if TYPE_CHECKING:
     from ...geometry.indenters import Indenter
@@ -32,7 +31,6 @@ examples:
   tactile mesh digit --press sphere --diameter 7 --depth-mm 0.6 --tier full --out contact.vtu
   tactile mesh biotac --press scenes/press_sphere --indenter sphere_14mm --force-n 0.5 --out contact.ply"""
 MOST_TILT = 45.0  # degrees off the normal, as in scenes
-LEAVES = NOTHING
 TIERS = ("fast", "full", "reference")
 _EDGE_MM = 0.5  # of a cylinder's rim, as in scenes
 
@@ -45,9 +43,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     frame.add_argument("--frames", metavar="FILE.h5", help="frames.h5 of `tactile convert`, or a simulated recording")
     frame.add_argument("--frame", type=int, metavar="N", help="which one, by its number in the recording, from 0")
     press = verb.add_argument_group("deformed by a press")
-    press.add_argument(
-        "--press", metavar="WHAT", help="sphere or cylinder, of --diameter; or a scene, for its indenter"
-    )
+    about = "sphere or cylinder, of --diameter; or a scene, for its indenter"
+    press.add_argument("--press", metavar="WHAT", help=about)
     press.add_argument("--diameter", type=float, metavar="MM", help="of the sphere or cylinder")
     press.add_argument("--indenter", metavar="NAME", help="which indenter of the scene (default: its first)")
     press.add_argument("--depth-mm", type=float, metavar="MM", help="from first touch")
@@ -106,9 +103,8 @@ def _check(options: argparse.Namespace) -> None:
     if not abs(options.tilt_deg) <= MOST_TILT:  # nan, too
         raise TactileError("--tilt-deg", f"{options.tilt_deg:g}", f"-{MOST_TILT:g} to {MOST_TILT:g}, as in scenes")
     if options.press and (options.depth_mm is None) == (options.force_n is None):
-        raise TactileError(
-            "--press", "both or none of --depth-mm and --force-n", "one of them", "Say how far or how hard"
-        )
+        advice = "Say how far or how hard"
+        raise TactileError("--press", "both or none of --depth-mm and --force-n", "one of them", advice)
 
 
 def _indenter(options: argparse.Namespace) -> Indenter:

@@ -30,17 +30,15 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scene", metavar="SCENE", help="scene.toml: indenters, ranges of places, angles, depths")
     verb.add_argument("--count", type=int, required=True, metavar="N", help="number of paired contacts")
     add(verb, "--seed", same="file")
-    verb.add_argument(
-        "--out", required=True, metavar="FILE", help="HDF5 file to write; FILE.card.json beside it describes it"
-    )
+    about = "HDF5 file to write; FILE.card.json beside it describes it"
+    verb.add_argument("--out", required=True, metavar="FILE", help=about)
     for word, role, sensor, about in (
         ("--from", "source", SOURCE, "sensor translated from (default: %(default)s)"),
         ("--to", "target", TARGET, "gel to translate to (default: %(default)s); yours is a folder in $TACTILE_SENSORS"),
     ):
         verb.add_argument(word, dest=role, default=sensor, metavar="SENSOR", help=about)
-    verb.add_argument(
-        "--keep", metavar="WORDS", help="traction: the force field on both surfaces, too, Pa on each node, float32"
-    )
+    about = "traction: the force field on both surfaces, too, Pa on each node, float32"
+    verb.add_argument("--keep", metavar="WORDS", help=about)
     engine.parts_arguments(verb)
     add(verb, "--progress")
 

@@ -10,7 +10,7 @@ from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, next_step, say, tell
 from . import engine
-from .common import NOTHING, PRESETS, add
+from .common import PRESETS, add
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,7 +52,6 @@ examples:
   tactile render scenes/press --out pictures --error 0.6levels
   tactile render scenes/press --out pictures --gel gelsight_mini"""
 SIMULATE_FIRST = "Simulate the scene first, with --error, and render that"
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -68,9 +67,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--exr", action="store_true", help="write OpenEXR beside PNG")
     verb.add_argument("--scene-out", metavar="FILE.xml", help="write the first frame as a scene of Mitsuba's, too")
     verb.add_argument("--noise", action="store_true", help="add the unit's camera noise to PNG pictures")
-    verb.add_argument(
-        "--variant", choices=("llvm", "scalar"), help="Mitsuba's variant (default: the faster that works)"
-    )
+    about = "Mitsuba's variant (default: the faster that works)"
+    verb.add_argument("--variant", choices=("llvm", "scalar"), help=about)
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
     engine.parts_arguments(verb)
     add(verb, "--progress")

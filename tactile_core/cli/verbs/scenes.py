@@ -7,7 +7,6 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from ..terminal import next_step, tell
-from .common import NOTHING
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,7 +20,6 @@ examples:
   tactile scenes
   tactile scenes copy                      all of them, into the folder scenes
   tactile scenes copy press --out mine     one, as mine/press"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ..terminal import agree, bar, duration, next_step, say, tell
 from . import engine
-from .common import NOTHING, add, check_seed
+from .common import add, check_seed
 
 if TYPE_CHECKING:
     from ...jobs.plan import Plan
@@ -36,7 +36,6 @@ examples:
   tactile simulate scenes/press --error 50um --out press.h5
   tactile simulate scenes/press --out press.h5 --plan                     what it would build and cost; nothing is run
   tactile simulate scenes/press_roll_slide --grid force_n=0.2:1:5 --grid recording.tilt_deg=0,10 --out many"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:
@@ -52,9 +51,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " displacement_NAME and traction_NAME of any other sensor, too",
     )
     add(verb, "--error", bound="um of the surface, such as 50um")
-    verb.add_argument(
-        "--yes", action="store_true", help="begin at once, however long the tier that --error picks will take"
-    )
+    about = "begin at once, however long the tier that --error picks will take"
+    verb.add_argument("--yes", action="store_true", help=about)
     verb.add_argument(
         "--grid",
         action="append",

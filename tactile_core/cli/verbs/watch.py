@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import say, tell
-from .common import NOTHING, UNIT, add, columns_of
+from .common import UNIT, add, columns_of
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +34,6 @@ examples:
   tactile watch touch.csv --play --tare 0:50 --sensor sensor.toml
   tactile watch touch.csv --serve 7311 --camera 0
   tactile watch --rosbag-play touch.bag --speed 2"""
-LEAVES = NOTHING
 
 
 def arguments(verb: argparse.ArgumentParser) -> None:

@@ -164,9 +164,8 @@ def _check_solid(where: str | os.PathLike, mesh: Any) -> None:
         sides = np.sort(mesh.edges, axis=1)
         count = np.unique(sides, axis=0, return_counts=True)[1]
         found = f"not closed: {(count != 2).sum()} edges do not belong to exactly two triangles"
-        raise TactileError(
-            where, found, "a closed surface", "Fill its holes, for example in Blender's 3D-Print Toolbox"
-        )
+        advice = "Fill its holes, for example in Blender's 3D-Print Toolbox"
+        raise TactileError(where, found, "a closed surface", advice)
     if not mesh.is_winding_consistent:
         raise TactileError(where, "neighbouring triangles face opposite ways", "one winding", "Recalculate its normals")
     with np.errstate(invalid="ignore", divide="ignore"):  # the centre of mass of nothing, which is not used

@@ -126,9 +126,8 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
     by_name = {press.name: press for press in photographs.presses}
     for name in names:
         if name not in by_name:
-            raise TactileError(
-                photographs.folder / name, "shows no press or is absent", f"some of {', '.join(by_name)}"
-            )
+            expected = f"some of {', '.join(by_name)}"
+            raise TactileError(photographs.folder / name, "shows no press or is absent", expected)
     return dataclasses.replace(photographs, presses=tuple(by_name[name] for name in names))
 
 

@@ -83,9 +83,8 @@ def _topics(bag: Bag, chosen: Chosen) -> tuple[list[Topic], int | None]:
     if not chosen.topic:
         return bag.topics, chosen.finger
     held = listed([topic.name for topic in bag.topics] + list(bag.others))
-    raise TactileError(
-        bag.path, f"no BioTac in a topic {chosen.topic!r}", f"one of {held}", "Name it as path#topic/finger"
-    )
+    advice = "Name it as path#topic/finger"
+    raise TactileError(bag.path, f"no BioTac in a topic {chosen.topic!r}", f"one of {held}", advice)
 
 
 def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:

@@ -38,9 +38,8 @@ def read(store: Store, finger: int) -> Recording:
         found = "fingers of " + " and ".join(f"{shape[-1] if shape else 0}" for shape in lengths.values()) + " frames"
         raise TactileError(store.path, found, "as many of each finger", "Export it again")
     if lengths[finger][-1] > MAX_FRAMES:
-        raise TactileError(
-            store.path, f"{lengths[finger][-1]:,} frames", f"at most {MAX_FRAMES:,}", "Split the recording"
-        )
+        advice = "Split the recording"
+        raise TactileError(store.path, f"{lengths[finger][-1]:,} frames", f"at most {MAX_FRAMES:,}", advice)
     electrodes = store.array(name, (ELECTRODES, None)).T
     frames = len(electrodes)
     store.taken.update(f"F{other}{each}" for other in lengths for each in ("Electrodes", "pac", "pdc", "tac", "tdc")

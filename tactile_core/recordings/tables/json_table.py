@@ -125,9 +125,8 @@ def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dic
     names = list(dict.fromkeys(name for each in begin[:LOOKED_AT] for name in each))
     if not names or len(names) > MAX_COLUMNS:
         found = f"{len(names):,} fields" if names else "no records"
-        raise TactileError(
-            path, found, f"records of up to {MAX_COLUMNS:,} fields", "Export the frames of the recording"
-        )
+        advice = "Export the frames of the recording"
+        raise TactileError(path, found, f"records of up to {MAX_COLUMNS:,} fields", advice)
     rows = [[_text(each.get(name)) for name in names] for each in begin[:LOOKED_AT]]
     cells, values = Cells(names, rows), array("d")
 

@@ -237,9 +237,8 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
         lines = lines[:-1]
     kept = [(number, line) for number, line in enumerate(lines, start=first + 1) if is_row(line, header)]
     if not kept:
-        raise TactileError(
-            path, "a header without data rows", "at least one frame", "Check that the recording was written to its end"
-        )
+        advice = "Check that the recording was written to its end"
+        raise TactileError(path, "a header without data rows", "at least one frame", advice)
     if len(kept) > MAX_FRAMES:
         raise TactileError(path, f"{len(kept):,} data rows", f"at most {MAX_FRAMES:,}", "Split the recording")
     problems: list[Problem] = []
