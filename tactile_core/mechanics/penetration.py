@@ -73,13 +73,13 @@ def check_follows(
     nodes.
     where : begins the error's text; grid : (rows, columns, 3) m, the nodes; closed : true if its last column joins the
         first
-    normals : (k, 3), outward, of the indenter at the nodes that carry force
+    normals : (k, 3), outward, of the indenter at the k nodes that carry force; of none where a body has passed them all
     behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back"""
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
         raise _let_through(where, found)
     foremost = pose.support(indenter, pose.direction)[None]
-    if np.abs(pose.curvature(indenter, foremost)).max() * BLUNT < 1:
+    if len(normals) and np.abs(pose.curvature(indenter, foremost)).max() * BLUNT < 1:
         return
     below = penetration(grid, indenter, pose, closed=closed)
     if below > max(_LEAST, _SHARE * depth):

@@ -309,6 +309,11 @@ def test_a_tip_that_sinks_in_between_nodes_is_told_from_a_solver_that_fails():
     assert "too sharp" in FLAGS
 
 
+def test_a_thin_plate_that_has_passed_the_nodes_is_not_taken_for_no_contact():
+    gel = Gel("digit", Box((6e-3, 6e-3, 0.1e-3), 0.04e-3))
+    assert gel.press(gel.touching(-3e-3, 0.05e-3, 0.7e-3)).flags[-2:] == ("unsolved", "too sharp")
+
+
 def test_meshes_and_sensors_that_cannot_be_are_refused():
     cut = trimesh.creation.icosphere(2, 3e-3)
     cut.update_faces(np.arange(len(cut.faces)) > 0)
