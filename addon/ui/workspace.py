@@ -66,7 +66,7 @@ def _bare_timeline(windows: bpy.types.WindowManager, window: bpy.types.Window) -
 
 
 def arrange(window: bpy.types.Window) -> None:
-    """Let a window's screen hold a 3D view, the picture over properties to its right, and a timeline below."""
+    """Rearrange a window's screen: a 3D view, the picture over properties to its right, a timeline below, no more."""
     kept = max(window.screen.areas, key=lambda area: area.width * area.height)
     kept.ui_type = "VIEW_3D"
     for area in [each for each in window.screen.areas if each != kept]:

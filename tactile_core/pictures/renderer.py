@@ -36,7 +36,7 @@ MOST_BELOW = 1.4e-3
 
 
 class Renderer:
-    """Camera pictures of one DIGIT by one preset; the scene and the picture at rest are made once.
+    """Camera pictures of one unit by one preset; the scene and the picture at rest are made once.
 
     calibration : the unit's camera and lights, of ``load_calibration``, or their file; None for the unit that ships
     preset : ``fast`` (numpy alone, 8 ms per picture), ``standard``, ``quality`` or ``reference`` (Mitsuba)
@@ -125,7 +125,7 @@ class Renderer:
 
     def render(self, displacement: np.ndarray) -> np.ndarray:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
-        displacement : of the DIGIT surface's 2,867 nodes, as ``translate`` and ``solve`` return it
+        displacement : of its gel's nodes (DIGIT: 2,867), as ``translate`` and ``solve`` return it
         Raises TactileError for another shape or values that are not finite."""
         if np.ndim(displacement) != 3:
             return self(gel_mapper(self.camera)(displacement), self.marks(displacement))

@@ -112,7 +112,7 @@ def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: in
 
 
 def in_blocks(function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Apply a function to frames x (T, *shape) in padded blocks, or to one frame alone; raises TactileError, which
+    """Apply a function to frames x (T, *shape) in padded blocks, unpadded where T is 1; raises TactileError, which
     names the network by `name`, if x has another shape."""
     x = np.asarray(x, np.float32)
     if x.shape[1:] != shape:

@@ -178,7 +178,7 @@ def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
 def _messages(
     bag: Bag, topic: Topic, start: int | None = None
 ) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
-    """Yield stamp (unix s; the bag's if it has none) and sensors' `channels` of each message from `start` ns on."""
+    """Yield stamp (unix s; else the bag's) and each sensor's (others, electrodes) of messages from `start` ns on."""
     known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
         for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):

@@ -45,7 +45,7 @@ class ColumnMap:
     value: str = ""
 
     def channels(self) -> set[str]:
-        """Return the names of the sensor's channels, in lower case."""
+        """Return the file's own names of the mapped channels, in lower case."""
         return {name.lower() for name in (*self.electrodes, self.pdc, self.tac, self.tdc) if name}
 
     def names(self) -> list[str]:
