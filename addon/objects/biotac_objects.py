@@ -1,4 +1,4 @@
-"""A sensor of skin and fluid in the scene, as a BioTac: skin, core and electrodes in a collection of their own."""
+"""A sensor of skin and fluid in the scene, as a BioTac: its skin and core, in a collection of their own."""
 
 from __future__ import annotations
 

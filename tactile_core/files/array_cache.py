@@ -55,7 +55,7 @@ def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> 
 
 
 def claim(folder: Path, room: str) -> None:
-    """Make an entry's folder and try to write in it before its arrays are computed; room and errors as `store`."""
+    """Make an entry's folder and try it before its arrays are computed; room, in words, and errors as `store`."""
     with atomic.writing(folder, f"a folder for {room}", "Name one in TACTILE_CACHE"):
         folder.mkdir(parents=True, exist_ok=True)
         atomic.probe(folder)

@@ -170,7 +170,8 @@ def plan(
     seed: int = 0,
     keep: Sequence[str] = DEFAULT,
 ) -> Job[Simulate]:
-    """Return the job: the [recording] of a scene for each combination of the values in ``grid``.
+    """Return the job: the [recording] of a scene for each combination of the values in ``grid``, words
+    such as ``force_n=0.2:2:5``.
     seed : of the first recording, each next one has one more; keep : words of ``scene_recording.outputs``
     Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)

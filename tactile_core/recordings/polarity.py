@@ -72,7 +72,7 @@ class Polarity:
 
     @property
     def doubt(self) -> Flag | int:
-        """Return the flag of every frame where the polarity is in doubt, else 0."""
+        """Return the flag that all frames get if the polarity is in doubt, else 0."""
         flags = {Basis.ASSUMED: Flag.POLARITY_ASSUMED, Basis.CONTRADICTED: Flag.POLARITY_DOUBTED}
         return flags.get(self.basis, 0)
 

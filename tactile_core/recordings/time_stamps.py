@@ -30,7 +30,7 @@ def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.nd
 
 
 def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
-    """Return time (T,) s from the first frame, unix start time (s, 0.0 if unknown) and warnings, from stamps (T,)."""
+    """Return time (T,) s from the first frame, unix start (s; 0.0: unknown), warnings; stamps (T,) in s to ns."""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
     warnings, missing = [], int(np.isnan(stamps).sum())
     if missing == len(stamps):

@@ -44,7 +44,7 @@ class Known(NamedTuple):
 
 
 def mirrored(field: np.ndarray) -> np.ndarray:
-    """Mirror a field on the grid (..., g, 3) across z = 0."""
+    """Mirror fields (..., LINES * LINES, 3) across z = 0."""
     grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
     return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
 

@@ -1,4 +1,4 @@
-"""Measure a method: CPU time, peak memory, error beside the baseline."""
+"""Rows of a benchmarked method: CPU time, peak memory, error beside that of doing nothing."""
 
 from __future__ import annotations
 
