@@ -3,7 +3,7 @@
 import bpy
 
 from ...tactile_core.errors import TactileError
-from ...tactile_core.geometry.indenters.scene_form import forms
+from ...tactile_core.geometry.indenters.indenter import forms
 from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
 from ..operators import view
 from ..operators.scene_bridge import sensor_of

@@ -1,12 +1,17 @@
-"""Advice on how to install an extra, by how this package was installed; its name is not on the package index."""
+"""Advice on how to install an extra, by how this package was installed (its name is not on the package index), and the
+modules that a package holds: a format, layout, job or indenter is one file there."""
 
 from __future__ import annotations
 
+import importlib
+import pkgutil
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 
 PACKAGE = "tactile-core"
 
@@ -60,3 +65,10 @@ def libraries(extra: str) -> list[str]:
         nested = re.fullmatch(rf"{PACKAGE}\[(.+)\]", name.strip())
         names += [each for part in nested[1].split(",") for each in libraries(part)] if nested else [name.strip()]
     return [f'"{name}"' if re.search(r"[<>=\[]", name) and not name.startswith('"') else name for name in names]
+
+
+@cache
+def modules_of(package: str) -> dict[str, ModuleType]:
+    """Import all modules of a package, given by its full name; return name -> module, in the order of names."""
+    names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
+    return {name: importlib.import_module(f"{package}.{name}") for name in names}

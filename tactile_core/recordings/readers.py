@@ -11,7 +11,7 @@ from functools import cache, partial
 from types import ModuleType
 
 from ..errors import TactileError, path_text
-from ..files.registry import modules_of
+from ..files.installed import modules_of
 from ..files.short_text import shown
 from ..sensors import SOURCE, electrode_count, title
 from . import formats

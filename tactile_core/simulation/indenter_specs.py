@@ -17,7 +17,7 @@ from msgspec import Meta
 from ..errors import TactileError
 from ..files import outside
 from ..geometry.indenters import Indenter, MeshIndenter, Pose, Several
-from ..geometry.indenters.scene_form import SceneForm, forms
+from ..geometry.indenters.indenter import SceneForm, forms
 
 Positive = Annotated[float, Meta(gt=0)]
 NotNegative = Annotated[float, Meta(ge=0)]

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...files.compiled import Loop
-from .indenter import NEAREST, Indenter, check_length, contiguous, lengths, sign_of
-from .scene_form import SceneForm, Size
+from .indenter import NEAREST, Indenter, SceneForm, Size, check_length, contiguous, lengths, sign_of
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,9 +9,8 @@ import numpy as np
 
 from ...errors import TactileError
 from .box import Box
-from .indenter import NEAREST, Hull, Indenter, Pose, Surface, check_length
+from .indenter import NEAREST, Hull, Indenter, Pose, SceneForm, Size, Surface, check_length
 from .ring import circle_curvature, circle_distance
-from .scene_form import SceneForm, Size
 from .several import Several, joined
 from .sphere import Sphere
 

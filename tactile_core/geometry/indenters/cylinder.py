@@ -11,8 +11,7 @@ import numpy as np
 from ...errors import TactileError
 from ...files.compiled import Loop
 from . import extrusion
-from .indenter import NEAREST, SQUARE, Indenter, check_length, contiguous, sign_of
-from .scene_form import SceneForm, Size
+from .indenter import NEAREST, SQUARE, Indenter, SceneForm, Size, check_length, contiguous, sign_of
 
 _ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # axis -> axes across it; own axes from an extrusion's
 

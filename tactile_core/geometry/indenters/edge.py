@@ -8,8 +8,7 @@ import numpy as np
 
 from ...errors import TactileError, finite_number
 from . import extrusion
-from .indenter import NEAREST, SQUARE, Indenter, check_length, sign_of
-from .scene_form import SceneForm, Size
+from .indenter import NEAREST, SQUARE, Indenter, SceneForm, Size, check_length, sign_of
 
 _ACROSS, _OWN = [1, 2], [2, 0, 1]  # own axes across; own axes from an extrusion's, which are y, z, x
 _ANGLES = np.deg2rad([10, 170])  # a sharper wedge is a blade, a blunter one a plane

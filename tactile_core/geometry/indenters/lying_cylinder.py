@@ -7,8 +7,7 @@ from typing import ClassVar
 
 from ...errors import TactileError
 from .cylinder import Cylinder
-from .indenter import check_length
-from .scene_form import SceneForm, Size
+from .indenter import SceneForm, Size, check_length
 
 
 @dataclasses.dataclass(frozen=True)

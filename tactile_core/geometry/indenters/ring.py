@@ -8,8 +8,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...files.compiled import Loop
-from .indenter import NEAREST, SQUARE, Hull, Indenter, Surface, check_length, contiguous
-from .scene_form import SceneForm, Size
+from .indenter import NEAREST, SQUARE, Hull, Indenter, SceneForm, Size, Surface, check_length, contiguous
 
 _ACROSS, _AROUND = 24, 64  # of the preview: nodes across and along the wire
 

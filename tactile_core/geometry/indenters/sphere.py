@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 
 from ...files.compiled import Loop
-from .indenter import NEAREST, Indenter, check_length, contiguous
-from .scene_form import SceneForm, Size
+from .indenter import NEAREST, Indenter, SceneForm, Size, check_length, contiguous
 
 
 @dataclasses.dataclass(frozen=True)

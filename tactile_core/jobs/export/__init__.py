@@ -9,7 +9,7 @@ from types import ModuleType
 
 from ...errors import TactileError
 from ...files import atomic, provenance
-from ...files.registry import modules_of
+from ...files.installed import modules_of
 from . import finished_job, formats
 
 NOTE = "note.json"

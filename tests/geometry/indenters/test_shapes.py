@@ -18,7 +18,7 @@ from tactile_core.geometry.indenters import (
     Sphere,
     pose_on,
 )
-from tactile_core.geometry.indenters.scene_form import forms
+from tactile_core.geometry.indenters.indenter import forms
 
 LEANING = np.array([[np.cos(0.4), 0, np.sin(0.4)], [0, 1, 0], [-np.sin(0.4), 0, np.cos(0.4)]])
 CONVEX = {
