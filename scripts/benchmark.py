@@ -32,10 +32,8 @@ from tactile_core.errors import TactileError
 from tactile_core.files import compiled, threads
 
 STAGES = ("mechanics", "translation", "conditions", "pictures", "chain", "peers")
-LEAVE_TRUTH = (
-    "pictures",
-    "chain",
-)  # whose first method leaves the truth that the others are measured against, in a file
+# Whose first method leaves the truth that the others are measured against, in a file.
+LEAVE_TRUTH = "pictures", "chain"
 
 
 def main(arguments: list[str] | None = None) -> int:

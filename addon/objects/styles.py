@@ -46,9 +46,8 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
     get_ready(thing)
     modifier = _add_nodes(thing, style, {style_nodes.LARGEST: largest, style_nodes.EXAGGERATION: exaggeration})
     if style == "DISPLACEMENT" and ERROR in thing:
-        driver = thing.driver_add(
-            f'modifiers["{MODIFIER}"]{style_nodes.input_path(modifier, style_nodes.ERROR)}'
-        ).driver
+        path = style_nodes.input_path(modifier, style_nodes.ERROR)
+        driver = thing.driver_add(f'modifiers["{MODIFIER}"]{path}').driver
         driver.type, variable = "SCRIPTED", driver.variables.new()
         variable.name, variable.targets[0].id, variable.targets[0].data_path = "error", thing, f'["{ERROR}"]'
         driver.expression = f"max(error, 0) * {1e-6 * thing.tactile.per_metre!r}"

@@ -104,14 +104,11 @@ def to_linear(picture: np.ndarray, raw: bool = False) -> np.ndarray:
     By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again; raw : as
     the view transform Raw does, without a curve
     """
-    levels = np.arange(256) / 255
-    curve = (
-        levels.astype(np.float32)
-        if raw
-        else np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    )
+    curve = np.arange(256) / 255
+    if not raw:
+        curve = np.where(curve <= 0.04045, curve / 12.92, ((curve + 0.055) / 1.055) ** 2.4)
     pixels = np.ones((*picture.shape[:2], 4), np.float32)
-    pixels[..., :3] = curve[picture]
+    pixels[..., :3] = curve.astype(np.float32)[picture]
     return pixels
 
 

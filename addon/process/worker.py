@@ -182,9 +182,8 @@ def _result(folder: Path, sensor: str, picked: list[str]) -> None:
     rest = sensors.sensor_surface(sensor).rest
     poses = []
     for k, second in enumerate(seconds):
-        at = Placement(
-            np.interp(second, times, x) * 1e-3, np.interp(second, times, z) * 1e-3, np.radians(spec.tilt_deg)
-        )
+        along, across = (1e-3 * np.interp(second, times, each) for each in (x, z))
+        at = Placement(along, across, np.radians(spec.tilt_deg))
         pose = pose_at(sensor, indenter, at)
         nodes = rest + moved[sensor][k]
         for _ in range(STEPS if truth.force[k].any() else 0):

@@ -62,10 +62,8 @@ def main(arguments: list[str] | None = None) -> int:
     if not compiled.available():
         print("measure_loop: numba is not installed (extra [fem]), or switched off", file=sys.stderr)
         return 2
-    rows, table = (
-        [],
-        [f"| | CPU ms: {LEVELS_SHOWN} | wall ms: {LEVELS_SHOWN} | error |", "|---|---|---|---|---|---|---|---|"],
-    )
+    rows: list[Row] = []
+    table = [f"| | CPU ms: {LEVELS_SHOWN} | wall ms: {LEVELS_SHOWN} | error |", "|---|---|---|---|---|---|---|---|"]
     for name, times, error in all_measured(options.count):
         table.append(f"| {name} | {' | '.join(f'{each:.3g}' for each in quantiles(times))} | {error} |")
         rows += as_rows(name, times, error)

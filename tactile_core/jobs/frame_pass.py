@@ -98,9 +98,8 @@ class FramePass:
         if self._translator.answer.samples:
             arrays |= self._translator.plausible(found.evidence, frames, signals.stiffness)
         arrays |= {"electrodes": signals.electrodes, "pressure_measured": signals.pressure_measured}
-        arrays["flags"] = (
-            arrays["flags"] | signals.flags | beyond_picture(arrays["contact_center"], self._drawer.camera)
-        )
+        beyond = beyond_picture(arrays["contact_center"], self._drawer.camera)
+        arrays["flags"] = arrays["flags"] | signals.flags | beyond
         return self._drawer.gel(arrays) | {"frame": frames.astype(np.int32), "time": found.time}
 
     def _heights(self, displacement: np.ndarray) -> np.ndarray:

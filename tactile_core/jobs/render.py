@@ -166,7 +166,9 @@ class Pictures:
         """Write the undeformed gel, and the camera's response, if OpenEXR is asked for."""
         if self.exr:
             self._write_exr(folder / REST, self.renderer.rest_radiance, self.about)
-            self._write_camera(folder / CAMERA)
+            # The response to each LED's light, and the part of the resting picture that is not from LEDs.
+            ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
+            write_exr(folder / CAMERA, camera_planes(self.renderer.calibration, ambient), self.about)
 
     def write_frame(self, folder: Path, number: int, values: np.ndarray) -> None:
         """Write frame `number`. values : displacement (M, 3) m of the gel's nodes, or its heights (H, W) m."""
@@ -192,11 +194,6 @@ class Pictures:
 
     def _write_exr(self, path: Path, radiance: np.ndarray, about: dict[str, str]) -> None:
         write_exr(path, {name: radiance[..., k] for k, name in enumerate("RGB")}, about)
-
-    def _write_camera(self, path: Path) -> None:
-        """Write the response to each LED's light, and the part of the resting picture that is not from LEDs."""
-        ambient = self.renderer.background - self.renderer.in_levels(self.renderer.rest_radiance)
-        write_exr(path, camera_planes(self.renderer.calibration, ambient), self.about)
 
 
 def pictures(

@@ -51,10 +51,8 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
     for recording in recordings:
         name = name_of(recording).casefold()  # macOS and Windows fold case in file names
         if name in seen:
-            advice = "Convert them into different --out folders"
-            raise TactileError(
-                recording, f"has the same name as {seen[name]}", "one name for each result folder", advice
-            )
+            found, advice = f"has the same name as {seen[name]}", "Convert them into different --out folders"
+            raise TactileError(recording, found, "one name for each result folder", advice)
         seen[name] = recording
     folders = [out / name_of(recording) for recording in recordings]
     for folder in folders:

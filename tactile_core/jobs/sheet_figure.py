@@ -58,10 +58,9 @@ class SheetFigure:
             _shown(self._gel.rest[:, axis], beside) for axis, beside in zip((0, 2), BESIDE_GEL, strict=True)
         )
         self.column_width = (WIDTH - LEFT - RIGHT - (FRAMES - 1) * GAP) / FRAMES
-        rows = (2 if truth else 1) * self._row_height(UNROLLED_X, UNROLLED_Z) + self._row_height(
-            self._gel_x, self._gel_z
-        )
-        rows += self.column_width * camera.height / camera.width + (2 if truth else 1) * GAP + Z_AXIS
+        skins = 2 if truth else 1
+        rows = skins * (self._row_height(UNROLLED_X, UNROLLED_Z) + GAP) + self._row_height(self._gel_x, self._gel_z)
+        rows += self.column_width * camera.height / camera.width + Z_AXIS
         head = TITLE + WARNING_LINE * len(warnings) + NUMBERS + ELECTRODES + TIME_AXIS + HEADING
         head += (PRESSURE + TIME_AXIS) + (EXPLAINED + GAP)
         self.height = head + rows + CAPTION + FOOT
@@ -154,9 +153,8 @@ class SheetFigure:
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
         """Draw maps of displacement (k, M, 3) m on the gel after a label, the picture's border, centers (k, c, 2) m."""
         gel, z = self._gel, self._gel_z
-        axes = self._surface_row(
-            label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
-        )
+        mesh, largest = (gel.rest[:, [0, 2]], gel.faces), scale(displacement)
+        axes = self._surface_row(label, *mesh, displacement, largest, self._gel_x, z, centers)
         border = np.stack([self.camera.gel_x[[0, 0, -1, -1, 0]], self.camera.gel_z[[0, -1, -1, 0, 0]]], axis=1)
         ticks = Z_TICKS[(z[0] < Z_TICKS) & (z[1] > Z_TICKS)]
         for k in range(self.columns):
@@ -201,9 +199,8 @@ class SheetFigure:
             drawn = [colors, *axes.plot(*outline, color="white", linewidth=2.2)]
             drawn += axes.plot(*outline, color="black", linewidth=0.9)
             if centers is not None:
-                drawn += axes.plot(
-                    *self._on_sheet(centers[k], k, z).T, "+", color=MARK, markersize=9, markeredgewidth=1.6
-                )
+                cross = self._on_sheet(centers[k], k, z).T
+                drawn += axes.plot(*cross, "+", color=MARK, markersize=9, markeredgewidth=1.6)
             for artist in drawn:
                 artist.set_clip_path(frame)
         left, right = (self._on_sheet(corners, k, z)[:, 0] for k in (0, self.columns - 1))

@@ -81,9 +81,5 @@ def _write_columns(options: argparse.Namespace) -> None:
     with opened(options.recordings[0]) as (container, where, _, file):
         guessed, held = guess_map(where, container, file)
     column_map.write(options.columns, guessed, held)
-    found = (
-        "guessed from names and values; check it"
-        if guessed[0].electrodes
-        else "no 19 electrodes found: name them there"
-    )
-    say(f"{options.columns}: written, {found}")
+    guess, none = "guessed from names and values; check it", "no 19 electrodes found: name them there"
+    say(f"{options.columns}: written, {guess if guessed[0].electrodes else none}")

@@ -95,9 +95,8 @@ def _check(options: argparse.Namespace) -> None:
         raise TactileError("--press", "given with --frames", "one of the two")
     if (options.frames is None) != (options.frame is None):
         raise TactileError("--frames and --frame", "one of them alone", "both", "Say which frame of which file")
-    given = [
-        name for name in ("diameter", "indenter", "depth_mm", "force_n", "tier") if getattr(options, name) is not None
-    ]
+    of_press = "diameter", "indenter", "depth_mm", "force_n", "tier"
+    given = [name for name in of_press if getattr(options, name) is not None]
     if given and not options.press:
         raise TactileError("--" + given[0].replace("_", "-"), "given without --press", "--press WHAT")
     if not abs(options.tilt_deg) <= MOST_TILT:  # nan, too

@@ -89,9 +89,8 @@ class Cluster:
         with self._answering():
             error = future.exception() if future.status in ("error", "lost", "cancelled") else None
             if isinstance(error, KilledWorker):
-                return Reply(
-                    failure=Failure(f"killed its worker {KILLS} times ({error.last_worker.address}); set aside")
-                )
+                why = f"killed its worker {KILLS} times ({error.last_worker.address}); set aside"
+                return Reply(failure=Failure(why))
             if future.status != "finished":
                 raise error or RuntimeError(future.status)
             return msgspec.convert(future.result(), Reply)
@@ -102,11 +101,8 @@ class Cluster:
         try:
             yield
         except Exception as error:
-            found, advice = (
-                f"a task was lost ({error})",
-                "Start one, and give the same command again: what is done stays",
-            )
-            raise TactileError(self._address, found, "a working scheduler", advice) from error
+            advice = "Start one, and give the same command again: what is done stays"
+            raise TactileError(self._address, f"a task was lost ({error})", "a working scheduler", advice) from error
 
     def __enter__(self) -> Cluster:
         with ExitStack() as stack:
@@ -138,10 +134,7 @@ class Cluster:
         """Return a client of the scheduler at place, an address. Raises TactileError where none answers."""
         from distributed import Client, Security
 
-        for name in (
-            "distributed",
-            "distributed.client",
-        ):  # what its logs tell of a lost scheduler is told in a sentence
+        for name in ("distributed", "distributed.client"):  # what its logs tell of a lost scheduler, a sentence tells
             logging.getLogger(name).setLevel(logging.CRITICAL)
         security = Security(require_encryption=True) if self._address.startswith("tls://") else None
         try:

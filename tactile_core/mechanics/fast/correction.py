@@ -254,17 +254,15 @@ def correct(compliance: Compliance, contact: Contact) -> Corrected:
         return Corrected(contact.displacement, 1.0)
     at = frame(compliance, contact)
     seen = features(compliance, contact, at)
-    return Corrected(
-        add_field(compliance.name, contact.displacement, at, parts.field(seen), contact.depth), parts.factor(seen)
-    )
+    moved = add_field(compliance.name, contact.displacement, at, parts.field(seen), contact.depth)
+    return Corrected(moved, parts.factor(seen))
 
 
 def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.ndarray, scale: float) -> np.ndarray:
     """Return displacement (n, 3) m plus ``scale``, the depth in m, times ``field`` (g, 3), learned per metre of depth
     on the grid of the patch frame ``at`` in the surface's own axes; the sum is in the sensor's axes."""
-    return _add_field(
-        displacement, np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor), at.centre, at.radius, field, scale
-    )
+    places, frames = np.ascontiguousarray(plane(sensor)), _frames_by_axis(sensor)
+    return _add_field(displacement, places, frames, at.centre, at.radius, field, scale)
 
 
 @Loop

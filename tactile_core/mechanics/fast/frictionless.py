@@ -190,9 +190,8 @@ class Frictionless:
         if abs(solved.step) <= _LARGEST_STEP:
             return solved
         step = float(np.clip(solved.step, -_LARGEST_STEP, _LARGEST_STEP))
-        return dataclasses.replace(
-            complement(matrix, offset - step * along, solved.active, factors=model.factors), step=step
-        )
+        found = complement(matrix, offset - step * along, solved.active, factors=model.factors)
+        return dataclasses.replace(found, step=step)
 
     def _step(self, state: Try, place, matrix, normal, solved: Pressing, iteration: int) -> Try:  # noqa: ANN001
         k = self.block.k

@@ -180,9 +180,8 @@ class ContactSet:
         surface, for deep inside the curvature misleads."""
         if not self.active.any():
             return np.empty((0, 3, 3))
-        return self.pressing[:, None, None] * self.obstacle.curvature(
-            at[self.nodes] - self._distance[:, None] * self.normals
-        )
+        feet = at[self.nodes] - self._distance[:, None] * self.normals
+        return self.pressing[:, None, None] * self.obstacle.curvature(feet)
 
     def gripping(self, along: float) -> np.ndarray:
         """Return friction's stiffness (k, 3, 3) N/m: that of sticking springs, and of slipping ones across the pull.
