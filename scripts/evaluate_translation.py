@@ -131,9 +131,8 @@ def renew_model_card(
     conditions = [f"| {what} | {words} |" for what, words in _conditions(translator.card, pairs, apart)]
     renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
-    write_table(
-        page.with_suffix(".csv"), {"test contacts": [each for each in rows if each not in unseen], "kept apart": unseen}
-    )
+    known = [each for each in rows if each not in unseen]
+    write_table(page.with_suffix(".csv"), {"test contacts": known, "kept apart": unseen})
     atomic.write_bytes(page.with_name(PICTURE), _cases(translator, pairs))
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import struct
 import zlib
 
 import bpy
 import numpy as np
 
 from ...tactile_core import sensors
-from ...tactile_core.files.png_writer import SIGNATURE
+from ...tactile_core.files.png_writer import png_file
 from ..settings import properties
 
 _PICTURE, _HEIGHTS = "{} picture", "{} height map"  # of a sensor
@@ -46,11 +45,7 @@ def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
     if former is not None:
         bpy.data.images.remove(former)
     rows = np.pad(np.packbits(values, axis=1), ((0, 0), (1, 0)))  # each begins with its filter: none
-    head = struct.pack(">IIBBBBB", *values.shape[::-1], 1, 0, 0, 0, 0)  # one bit, grey
-    chunks = [(b"IHDR", head), (b"IDAT", zlib.compress(rows.tobytes())), (b"IEND", b"")]
-    packed = SIGNATURE + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
-    )
+    packed = png_file(values.shape[::-1], 1, 0, zlib.compress(rows.tobytes()))
     image = bpy.data.images.new(name, 1, 1)
     image.pack(data=packed, data_len=len(packed))
     image.source = "FILE"

@@ -112,9 +112,8 @@ def conversions(folder: Path) -> dict[str, Part]:
 def full_tier() -> dict[str, dict[str, float]]:
     """Measure the full tier's CPU ms a contact at a force, by sensor: "smooth", and "rough" with friction 0.78."""
     ways = {"smooth": 0.0, "rough": FRICTION}
-    return {
-        sensor: {way: contact_ms(sensor, friction) for way, friction in ways.items()} for sensor in ("biotac", "digit")
-    }
+    sensors: tuple[Sensor, ...] = "biotac", "digit"
+    return {sensor: {way: contact_ms(sensor, friction) for way, friction in ways.items()} for sensor in sensors}
 
 
 def contact_ms(sensor: Sensor, friction: float) -> float:

@@ -54,12 +54,14 @@ def _packed(picture: np.ndarray) -> bytes:
     filtered = np.empty((height, 1 + rows.shape[1]), np.uint8)
     filtered[:, 0], filtered[0, 1:] = UP, rows[0]
     np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])
-    depth, color = 8, 2  # bits of a value; red, green, blue
-    chunks = [
-        (b"IHDR", struct.pack(">IIBBBBB", width, height, depth, color, 0, 0, 0)),
-        (b"IDAT", bytes(deflate.zlib_compress(filtered.data, LEVEL))),
-        (b"IEND", b""),
-    ]
+    return png_file((width, height), 8, 2, bytes(deflate.zlib_compress(filtered.data, LEVEL)))
+
+
+def png_file(size: tuple[int, int], depth: int, color: int, packed: bytes) -> bytes:
+    """Return the bytes of a PNG of ``size`` (width, height) px. depth : bits of a value; color : 0 grey, 2 red, green
+    and blue; packed : by zlib, its rows, each behind the number of its filter"""
+    head = struct.pack(">IIBBBBB", *size, depth, color, 0, 0, 0)
+    chunks = b"IHDR" + head, b"IDAT" + packed, b"IEND"
     return SIGNATURE + b"".join(
-        struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data)) for name, data in chunks
+        struct.pack(">I", len(each) - 4) + each + struct.pack(">I", zlib.crc32(each)) for each in chunks
     )

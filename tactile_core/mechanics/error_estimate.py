@@ -113,8 +113,7 @@ def unsure_side(contact: Contact, normals: np.ndarray, radius: float) -> float:
     one_sided = sideways**2 / float(np.abs(contact.nodal_force @ aside).sum())  # 1: no node pushes back
     doubt = min(one_sided * sideways, force * spacing / (2 * radius))
     loads = (size / size.sum())[:, None] * (doubt / sideways * aside)
-    response = surface_motion(
-        contact.compliance, contact.nodes, loads, contact.core_nodes, np.zeros_like(contact.core_force)
-    )
+    no_core_force = np.zeros_like(contact.core_force)
+    response = surface_motion(contact.compliance, contact.nodes, loads, contact.core_nodes, no_core_force)
     moves = np.linalg.norm(contact.displacement, axis=1) > _COUNTS
     return float(np.sqrt((response[moves] ** 2).sum(axis=1).mean())) if moves.any() else 0.0

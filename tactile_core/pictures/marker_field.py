@@ -22,9 +22,8 @@ class MarkerField:
         markers, camera = unit.markers, unit.camera
         self._dark = 1 - markers.albedo  # share of light that ink takes
         down, right = (markers.pitch * (np.arange(n) - (n - 1) / 2) for n in (markers.rows, markers.columns))
-        x, z = np.meshgrid(
-            camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right, indexing="ij"
-        )
+        along, across = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
+        x, z = np.meshgrid(along, across, indexing="ij")
         # The middles, and where each dot's rim lies along and across the finger: all follow the surface.
         radius = markers.diameter / 2
         steps = radius * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])

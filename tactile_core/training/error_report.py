@@ -125,9 +125,8 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
     "rectified") -> distance -> quantiles. Rectified signals scatter more, and would hide unusual signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
-        signal = contacts.read(
-            contacts.split.validation, np.random.default_rng([measure.seed, 5]), share, contacts.options.unit
-        )
+        random = np.random.default_rng([measure.seed, 5])
+        signal = contacts.read(contacts.split.validation, random, share, contacts.options.unit)
         distance = measure.networks.signal_distance(signal[:, :-1], bool(share))
         found[kind] = {name: quantiles(getattr(distance, name)) for name in DISTANCES}
     return found

@@ -37,9 +37,8 @@ def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
     """Return displacements (B, n, 3) float32 m of a surface, sensor "biotac" or "digit", in rows (B,) of pairs."""
-    return getattr(pairs, f"displacement_{sensor}")[rows].astype(np.float32) * np.float32(
-        getattr(pairs, f"scale_{sensor}")
-    )
+    steps, step = getattr(pairs, f"displacement_{sensor}")[rows], getattr(pairs, f"scale_{sensor}")
+    return steps.astype(np.float32) * np.float32(step)
 
 
 def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
@@ -202,9 +201,8 @@ def is_median(name: str) -> bool:
 
 def _baseline(columns: Columns, name: str) -> np.ndarray:
     step, metric = name.split("_", 1)
-    nothing = columns.get(
-        "baseline_counts" if metric == "counts" else f"{BASELINES.get(step, 'baseline_digit')}_{metric}"
-    )
+    of = "baseline" if metric == "counts" else BASELINES.get(step, "baseline_digit")
+    nothing = columns.get(f"{of}_{metric}")
     return np.full(len(columns[name]), np.nan) if nothing is None else nothing
 
 

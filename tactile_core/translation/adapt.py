@@ -109,9 +109,8 @@ def adapt_hand(
     rest = None if untouched is None else _given_rest(untouched, len(units), sensor, columns)
     if typical_rest(sensor) is None:
         rests = {unit: _rest_of_files(files, sensor) for unit, files in units.items()}
-        return units_file(rests, sensor), (
-            f"no gains are fitted to a {title(sensor)}: its recordings give its rest and film",
-        )
+        said = f"no gains are fitted to a {title(sensor)}: its recordings give its rest and film"
+        return units_file(rests, sensor), (said,)
     fitted: dict[str, ElectrodeGains] = {}
     warnings: list[str] = []
     for unit, files in units.items():

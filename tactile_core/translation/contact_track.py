@@ -153,9 +153,8 @@ class ForwardTracker:
             free = begins[0, came[0, best], best]
         place, noise = now.mean[:, best, :PLACE], np.square(now.spread[:, best, :PLACE])
         walk = np.where(free, ANYWHERE**2, step[:, :PLACE])
-        (self._place,), (self._variance,), _ = _filtered(
-            place, noise, walk, self._place, np.where(free, 0, self._variance)
-        )
+        variance = np.where(free, 0, self._variance)
+        (self._place,), (self._variance,), _ = _filtered(place, noise, walk, self._place, variance)
         touched = touches(now.mean[:, best])
         state = _states(evidence, self._place[None], touched)
         if touched[0]:

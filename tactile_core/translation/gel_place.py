@@ -62,9 +62,8 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
     place, limit = (nearest - (size - 1) / 2) / PLACE_UNIT, (size - 1) / 2 / PLACE_UNIT
     small = SMALL / PLACE_UNIT * np.eye(PLACE)
     for _ in range(STEPS):
-        slope = np.stack(
-            [between_nodes(grid, place + one) - between_nodes(grid, place - one) for one in small], axis=-1
-        )
+        rises = [between_nodes(grid, place + one) - between_nodes(grid, place - one) for one in small]
+        slope = np.stack(rises, axis=-1)
         missing = (point - between_nodes(grid, place))[..., None]
         step = np.linalg.pinv(slope) @ missing * (2 * SMALL / PLACE_UNIT)  # at a corner one slope may be none
         place = np.clip(place + step[..., 0], -limit, limit)

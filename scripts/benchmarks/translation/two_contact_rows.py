@@ -39,9 +39,8 @@ def rows(pairs: Pairs) -> list[Row]:
     single = _marked(pairs.signal[random.choice(felt, COUNT)])
     first, second, apart = pairs_apart(pairs, felt, random)
     both = _marked(pairs.signal[first] + pairs.signal[second])
-    found = [
-        row("two_contacts_found", both.mean(), "1", baseline=single.mean(), of=f"{COUNT} sums; baseline: single ones")
-    ]
+    of = f"{COUNT} sums; baseline: single ones"
+    found = [row("two_contacts_found", both.mean(), "1", baseline=single.mean(), of=of)]
     for least, most in BANDS:
         some = (apart >= least) & (apart < most)
         of = f"{some.sum()} sums, from {1e3 * least:g} mm" + ("" if most == np.inf else f" to {1e3 * most:g} mm apart")

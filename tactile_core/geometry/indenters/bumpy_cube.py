@@ -110,9 +110,8 @@ class BumpyCube(Indenter):
         gradient = np.where((branch == _CUBE)[:, None], gradient, from_ball)
         above = (points[:, 2] >= self.bump_height) & (np.hypot(at_bump[:, 0], at_bump[:, 1]) < self._foot)
         if above.any():
-            branch[above], distance[above], gradient[above] = self._above(
-                points[above], at_bump[above], of_ball[above], from_ball[above]
-            )
+            there = (each[above] for each in (points, at_bump, of_ball, from_ball))
+            branch[above], distance[above], gradient[above] = self._above(*there)
         return branch, distance, gradient, at_bump
 
     def _above(self, points, at_bump, of_ball, from_ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # noqa: ANN001

@@ -89,9 +89,8 @@ class ContactProblem:
         """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
         wanted = self._nodes_within(pose, _REACH)
         touched = np.empty(0, int) if start is None else start.nodes
-        if len(self.near) > _LARGE * len(wanted) or not (
-            among(wanted, self.near).all() and among(touched, self.near).all()
-        ):
+        held = among(wanted, self.near).all() and among(touched, self.near).all()
+        if len(self.near) > _LARGE * len(wanted) or not held:
             near = wanted if start is None else np.union1d(self._nodes_within(pose, _REACH + _SPARE), touched)
             self._rows = self._rows_of(near)
 

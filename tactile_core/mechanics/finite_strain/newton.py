@@ -235,9 +235,8 @@ class FiniteStrainContact:
         held, step = self.fixed.copy(), np.zeros_like(residual)
         nodes = np.concatenate([outer.nodes, inner.nodes])
         frames = np.concatenate([touching.begin(at) for touching in (outer, inner)])
-        blocks[pattern.diagonal[nodes]] -= held_back(
-            np.concatenate([outer.bending(at), inner.bending(at)]), blocks[pattern.diagonal[nodes]]
-        )
+        bending = np.concatenate([outer.bending(at), inner.bending(at)])
+        blocks[pattern.diagonal[nodes]] -= held_back(bending, blocks[pattern.diagonal[nodes]])
         blocks[pattern.diagonal[outer.nodes]] += outer.gripping(min(unrest, _MOST_ALONG))
         held[nodes] = np.einsum("nij,ni->nj", frames**2, self.fixed[nodes]) > 0.5
         for touching in (outer, inner):

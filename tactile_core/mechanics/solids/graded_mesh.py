@@ -81,9 +81,8 @@ class GradedMesh:
         i, j = to_rows.shape[1], to_columns.shape[1]
         k = values.shape[1]
         if len(values) == i * j:
-            return np.einsum("ri,ijk,cj->rck", to_rows, values.reshape(i, j, k), to_columns, optimize=True).reshape(
-                -1, k
-            )
+            grid = np.einsum("ri,ijk,cj->rck", to_rows, values.reshape(i, j, k), to_columns, optimize=True)
+            return grid.reshape(-1, k)
         ring, poles = values[: (i - 2) * j].reshape(i - 2, j, k), values[(i - 2) * j :]
         ends = [np.broadcast_to(pole, (1, j, k)) for pole in poles]
         grid = np.concatenate([ends[0], ring, ends[1]])

@@ -68,9 +68,8 @@ def print_on(
 
 def deepest(radius: float, thickness: float = LAYER) -> float:
     """Return the depth m up to which the print of a ball of radius m is tabulated for a gel of thickness m."""
-    return sum(
-        share * radius / table.radius * float(table.depths[-1]) for table, share in _tables_near(radius, thickness)
-    )
+    near = _tables_near(radius, thickness)
+    return sum(share * radius / table.radius * float(table.depths[-1]) for table, share in near)
 
 
 def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:

@@ -114,9 +114,8 @@ def fit_ball(
         for place in sight.guesses(bench, radius)
         for share in DEPTHS
     ]
-    x, cost = min(
-        (minimise(problem, start, most=STEPS, tolerance=TOLERANCE) for start in starts), key=lambda end: end[1]
-    )
+    ends = (minimise(problem, start, most=STEPS, tolerance=TOLERANCE) for start in starts)
+    x, cost = min(ends, key=lambda end: end[1])
     return Ball(*x, *[radius][len(x) - 3 :]), 2 * cost / (3 * sight.counts.sum())
 
 
