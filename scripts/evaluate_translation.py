@@ -107,10 +107,6 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
     return found
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 def expected(rows: Sequence[Row]) -> list[str]:
     """Return a Markdown table's lines: errors of contacts 0.1 to 0.3 mm deep and of deeper ones, beside baselines."""
     by_set = {(row["name"], part): row for row in rows for part in (SHALLOW, DEEP) if part in (row["set"] or "")}
@@ -181,3 +177,7 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
         axes[row, 0].set_ylabel(f"{word}: {names[pairs.indenter[contact]]}\nx, mm")
         figure.colorbar(drawn, ax=axes[row], label="depth, mm")
     return png_of(figure)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -275,6 +275,16 @@ def test_a_file_name_stands_once_but_for_a_verbs():
     assert twice == {}
 
 
+def test_a_script_is_whole_before_it_runs():
+    """What stands below the guard of ``__main__`` is not there yet when the script runs, but in tests, which import."""
+    early = [
+        str(path.relative_to(ROOT))
+        for path in sources("scripts", "scenes")
+        if any(isinstance(node, ast.If) and "__name__" in ast.unparse(node.test) for node in nodes(path)[0].body[:-1])
+    ]
+    assert early == []
+
+
 def test_no_function_bears_a_name_that_says_nothing():
     banned = {"told", "some", "of", "first", "seen", "within", "left", "fall", "hidden"}
     found = [
