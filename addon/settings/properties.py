@@ -157,7 +157,7 @@ def surface_of(thing: bpy.types.Object) -> Lattice:
 
 
 def role_of(sensor: str) -> str:
-    """Return the role of a sensor's surface. Raises TactileError for an unknown sensor."""
+    """Return "DIGIT" for a gel, else "BIOTAC". Raises TactileError for unknown sensors."""
     return "DIGIT" if sensors.is_gel(sensor) else "BIOTAC"
 
 

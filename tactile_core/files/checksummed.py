@@ -31,7 +31,7 @@ def write_checksum(path: Path, rows: int | None = None) -> str:
 
 
 def verified_checksum(path: Path) -> str | None:
-    """Return the hash of a file that matches its checksum; None for one that is missing, cut or changed."""
+    """Return a file's hash if its own first bytes state the same; None if it is missing, cut or changed."""
     try:
         digest, rows = _stated(path)
         return digest if digest is not None and _digest(path, rows) == digest else None
@@ -45,7 +45,7 @@ def stated_checksum(path: Path) -> str | None:
 
 
 def stated_rows(path: Path) -> int | None:
-    """Return the number of rows stored beside the hash, unchecked; None where there is none."""
+    """Return the number of rows that a file's first bytes state, unchecked; None if none."""
     return _stated(path)[1]
 
 

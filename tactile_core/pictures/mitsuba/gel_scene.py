@@ -169,7 +169,7 @@ class Surroundings:
         return {f"lamp_{k}": plugin for k, plugin in enumerate(lamps)}
 
     def shapes(self, mi: Any) -> dict[str, Any]:
-        """Return the bodies as meshes of Mitsuba's, by name."""
+        """Return occluders as meshes of Mitsuba's, by name."""
         return {f"body_{k}": _mesh(mi, f"body_{k}", each) for k, each in enumerate(self.occluders)}
 
 
