@@ -35,7 +35,7 @@ class TactileRender(bpy.types.PropertyGroup):
 
     preset: bpy.props.EnumProperty(
         name="Preset", description="How exactly the picture is made", items=PRESETS,
-        update=lambda settings, context: _prepare(settings, context),
+        update=lambda settings, context: _prepare(settings, context), translation_context="Tactile",
     )  # fmt: skip
     calibration: bpy.props.StringProperty(
         name="Calibration", description="File of one unit (tactile calibrate); empty: that of the sensor, or of the"

@@ -73,10 +73,9 @@ def authored(context: bpy.types.Context) -> Authored:
     pairs = {name: value for name, value in _press(thing).items() if name == "friction"}
     document = DEFAULTS | {"pairs": pairs} | json.loads(thing.tactile.document or "{}")
     meshes: dict[str, bytes] = {}
-    specs = [_spec(thing, sensor, context, meshes)]
     # Other indenters of the file stand in the scene as well, in the order they were added.
     others = [other for other in scene.objects if other.tactile.role == "INDENTER" and other != thing]
-    specs += [_spec(other, sensor, context, meshes) for other in others]
+    specs = _specs([thing, *others], sensor, context, meshes)
     kept = document.pop("recording", None) or {}
     by_height = thing.tactile.press_by == "HEIGHT"
     frames = _sampled(scene) if by_height else _key_frames(scene, thing, sensor)
@@ -105,6 +104,17 @@ def _scene(kind: type, document: dict, specs: list, recording: dict) -> Any:
         return msgspec.convert(whole, kind)
     except msgspec.ValidationError as error:
         raise TactileError("Tactile scene", str(error), "what a scene file may hold") from error
+
+
+def _specs(things, sensor, context, meshes: dict[str, bytes]) -> list:  # noqa: ANN001
+    """List the specs of indenters; those of one name, as duplicates have, by the names of their objects."""
+    import msgspec
+
+    specs = [_spec(thing, sensor, context, meshes) for thing in things]
+    names = [spec.name for spec in specs]
+    own = [bpy.path.clean_name(thing.name) if names.count(thing_name) > 1 else thing_name
+           for thing, thing_name in zip(things, names, strict=True)]  # fmt: skip
+    return [msgspec.structs.replace(spec, name=name) for spec, name in zip(specs, own, strict=True)]
 
 
 def _spec(thing, sensor, context, meshes: dict[str, bytes]) -> Any:  # noqa: ANN001

@@ -114,7 +114,10 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
     points, depths, sensor = [], [], job["placed_on"]
     for k, (point, apex) in enumerate(zip(spec.points, apexes, strict=True)):
         place = Placement(point.x_mm * 1e-3, point.z_mm * 1e-3, np.radians(spec.tilt_deg))
-        pose = pose_at(sensor, indenter, place)
+        try:
+            pose = pose_at(sensor, indenter, place)
+        except TactileError as error:
+            raise _at_frame(spec.indenter, job, k, error.found, error.expected, error.advice) from error
         depth = float((apex - pose.apex) @ pose.direction)
         force = 0.0
         if depth > 0:

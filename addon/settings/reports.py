@@ -34,6 +34,7 @@ WORDS = (
     (r"--error\b", "Largest Error"),
     (r"--frames-apart\b", "Each Frame Alone"),
     (r"--contacts( 2)?\b", "Two Contacts"),
+    (r"the aspect ratio of \d+ x \d+", lambda found: f"{found[0]}. Set Up Render sets it; the percentage keeps it"),
 )  # fmt: skip
 ADVICE = "Install the extension's zip for this platform, which brings it"
 
@@ -86,6 +87,7 @@ class TactileOperator(bpy.types.Operator):
     """Base of the add-on's operators: ``_work`` does the work, and its errors are reported."""
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads plain class attributes)
+    bl_translation_context = "Tactile"  # of no dictionary: Blender's own would make Translate to move
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Do the work and report its errors; Blender calls it."""

@@ -154,7 +154,8 @@ def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose
         if pose.distance(indenter, rest[some])[0].min() > _TOUCHES:  # it slides past them
             pose, some = _advance(indenter, away, rest), np.arange(len(rest))
             if pose.distance(indenter, rest)[0].min() > _MISSED:
-                raise TactileError("indenter", "it passes the sensor by", "a place and a lean that meet its surface")
+                expected = "a place and a lean that meet its surface"
+                raise TactileError("indenter", "it passes the sensor by", expected, "Move it over the sensor")
         travel = float(np.linalg.norm(pose.apex - away.apex))
         if travel + _CLOSE > reach:
             reach = travel + _CLOSE

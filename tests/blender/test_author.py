@@ -152,6 +152,23 @@ def test_too_deep_a_press_is_reported_by_object_frame_and_depth(gel_alone):
     assert "/tmp" not in str(caught.value) and "scene.toml" not in str(caught.value)
 
 
+def test_an_indenter_beside_the_sensor_is_reported_by_object_and_frame(gel_alone):
+    bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
+    gel_alone.frame_start, gel_alone.frame_end = 1, 2
+    for frame, aside in ((1, 0.0), (2, 60.0)):
+        _key(bpy.context.object, frame, y=aside)
+    with pytest.raises(RuntimeError, match=r"sphere, frame 2: it passes the sensor by.* Move it over the sensor"):
+        bpy.ops.tactile.simulate()
+
+
+def test_a_duplicate_stands_in_the_scene_by_its_object_s_name(gel_alone, part):
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    gel_alone.collection.objects.link(bpy.context.object.copy())
+    found = part("addon.operators.scene_bridge").authored(bpy.context).scene
+    assert [body.name for body in found.indenters] == ["sphere", "sphere_001"]
+    assert found.recording.indenter == "sphere"
+
+
 def test_an_indenter_that_touches_nothing_is_said_and_a_hidden_one_refused(gel_alone, capfd):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object

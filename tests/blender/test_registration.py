@@ -35,3 +35,10 @@ def test_off_leaves_nothing_and_on_again_is_whole(extension, part):
     finally:
         extension.register()
     assert known(extension) == before
+
+
+def test_no_button_takes_another_meaning_in_another_language(extension):
+    """Translate was to move in Blender's French and Spanish, the preset Fast to paste in its German."""
+    buttons = [kind for name in dir(bpy.types) if name.startswith("TACTILE_OT_") and (kind := getattr(bpy.types, name))]
+    preset = bpy.types.Scene.bl_rna.properties["tactile_render"].fixed_type.properties["preset"]
+    assert {kind.bl_rna.translation_context for kind in buttons} == {preset.translation_context} == {"Tactile"}

@@ -286,7 +286,7 @@ def test_a_calibration_that_is_none_is_reported(ready, tmp_path):
 
 def test_another_aspect_ratio_is_reported(ready, tmp_path):
     ready.render.resolution_x = 300
-    with pytest.raises(RuntimeError, match="aspect ratio"):
+    with pytest.raises(RuntimeError, match=r"aspect ratio of \d+ x \d+\. Set Up Render sets it"):
         bpy.ops.render.render()
 
 
