@@ -73,7 +73,7 @@ class Known(NamedTuple):
 
 
 def mirrored(field: np.ndarray) -> np.ndarray:
-    """Mirror fields (..., LINES * LINES, 3) across z = 0."""
+    """Mirror ``field`` across z = 0: (..., LINES * LINES, 3), vectors on the patch's grid."""
     grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
     return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
 
