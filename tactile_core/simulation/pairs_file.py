@@ -232,5 +232,9 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 
 def quantise(displacement: np.ndarray) -> np.ndarray:
-    """Convert displacement (...) m, up to 3.2 mm, to int16 steps of ``SCALE`` m."""
-    return np.round(displacement / SCALE).astype(np.int16)
+    """Convert displacement (...) m to int16 steps of ``SCALE`` m. Raises TactileError beyond 3.2767 mm."""
+    steps = np.round(displacement / SCALE)
+    if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):  # false for NaN too
+        found = f"{1e3 * np.abs(displacement).max():.2f} mm"
+        raise TactileError("pairs, displacement", found, "at most 3.27 mm", "Lower depth_max_percent in the scene")
+    return steps.astype(np.int16)

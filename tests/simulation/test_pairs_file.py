@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.errors import TactileError
-from tactile_core.simulation.pairs_file import read_pairs, split_presses
+from tactile_core.simulation.pairs_file import quantise, read_pairs, split_presses
 
 h5py = pytest.importorskip("h5py", reason="pairs files need h5py")
 from small_pairs import write_pairs  # noqa: E402
@@ -18,6 +18,13 @@ def test_whole_file(tmp_path):
     assert pairs.displacement_biotac.dtype == np.int16
     assert pairs.signal.shape == (15, 19)
     assert pairs.scale_digit == 1e-7
+
+
+def test_what_int16_cannot_hold_is_refused_and_not_wrapped():
+    assert quantise(np.array([3.2767e-3, -1e-7])).tolist() == [32767, -1]
+    for displacement in (3.3e-3, np.nan):
+        with pytest.raises(TactileError, match=r"at most 3\.27 mm"):
+            quantise(np.array([displacement]))
 
 
 def test_hash_is_of_the_content(tmp_path):
