@@ -77,7 +77,7 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
-    """Return the mean (C, 2) of the places (n, 2) of a dent's core, by depth (C, n) m; NaN if none exceeds least."""
+    """Return the mean (C, 2) m of a dent's core of places (n, 2) m by depth (C, n) m; NaN if none exceeds least m."""
     peak = depth.max(-1, keepdims=True)
     weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -112,7 +112,7 @@ def row(
     of: str = "",
     at_least: bool = False,
 ) -> Row:
-    """Make a report row of one value, rounded to four digits; ``of`` names the data it was measured on.
+    """Make a row of a report: name, value, unit, target, ok, baseline, set (``of``, the data); four digits.
 
     value : None or NaN where nothing could be measured, which misses any target
     baseline : the value of doing nothing, or of the strongest simple answer
@@ -136,7 +136,7 @@ def line(row: Row) -> str:
 
 
 def failed(rows: list[Row]) -> list[Row]:
-    """Return the rows that miss their target, but for those of time and memory."""
+    """Return the rows that miss their target, but for those in s, ms and MB, which vary with the machine."""
     return [found for found in rows if found["ok"] is False and found["unit"] not in COSTS]
 
 
@@ -154,7 +154,7 @@ class Candidate(NamedTuple):
 
 
 def cheapest(candidates: Sequence[Candidate], bound: float, unit: str, what: str = "") -> Candidate:
-    """Return the candidate of least cost whose error is at most the bound; what : their subject, for the message.
+    """Return the candidate of least cost whose error is at most the bound; what : the errors' subject, for the message.
 
     Raises TactileError, naming the most exact candidate, where none is exact enough.
     """

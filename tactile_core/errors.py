@@ -17,7 +17,7 @@ class TactileError(Exception):
     found : what is there
     expected : what should be there
     advice : what the user can do, an imperative sentence
-    """
+    second : moment in a recording that the error is of, s from its start; None for all else"""
 
     second: float | None = None  # of a recording, where the error is of a moment in it
 

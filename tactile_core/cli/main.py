@@ -82,7 +82,7 @@ PATHS = (
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one verb; returns the exit status. arguments : words after `tactile`; None takes the process's own"""
+    """Run one verb; returns the exit status, 0 if done. arguments : words after `tactile`; None: the process's own"""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:  # closed, as in `tactile convert … >&-`
             setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - for as long as the process lives

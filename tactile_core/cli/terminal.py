@@ -41,7 +41,7 @@ def _written() -> Iterator[None]:
 
 
 def say(text: str) -> None:
-    """Print one line on stderr, whatever the text holds."""
+    """Print the text as one line on stderr, after "tactile: ", its line breaks and control characters made harmless."""
     sys.stderr.write("tactile: " + printable(" ".join(text.split())) + "\n")
 
 
@@ -57,14 +57,14 @@ def next_step(text: str) -> None:
 
 
 def counted(number: int, thing: str) -> str:
-    """Write a number of things: 1 shard, 2 shards, 3 presses; a thing that is no word, such as %, stays."""
+    """Return a number of things in words: 1 shard, 2 shards, 3 presses; a thing that is no word, such as %, stays."""
     if number == 1 or not thing.isalpha():
         return f"{number} {thing}"
     return f"{number} {thing}{'es' if thing.endswith('s') else 's'}"
 
 
 def complain(text: str) -> None:
-    """Print an error on stderr."""
+    """Print an error in one line on stderr, after "error: "."""
     say("error: " + text)
 
 
@@ -72,7 +72,7 @@ LONG = 60.0  # s from which on a job is asked about
 
 
 def duration(seconds: float) -> str:
-    """Write seconds in their most readable unit: 40 s, 12 min, 3.5 h."""
+    """Return seconds as text in their most readable unit: 40 s, 12 min, 3.5 h."""
     if seconds < 2 * LONG:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -37,7 +37,7 @@ class DamagedError(Exception):
 
 
 def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Map arrays that `store` wrote, by name, read-only. Raises DamagedError by their hashes (0.6 ms CPU per MB)."""
+    """Map arrays that `store` wrote, name -> array, read-only. Raises DamagedError for another hash (0.6 ms per MB)."""
     try:
         stated = json.loads(outside.read(folder / HASHES, _MOST))
         return {name: _checked(folder / f"{name}.npy", stated[name]) for name in names}

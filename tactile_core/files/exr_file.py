@@ -59,7 +59,7 @@ def _check_size(path: str | os.PathLike) -> None:
 
 
 def read_height(path: str | os.PathLike) -> np.ndarray:
-    """Read heights (H, W) m of an EXR file: its only channel, or the first of HEIGHT_CHANNELS; else TactileError."""
+    """Read heights (H, W) m of an EXR file: its only channel, or the first of height, Y, Z, R; else TactileError."""
     planes, _ = read_exr(path)
     if len(planes) == 1:
         return next(iter(planes.values()))

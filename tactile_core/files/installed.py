@@ -34,7 +34,7 @@ def checkout() -> Path | None:
 
 @contextmanager
 def needing(extra: str) -> Iterator[None]:
-    """Add to a ModuleNotFoundError in the block how to install the extra, for callers from Python."""
+    """Add how to install the extra as a note to a ModuleNotFoundError raised in the block."""
     try:
         yield
     except ModuleNotFoundError as error:

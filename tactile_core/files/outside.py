@@ -51,7 +51,7 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
-    """Read UTF-8 text of at most `most` bytes, without its mark. Raises OSError, UnicodeDecodeError, TactileError."""
+    """Read UTF-8 text, at most `most` bytes, no byte-order mark. Raises OSError, UnicodeDecodeError, TactileError."""
     return read(path, most, "a text file").decode("utf-8-sig")
 
 

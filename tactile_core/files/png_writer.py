@@ -30,7 +30,7 @@ def write_png(file: str | os.PathLike, picture: np.ndarray) -> None:
 
 
 def pack_png(picture: np.ndarray, packing: Mapping[str, int] = PACKING) -> bytes:
-    """Pack a picture (H, W, 3) uint8 as a PNG; packing : of Pillow, which is used without libdeflate."""
+    """Pack a picture (H, W, 3) uint8 as a PNG; packing : options of Pillow's PNG, used without libdeflate."""
     if _has_libdeflate():
         return _packed(picture)
     from PIL import Image

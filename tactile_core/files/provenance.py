@@ -22,12 +22,12 @@ def sha256(path: str | os.PathLike) -> str:
 
 
 def entry(path: str | os.PathLike) -> dict[str, str]:
-    """Return a file's name, without its folders, and `sha256`, as notes have them."""
+    """Return ``file``, its name without folders, and ``sha256``, hash of its content, for a result's note."""
     return {"file": os.path.basename(path), "sha256": sha256(path)}
 
 
 def versions(*more: str) -> dict[str, str]:
-    """Return versions that can change a result's bytes, besides its input and the weights; more : further libraries."""
+    """Return name -> version of what can change a result's bytes: this package, Python, numpy, h5py, libraries more."""
     import importlib
     import platform
 
@@ -37,7 +37,7 @@ def versions(*more: str) -> dict[str, str]:
 
 
 def machine() -> dict[str, str | int | None]:
-    """Describe what can change timings: system, processor, number of cores."""
+    """Return what can change timings: ``system`` and ``processor``, in words, and ``cores``, their number."""
     import platform
 
     return {"system": platform.platform(), "processor": _processor(), "cores": os.cpu_count()}

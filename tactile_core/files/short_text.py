@@ -18,7 +18,7 @@ def shown(text: str) -> str:
 
 
 def listed(names: Sequence[str], most: int = 8) -> str:
-    """List names for a message, the first few (`most`) and the number of the others."""
+    """Join names by commas for a message: the first `most`, then how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 

@@ -25,7 +25,7 @@ class Stopwatch:
             self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + time.process_time() - cpu_start
 
     def per_frame(self, count: int) -> dict[str, dict[str, float]]:
-        """Return ms per frame (of `count`) of each stage and of all, by the wall clock and by CPU time."""
+        """Return ms per frame (of `count`): ms_a_frame, by the wall clock, cpu_ms_a_frame; each by stage, and all."""
         return {"ms_a_frame": _per_frame(self.seconds, count), "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count)}
 
 

@@ -49,7 +49,7 @@ def electrode_count(sensor: str) -> int:
 
 
 def electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Return electrode positions (19, 3) m, E1 first, shared frame; BioTac SP (24, 3). TactileError: no, bad table."""
+    """Return electrodes' places (19, 3) m, E1 first, shared frame; BioTac SP (24, 3). TactileError: no or bad table."""
     places = from_maker(1e-3 * places_of(sensor).sensing, sensor)
     skin_of(sensor).check_inside(places)
     return places

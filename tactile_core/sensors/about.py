@@ -13,7 +13,7 @@ from .gel_sensor import GelSensor
 
 
 def about(name: str) -> str:
-    """Describe a sensor in a few lines. Raises TactileError for an unknown sensor or a bad descriptor."""
+    """Return lines on kind, size, material, surface, sources. TactileError for an unknown sensor or bad descriptor."""
     found, surface = describe(name), sensor_surface(name)
     size = " x ".join(f"{1e3 * each:.2f}" for each in np.ptp(surface.rest, axis=0)[[0, 2]])
     lines = [

@@ -135,7 +135,7 @@ class Response:
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 
     def times(self, led: np.ndarray) -> Response:
-        """Return the matrix with each LED's column multiplied by led (3,)."""
+        """Return the response with each LED's column, in centre and slopes, multiplied by led (3,), no unit."""
         parts = (np.asarray(getattr(self, field.name)) * led for field in dataclasses.fields(self))
         return Response(*(tuple(map(tuple, part.tolist())) for part in parts))
 
@@ -146,9 +146,9 @@ class Fit:
 
     note : how it was fitted, free text; photographs : names of the files; the folder is the user's
     ball_diameter : m, of the ball that they show
-    errors : on those photographs, by the names of ``tactile calibrate --test``
+    errors : mean on those photographs, by metric: _l1 in grey levels, _psnr in dB, _ssim, lobe_iou, ball_radius_error
     standard_errors : by parameter, in its unit of measurement in the file
-    not_identified : parameters that the photographs do not determine, held near the start by a prior on units"""
+    not_identified : parameters that the photographs do not determine, held near the start by units' assumed spread"""
 
     note: str
     photographs: tuple[str, ...]

@@ -28,10 +28,10 @@ EXPECTED, ADVICE = "a file of `tactile calibrate`", "Make it again with `tactile
 def load_calibration(
     path: str | os.PathLike | None = None, sensor: str | None = None, object_reflectance: float | None = None
 ) -> Calibration:
-    """Load the calibration in a TOML file; None for the one that ships with a sensor's descriptor, None the DIGIT's.
+    """Load the calibration in a TOML file.
 
-    path : written by ``tactile calibrate``, or by hand; its lengths are in mm, those of the result in m
-    sensor : name of the sensor whose calibration it must be; None for any
+    path : by ``tactile calibrate`` or by hand, lengths in mm (the result's in m); None for the one shipped for sensor
+    sensor : name of the sensor whose calibration it must be; None for any, and without a path for the DIGIT
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the file's
     A background's photograph is searched beside the file. Raises TactileError naming file and field for an unreadable
     file, a field that is unknown, missing or out of range, and for a file of another sensor.

@@ -123,7 +123,7 @@ class Camera:
         return self.centre_z + self.right_z * self.right
 
     def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Project gel points at x, z and height (toward the camera), m, to (row, column), whole at pixel centres."""
+        """Project x, z, height (...) m, toward the camera, to row and column (...) px, whole at pixel centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5
@@ -138,7 +138,7 @@ class Camera:
     def to_gel(
         self, row: np.ndarray, column: np.ndarray, height: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (x, z) m of points at a height, m, that fractional pixels row, column see; inverts ``to_pixel``."""
+        """Return x, z (...) m of points at height (...) m that row, column (...) px see; inverts ``to_pixel``."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer

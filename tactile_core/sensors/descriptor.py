@@ -47,12 +47,12 @@ def _advice() -> str:
 
 
 def names() -> tuple[str, ...]:
-    """List the known sensors: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
+    """List the known sensors by name, sorted: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
     return tuple(sorted(_folders()))
 
 
 def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
-    """Return the sensor that is read and the gel whose nodes a file's keys name; None where they do not name two
+    """Return (the sensor of skin and fluid, the gel) whose nodes a file's keys name; None where they do not name two
     sensors.
     keys : the file's attributes, ``<name>_nodes_sha256`` for each sensor; where, what, advice : for errors, the file,
     its content in words, what to do. Raises TactileError for an unknown sensor, and for two of the same kind."""

@@ -66,14 +66,14 @@ def typical_rest(name: str) -> np.ndarray | None:
 
 @functools.cache
 def contacts_of(name: str) -> np.ndarray | None:
-    """Load changes (contacts, electrodes) float64 counts by simulation; None if the descriptor names no table. Raises
-    TactileError for a sensor without electrodes, or a bad table."""
+    """Load changes (contacts, electrodes) float64 counts of simulated contacts, to judge recordings by; None without
+    such a table. Raises TactileError for a sensor without electrodes, or a bad table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contacts)
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the rise (P,) float64 Pa of the fluid's pressure in ``contacts_of``'s contacts; None if no table has it."""
+    """Load the fluid's pressure rise (contacts,) float64 Pa, of each row of ``contacts_of``; None without a table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 
@@ -87,8 +87,8 @@ def _table(sensor: Fluid, file: str) -> np.ndarray | None:
 
 
 def read_places(path: Path) -> Places:
-    """Read a table of ``COLUMNS``; electrodes without counts at rest are the excitation's. Or read bsadr/biotac's own
-    table of a BioTac SP, ``SP_COLUMNS``, where the excitation's have numbers below zero. Raises TactileError naming
+    """Read a CSV table of name, x_mm, y_mm, z_mm, rest_counts; electrodes without counts are the excitation's. Or read
+    bsadr/biotac's own table of a BioTac SP, whose ids below zero are the excitation's. Raises TactileError naming
     file and row."""
     rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:

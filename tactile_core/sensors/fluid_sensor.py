@@ -16,7 +16,7 @@ FALLS, RISES = POLARITIES = ("falls", "rises")
 @dataclasses.dataclass(frozen=True)
 class Frame:
     """Transformation from the maker's frame to the shared one, in m.
-    x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign y_maker"""
+    x = -x_maker - shift_x, y = z_maker + shift_y, z = lateral_sign y_maker; lateral_sign : 1 or -1"""
 
     shift_x: float = number("mm")
     shift_y: float = number("mm")
@@ -110,7 +110,7 @@ class Electrodes:
 @dataclasses.dataclass(frozen=True)
 class Readout:
     """Voltage dividers and a converter. bits : of a count; rate : Hz; load : ohm, of a divider; pressure : Pa per count
-    polarity : whether counts fall or rise as a film thins"""
+    polarity : "falls" or "rises", what raw counts do as a film thins"""
 
     bits: int = number(above=0, below=32)
     rate: float = number("hz", above=0)

@@ -34,7 +34,7 @@ class GelShape:
         self.spacing = (window[1] - window[0]) / (self._lattice.window_nodes[0] - 1)
 
     def outline_distance(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the distance, m, from a place (x, z) m of the plane to the gel's outline; 0 outside."""
+        """Return how far (...) m places x, z (...) m of the plane lie inside the gel's outline; 0 outside."""
         side = self._half_width_at(x) - np.abs(z)
         if self._outline.tip == ROUND:
             side = np.where(x < self.arc_x, self.half_width - np.hypot(x - self.arc_x, z), side)
@@ -43,7 +43,7 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the height of the resting gel above its flat back, m, at (x, z) in m: the thickness, or with a [dome]
+        """Return the resting gel's height (...) m above its flat back at x, z (...) m: the thickness, or with a [dome]
         a smooth fit to its profile (of a faceted mesh; least squares by Chebyshev polynomials in x, even powers of z),
         less the edge's drop near the outline."""
         x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))

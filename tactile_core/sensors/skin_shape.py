@@ -45,7 +45,7 @@ class SkinShape:
 
     @functools.cached_property
     def table(self) -> dict[str, np.ndarray]:
-        """By name: x (n,) m, theta (72,) rad, and radii (n, 72) m, outer and inner of the skin, and core; symmetric."""
+        """By name: x (n,) m, theta (72,) rad; radii (n, 72) m outer, inner (of the skin), core. Symmetric in z."""
         rows = read_radii(self.descriptor.folder / self._skin.profile)
         mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
         radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3

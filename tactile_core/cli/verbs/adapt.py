@@ -49,7 +49,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fit and write the gains; returns the exit status."""
+    """Fit the unit's rest, film, gains and stiffness, and write them to one file; returns the exit status."""
     from ...files import atomic
     from ...recordings import PrepareOptions, electrode_gains
     from ...translation import adapt, force_scale, networks, reference_signals

@@ -75,14 +75,14 @@ UNIT = "--sensor", "--to", "--weights", "--calibration"
 
 
 def add(verb: argparse.ArgumentParser, *names: str, **words: str) -> None:
-    """Add some of the options that verbs share; words : name -> the verb's words for the {name} in an option's help"""
+    """Add shared options, ``names`` such as "--tare"; words : name -> the verb's words for the {name} in their help"""
     for name in names:
         option = OPTIONS[name]
         verb.add_argument(name, **option | {"help": option["help"].format_map({"among": "", **words})})
 
 
 def columns_of(options: argparse.Namespace) -> ColumnMap | None:
-    """Return the map that ``--columns`` names; None where it is not given."""
+    """Return the map of columns in the file that ``--columns`` names; None where it is not given."""
     if options.columns is None:
         return None
     from ...recordings.tables import column_map
@@ -91,7 +91,7 @@ def columns_of(options: argparse.Namespace) -> ColumnMap | None:
 
 
 def check_seed(seed: int) -> None:
-    """Raise TactileError for a seed that the generators do not take."""
+    """Raise TactileError for a seed outside 0 to 2**32 - 1, which numpy's and torch's generators take."""
     if not 0 <= seed <= MAX_SEED:
         raise TactileError("--seed", str(seed), f"0 to {MAX_SEED}", "Give another one")
 

@@ -21,7 +21,7 @@ ASSEMBLES = "the command that planned it, without --plan, which makes the result
 
 
 def place_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add ``--workers``, ``--cluster``."""
+    """Add ``--workers``, ``--cluster`` and ``--insecure``: where tasks are done."""
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes stay the same")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
@@ -33,7 +33,7 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def parts_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add ``--plan`` and `place_arguments`, for a verb whose job is in a folder beside its result."""
+    """Add ``--plan`` and those of `place_arguments`, for a verb whose job is in a folder beside its result."""
     place_arguments(verb)
     verb.add_argument(
         "--plan",

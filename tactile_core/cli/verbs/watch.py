@@ -67,7 +67,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Show the newest frames until the recording ends, the window is closed, or Ctrl-C."""
+    """Show the newest frames until the recording ends, the window is closed, or Ctrl-C; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
     from ...recordings import PrepareOptions

@@ -185,8 +185,8 @@ class Size:
 class SceneForm:
     """Entry of a shape in scenes and in Blender's Add menu; every module here with a ``SCENE`` of this type has one.
 
-    kind : its name in scenes; says : what it is, in a line; sizes : argument of the shape -> its ``Size``, those
-    without a default first; label, icon : of the menu's entry, which is left out without a label
+    kind : its name in scenes; shape : class or function that makes it; says : what it is, in a line
+    sizes : argument of ``shape`` -> its ``Size``, those without a default first; label, icon : of the menu, "" for none
     """
 
     kind: str

@@ -48,7 +48,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
     """Return the mesh (a trimesh, mm) in an indenter's own frame: its lowest flat or point touches z = 0 at the origin.
 
     content : of the file; where : the file, for its suffix and for messages; scale : m per unit of the file
-    up : the file's axis, one of ``UPS``, that points out of the sensor
+    up : the file's axis, x, y, z, -x, -y or -z, that points out of the sensor
     Raises TactileError unless it is closed, wound outward, and has the size of an indenter. Whether it crosses itself
     shows when its grid is built."""
     vertices, faces = _parsed(content, pathlib.Path(where))
