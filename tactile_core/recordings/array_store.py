@@ -27,8 +27,8 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file. shapes : name -> shape and type, as declared; load, load_rows : read one, or rows
-    attributes, attributes_of : of the root, of an array; taken : names of arrays that a reader has used"""
+    """Named arrays of an open file. shapes : name -> declared shape and type; taken : names that a reader used; load,
+    load_rows : read one, or rows (None: no parts); attributes : of the root; attributes_of : of an array, by name"""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]

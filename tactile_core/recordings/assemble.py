@@ -104,8 +104,7 @@ def assemble(
     rows : (T,) int, the file's line or row of each frame, `row_word` for messages; None: frames count from 0
     names : of the electrodes' columns in the file; an empty one is a missing column, a dead channel
     snapshots : true where frames do not follow each other in time, whose time is NaN; labels : name -> (T,) texts
-    truth, simulated, about, warnings, sensor : as of `Recording`
-    channels : pdc, tac, tdc, pac, position, force
+    truth, simulated, about, warnings, sensor, channels (pdc, tac, tdc, pac, position, force) : as of `Recording`
     Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad."""
     frames = len(electrodes)
     _check_size(path, electrodes, sensor)

@@ -124,7 +124,7 @@ def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats (of kind "raw"); return them, flags
-    (T,) with REPAIRED and DEAD_CHANNEL added, and a report of numbers and rows."""
+    (T,) with REPAIRED and DEAD_CHANNEL added, and a report: samples_interpolated, samples_glitch, rows_repaired."""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
@@ -199,7 +199,7 @@ def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -
 
 
 def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
-    """Return true, and add a warning, if no unit of the sensor, or no electrode, rests at the counts rest (e,)."""
+    """Return true and add a warning if rest (e,) counts, or one electrode's, are those of no unit of the sensor."""
     typical = typical_rest(sensor)
     if typical is None:
         return False
@@ -221,7 +221,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of readings (T, 19), of kind "raw", at an end of the 12-bit range; extends warnings."""
+    """Return flags (T,): SATURATED where a reading (T, 19) of kind "raw" is an end of 12 bits; extends warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)
@@ -235,7 +235,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) of readings (T, 19) counts constant for 1 s in an electrode; findings are added to warnings."""
+    """Return flags (T,): DEAD_CHANNEL where one of readings (T, 19) counts stands still for 1 s; extends warnings."""
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():

@@ -39,7 +39,7 @@ Runs = dict[str, list[tuple[str, int]]]  # name -> texts in order, each with the
 
 
 def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) -> None:
-    """Add to ``runs``, which end before frame ``start``, the labels (stop - start,) of frames ``start`` to ``stop``."""
+    """Add to ``runs``, name -> pairs (text, frames in a row) before start, labels (stop - start,) of start to stop."""
     for name in {**runs, **labels}:
         held = runs.setdefault(name, [("", start)] * bool(start))
         column = labels[name].tolist() if name in labels else [""] * (stop - start)
@@ -47,7 +47,7 @@ def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) 
 
 
 def unfold(runs: Runs) -> dict[str, np.ndarray]:
-    """Return the labels, (T,) texts by name, that runs shorten."""
+    """Return the labels, name -> (T,) texts, that runs, name -> pairs (text, frames in a row with it), shorten."""
     return {
         name: np.array([text for text, frames in each for _ in range(frames)], dtype=object)
         for name, each in runs.items()

@@ -185,7 +185,7 @@ def _apart(less: float, more: float) -> bool:
 
 
 def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
-    """Return the mean cosine of changes (n, 19) counts to the nearest simulated contact, in the networks' scale."""
+    """Return the mean cosine of changes (n, 19) counts to their nearest simulated contacts, by arcsinh(counts / 15)."""
     return float((unit(changes) @ patterns(sensor).T).max(axis=1).mean())
 
 
@@ -199,11 +199,11 @@ def contact_signals(sensor: str = SOURCE) -> np.ndarray:
 
 @functools.cache
 def patterns(sensor: str = SOURCE) -> np.ndarray:
-    """Return unit vectors (P, 19) of simulated contacts, in the networks' scale."""
+    """Return unit vectors (P, 19) of simulated contacts, in the networks' scale, arcsinh(counts / 15)."""
     return unit(contact_signals(sensor))
 
 
 def unit(changes: np.ndarray) -> np.ndarray:
-    """Return the unit vectors (n, 19) of changes (n, 19) counts, in the networks' scale."""
+    """Return the unit vectors (n, 19) of changes (n, 19) counts, in the networks' scale, arcsinh(counts / 15)."""
     compressed = np.arcsinh(changes / SCALE)
     return compressed / np.maximum(np.linalg.norm(compressed, axis=1, keepdims=True), 1e-9)

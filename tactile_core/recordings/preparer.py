@@ -90,7 +90,7 @@ def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarra
 
 
 class Preparer:
-    """Prepare a recording's parts in order, each with what earlier parts showed; a single part is as from `prepare`."""
+    """Function that prepares a recording's parts in order, with what earlier ones showed; one alone as `prepare`."""
 
     def __init__(
         self,

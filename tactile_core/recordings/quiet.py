@@ -73,7 +73,7 @@ def window_frames(rate: float) -> int:
 def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
     """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
 
-    electrodes : (T, 19) float, counts, repaired; pdc : (T,) float, counts, or None; rate in Hz; kind : of `KINDS`
+    electrodes : (T, 19), repaired, pdc : (T,) or None, counts; rate : Hz; kind : raw, tared, scaled or rectified
     A held press is calm too, but its PDC is higher than without contact. Without PDC, calm parts near the start or end
     are taken for rest, and others must agree with them. In tared recordings rest is near zero.
     Known limit: a raw recording of one steady contact from its first frame to its last looks like rest."""

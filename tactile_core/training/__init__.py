@@ -1,1 +1,1 @@
-"""Training of the five networks from paired contacts: the only room that knows torch."""
+"""Training of the five networks from paired contacts: the only package that imports torch."""

@@ -22,7 +22,7 @@ from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, to
 class Batch:
     """A batch of B contacts of e electrodes.
 
-    rows : (B,) contact indices; SILENT none, C + i mirrored i   signal : (B, e + 1) SVB's input, see `measured`
+    rows : (B,) contact indices; SILENT none, C + i mirrored i   signal : (B, e + 1) counts; last 1 if rectified
     biotac, digit : (B, K) inputs of the mesh encoders           force : (B, 3) N
     pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
     signed : (B,) as rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
@@ -39,8 +39,8 @@ class Batch:
 
 class Contacts:
     """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i.
-    frames : role (of PAIR) -> moving frame; generator : of the random numbers that the bases begin with
-    biotac, digit : `SurfaceCodec` of each role; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
+    frames : "biotac" (source), "digit" (target) -> moving frame; generator : of the bases' random start
+    biotac, digit : `SurfaceCodec` of these two; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
     rest : (e,) counts of the unit that changes are from
     device : where batches go; the contacts themselves stay in the host's memory"""
 

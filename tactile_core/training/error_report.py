@@ -90,7 +90,7 @@ def signal_rows(measure: Measure) -> list[Row]:
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """Translate T frames of noise alone, untracked; return largest displacements (T,) m and sizes of force (T,) N."""
+    """Translate T frames of noise alone, untracked; return biotac_m, digit_m (T,), largest displacements; force_N."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)
@@ -111,7 +111,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return quantiles, at "levels", of what noise alone is translated to (`silence`): less may be no contact."""
+    """Return "levels" and, by the names of `silence`, the quantiles at them of noise alone: less may be no contact."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 
@@ -121,8 +121,8 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, as kind ("signed",
-    "rectified") -> distance -> quantiles. Rectified signals scatter more, and would hide unusual signed ones."""
+    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses: "signed", "rectified" ->
+    mahalanobis, residual, largest -> quantiles. Rectified signals scatter more, and would hide unusual signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
         random = np.random.default_rng([measure.seed, 5])
@@ -133,7 +133,7 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `card.fit_bounds` on validation presses; return kind ("signed", "rectified") -> surface -> numbers.
+    """Fit `card.fit_bounds` on validation presses; return "signed", "rectified" -> "biotac", "digit" -> numbers.
     silence : `silence_quantiles`"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}

@@ -124,8 +124,8 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Compute `Networks.signal_distance`'s tensors: training latents' mean (K,), whitening (K, K), SVB's residuals.
-    seed : of the noise drawn for the signals"""
+    """Compute `Networks.signal_distance`'s tensors: distance.mean (K,), .whitening (K, K), of training latents, and
+    distance.residual (e,), SVB's. seed : of the noise drawn for the signals"""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
@@ -184,7 +184,7 @@ def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dic
 
 
 def pairs_entry(contacts: Contacts) -> dict[str, object]:
-    """Return, for the card, the origin of the training data, and numbers of contacts and presses in each part."""
+    """Return, for the card, the training data's origin, largest pressure, and contacts and presses in each part."""
     pairs, split = contacts.pairs, contacts.split
     parts = {"train": split.train, "validation": split.validation, "test": split.test}
     return {

@@ -180,8 +180,8 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
-    """Make SVB: electrodes + 1 inputs, 256, 128, 64, the latent, and back, on compressed signals (ACROSS:
-    docs/sources.md, Networks). The last input says whether the signals are rectified."""
+    """Make SVB, of sizes after ACROSS (a paper: docs/sources.md, Networks): electrodes + 1 inputs, 256, 128, 64, the
+    latent, and back, on compressed signals. The last input says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 

@@ -48,7 +48,7 @@ class Model(nn.Module):
         initialise(self, generator)
 
     def from_signal(self, signal: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20) to latent_source and latent_target of the most plausible contact."""
+        """Map signal (B, 20), counts and 1 if rectified, to latent_source, latent_target of the likeliest contact."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         state = torch.where(rectified, self.R2MPN.contact(latent), self.S2MPN.contact(latent))
         biotac, _ = self.given(signal, state)
@@ -87,7 +87,7 @@ class Model(nn.Module):
         return self.error(torch.cat([latent, left, size, seen[:, -1:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20) to the latent of `direct_decoder`, without the mesh latents."""
+        """Map signal (B, 20), as of `from_signal`, to the latent (B, L') that `direct_decoder` decodes to the gel."""
         return self.direct(compress(signal))
 
 

@@ -108,7 +108,7 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Return columns (B,) of BioTac and DIGIT meshes from signals: largest node errors, m, and those expected, m.
+    """Return columns (B,): ``biotac_max_m``, largest node error by signals, ``biotac_expected_m``; the same of digit.
     rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs
     ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
@@ -126,8 +126,8 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """Return errors of displacement found (C, n, 3) m against the true one: moving nodes' rms, largest, core's height
-    (um), and peak (%; NaN where the true one is below PEAK_FROM). name : before each column's
+    """Return errors of displacement found (C, n, 3) m against the true one: ``rms_um`` of moving nodes, ``max_um``,
+    ``core_height_um``, ``peak_depth_percent`` (NaN for true ones below PEAK_FROM). name : before each column's
     depth : displacement (C, n, 3) m -> each node's depth (C, n) m, by which core and peak are found"""
     metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
@@ -136,8 +136,8 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
-    """Compare the contact patch of gels found (C, M, 3) m with the true patch (C, M) bool: intersection over union (NaN
-    for true ones below LEAST_PATCH nodes), and distance of their middles, mm. name : before each column's"""
+    """Compare the contact patch of gels found (C, M, 3) m with the true patch (C, M) bool: ``iou``, intersection over
+    union (NaN below LEAST_PATCH true nodes), ``position_mm``, of their middles. name : before each column's"""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)

@@ -61,9 +61,9 @@ class SurfaceCodec:
     """Displacements of one sensor, their moving frame and linear bases, in the host's memory.
 
     data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i mirrored
-    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window, of the remainder after
+    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window's w nodes, of what is left by
         ``wide``
-    place : (C, 2) of each dent; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
+    place : (C, 2) of dents, C = 2 D if mirrored, or D; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
     baseline : m, loss of no displacement, mean over training contacts
     In the methods, rows (B,) are contact indices, D + i for the mirror image of i, SILENT for no contact. Arguments:
@@ -222,9 +222,9 @@ def touching(rows: np.ndarray) -> Tensor:
 
 
 def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
-    """Return orthonormal rows (K, size) that span most of the fields; K = min(modes, contacts, size). They are not
+    """Return orthonormal rows (K, size), K = min(modes, contacts, size), that span most of the fields. They are not
     centred, so that no displacement has zero coefficients, and rounded to float16, the shipped dtype.
-    rows : contacts to use"""
+    fields : contact indices (B,) -> (B, size) mm; rows : contacts to use"""
     size = fields(rows[:1]).shape[1]
     modes = min(modes, len(rows), size)
     columns = min(modes + EXTRA, len(rows), size)

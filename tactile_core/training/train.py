@@ -239,7 +239,7 @@ def train_epoch(
 
 
 def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: int) -> float:
-    """Compute, for the log, stage ``index``'s mean loss on the validation presses, with the same noise every time."""
+    """Compute, for the log, stage ``index``'s mean loss on validation presses, with equal noise to compare epochs."""
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)

@@ -148,7 +148,7 @@ def doubt(card: Mapping[str, Any]) -> str:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return the 99 % quantile of a quantity over frames of noise without contact, from a card's ``silence``."""
+    """Return what 99 % of frames of noise stay below, by a card's silence; quantity : biotac_m, digit_m or force_N"""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 
 

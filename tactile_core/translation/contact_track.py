@@ -107,7 +107,7 @@ def _span(block: int, count: int) -> tuple[int, int]:
 
 
 class Tracker:
-    """Contact in a whole recording, by ``track``: computed on demand, block by block."""
+    """Function from frames of a whole recording to evidence and states, by ``track``: on demand, block by block."""
 
     def __init__(self, read: Read, count: int) -> None:
         """Take read(start, stop), which gives times and evidence of these frames; count : frames in all."""

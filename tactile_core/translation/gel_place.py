@@ -1,4 +1,4 @@
-"""Find where on a gel a contact lies: its patch, and its place, so that contacts can be shifted. `frame` : the gel's"""
+"""Find where on a gel a contact lies: its patch and place, to shift contacts. frame : the gel's moving window"""
 
 from __future__ import annotations
 

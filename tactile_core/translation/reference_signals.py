@@ -80,7 +80,7 @@ def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 
 def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
-    """Write ``signals.safetensors`` into a weights folder; returns the card's entry "signals"."""
+    """Write ``signals.safetensors`` into a weights folder; return the card's entry: count, file, sha256, unit."""
     arrays: dict[str, np.ndarray] = {
         "typical": signals.typical.astype(np.float16),
         "bias.signed": signals.bias_signed.astype(np.float32),

@@ -43,7 +43,7 @@ class Decoded(NamedTuple):
 
 
 class RecordingPass:
-    """Track and decode frames of a recording, some at a time; a frame's result does not depend on the others."""
+    """Function from frames of a recording to their `Decoded`; a frame's result does not depend on the others."""
 
     def __init__(self, translator: Translator, read: Read, count: int) -> None:
         """Take read(frames), which gives their times and signals; count : frames of the whole recording."""

@@ -91,7 +91,7 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 class Translator:
-    """Verified networks that encode signals and decode contacts; card : their model card; sha256 : of the card"""
+    """Verified networks that encode signals and decode contacts; card : their card; sha256 : its; answer : options"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
         """Store networks and options; patterns : simulated contacts of the source, None for a BioTac's, which ship."""
@@ -223,7 +223,7 @@ class Translator:
         return (1 - left / np.maximum(whole, LEAST_SQUARE)).astype(np.float32)
 
     def silent(self, quantity: str) -> float:
-        """Return the card's `silent_level` of a quantity, m or N: what noise alone stays below."""
+        """Return what noise alone stays below, by the card; quantity : "biotac_m", "digit_m" or "force_N" of it."""
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
@@ -239,7 +239,7 @@ class Translator:
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
         """Return the bound (T,) m that 95 of 100 largest node errors stay below, by `card.error_bound`.
         expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger, NaN without
-        surface, kind : of the card: one of `SURFACES`, and "signed" or "rectified" signals"""
+        surface : "biotac", the source's, or "digit", the target's; kind : "signed" or "rectified" signals"""
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:

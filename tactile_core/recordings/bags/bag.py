@@ -39,7 +39,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """Open bag. ros1 : true of ROS 1, false of ROS 2; reader : rosbags', open; middle : ns, of its time span
+    """Open bag. ros1 : true of ROS 1, false of ROS 2; reader : rosbags', open; middle : of its time, unix ns
     topics : with BioTacs, by name; others : without, in words"""
 
     path: str

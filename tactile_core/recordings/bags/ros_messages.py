@@ -76,8 +76,8 @@ class Definition:
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
-    """Return the possible definitions of a type, kind: the bag's own text, in IDL if idl, or those of `KNOWN` where it
-    is empty; unreadable ones are left out."""
+    """Return the possible definitions of message type `kind`: of the bag's own text, in IDL if idl, or, where that is
+    empty, those of `KNOWN`; unreadable ones are left out."""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
     if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):
@@ -100,7 +100,7 @@ def _parsed(texts: dict[str, str]) -> dict[str, Any]:
 
 
 class Decoder:
-    """Decoder of one message type to dictionaries of numbers, arrays, texts and lists of dictionaries."""
+    """Decoder of one type's messages to a dictionary: field -> number, array, text, dictionary or list of these."""
 
     def __init__(self, definition: Definition, ros1: bool) -> None:
         self._definition, self._ros1 = definition, ros1

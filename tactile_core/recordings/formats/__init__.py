@@ -77,18 +77,18 @@ HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": 
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
-    """Return the largest share of a finger's columns in keys, a file's. style : of a column, by finger and number"""
+    """Return the largest share (0..1) of a finger's columns in keys, a file's. style : of names, "{}_e{}" for ff_e1"""
     return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
 
 
 def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
-    """Return the numbers of the fingers of which keys, a file's, hold columns; style : of a column, by finger"""
+    """Return the numbers of the fingers of which keys, a file's, hold columns; style : of names, "{}_e{}" for ff_e1"""
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build one finger's recording of a BioTac SP's table; other columns go to ``about``. Raises as ``assemble``.
-    finger : number in the order of HAND, from 0; layout : in words; style : of a column, by finger and number
+    """Build one finger's recording of a BioTac SP's table; other columns' names go to about. Raises as ``assemble``.
+    finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : in words; style : of names, "{}_e{}" for ff_e1
     snapshots : true where frames do not follow each other in time"""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}

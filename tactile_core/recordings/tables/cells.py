@@ -78,7 +78,7 @@ class Words:
 
 
 class Cells:
-    """Kinds of a table's columns. words : of columns of texts, by name; plain : true where all hold numbers"""
+    """Kinds of a table's columns: number, time, text. words : of columns of texts, by name; plain : all numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """Decide the kinds of the columns called names by the first of rows, lists of cells."""
