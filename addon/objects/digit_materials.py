@@ -73,8 +73,7 @@ def acrylic() -> bpy.types.Material:
     gloss = nodes.output("ShaderNodeBsdfGlossy", toward_camera(nodes, fresnel), 0.05)  # colour, roughness
     both = nodes.output("ShaderNodeAddShader", nodes.output("ShaderNodeBsdfTransparent"), gloss)
     nodes.tree.links.new(both, surface_of(material))
-    if hasattr(material, "surface_render_method"):
-        material.surface_render_method = "BLENDED"
+    material.surface_render_method = "BLENDED"
     return material
 
 

@@ -66,6 +66,5 @@ def _material() -> bpy.types.Material:
     links.new(colour.outputs["Color"], shader.inputs["Base Color"])
     links.new(colour.outputs["Alpha"], shader.inputs["Alpha"])
     shader.inputs["Roughness"].default_value = 0.6
-    if hasattr(material, "surface_render_method"):
-        material.surface_render_method = "DITHERED"
+    material.surface_render_method = "DITHERED"
     return material

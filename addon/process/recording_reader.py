@@ -14,12 +14,11 @@ import os
 import numpy as np
 
 from ...tactile_core import recordings
+from ...tactile_core.files.hdf5_checked import SIGNATURE
 from ...tactile_core.recordings import Recording, Truth
 from ...tactile_core.recordings.tables import column_map
 from ...tactile_core.sensors import SOURCE
 from .jobs import Job, JobFolder
-
-_HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Recording:
@@ -32,7 +31,7 @@ def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Re
 def _is_hdf5(path: str | os.PathLike) -> bool:
     try:
         with open(path, "rb") as file:
-            return file.read(len(_HDF5)) == _HDF5
+            return file.read(len(SIGNATURE)) == SIGNATURE
     except OSError:
         return False  # the reader says what is wrong
 
