@@ -33,23 +33,15 @@ def write_checksum(path: Path, rows: int | None = None) -> str:
 def verified_checksum(path: Path) -> str | None:
     """Return a file's hash if its own first bytes state the same; None if it is missing, cut or changed."""
     try:
-        digest, rows = _stated(path)
+        digest, rows = stated(path)
         return digest if digest is not None and _digest(path, rows) == digest else None
     except (OSError, TactileError):
         return None
 
 
-def stated_checksum(path: Path) -> str | None:
-    """Return the hash stored in a file, without checking that its content still matches; None where there is none."""
-    return _stated(path)[0]
-
-
-def stated_rows(path: Path) -> int | None:
-    """Return the number of rows that a file's first bytes state, unchecked; None if none."""
-    return _stated(path)[1]
-
-
-def _stated(path: Path) -> tuple[str | None, int | None]:
+def stated(path: Path) -> tuple[str | None, int | None]:
+    """Return the hash and the number of rows that a file's first bytes state, without checking that its content still
+    matches; None for either where there is none."""
     try:
         with outside.open_file(path) as file:
             room = file.read(ROOM)

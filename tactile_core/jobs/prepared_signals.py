@@ -68,7 +68,7 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
     TactileError if the recording changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
-    frames = checksummed.stated_rows(file)
+    _, frames = checksummed.stated(file)
     if frames is not None and checksummed.verified_checksum(file) is not None:
         return frames, False
     check_unchanged(one)

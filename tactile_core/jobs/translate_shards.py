@@ -134,7 +134,7 @@ def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict
 def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts | None:
     """Return the facts of a prepared recording: shards, frames, warnings, bytes; None where it is not prepared."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
-    frames = checksummed.stated_rows(file)
+    _, frames = checksummed.stated(file)
     if frames is None:  # none yet, or a damaged one, which the next run makes again
         return None
     done = translated(frames, job)

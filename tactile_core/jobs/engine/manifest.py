@@ -133,7 +133,7 @@ def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)
-        digest = checksummed.stated_checksum(path)
+        digest, _ = checksummed.stated(path)
         if digest is not None:
             listed["shards"].append({"file": path.name, "sha256": digest})
     return listed | {"warnings": warnings}
