@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -165,10 +166,8 @@ def fit_unit(
 
     check_orientation(photographs, ball_diameter, start, part(0, CHECKED))
     apart = cross_validated(photographs, ball_diameter, start, quick=quick, progress=part(CHECKED, TRIED))
-    fitted = calibrate(
-        photographs, ball_diameter, start, unit=unit, quick=quick, reflectance=reflectance, progress=part(TRIED, 100)
-    )
-    return fitted, apart
+    fit = functools.partial(calibrate, unit=unit, quick=quick, reflectance=reflectance, progress=part(TRIED, 100))
+    return fit(photographs, ball_diameter, start), apart
 
 
 def cross_validated(
@@ -202,8 +201,7 @@ def check_worth(tried: list[Evaluation]) -> None:
     tried : its evaluations, on presses held out"""
     ours, baseline = mean_metrics(tried)
     if not ours["roi_l1"] <= WORTH * baseline["roi_l1"]:
-        found = (
-            f"{ours['roi_l1']:.1f} levels off in the region of the press, the background alone {baseline['roi_l1']:.1f}"
-        )
+        off, alone = ours["roi_l1"], baseline["roi_l1"]
+        found = f"{off:.1f} levels off in the region of the press, the background alone {alone:.1f}"
         advice = "Check --ball-diameter, --background, the light, and that the pictures lie fingertip up"
         raise TactileError("calibration, tried on held-out presses", found, f"at most {WORTH:g} of that", advice)

@@ -89,7 +89,9 @@ def calibrate(
         search.fit(every, MitsubaPictures(working_preset(QUALITY, factor)), FINISHING_STEPS)
     fitted = search.calibration().at_size(whole.camera.width, whole.camera.height)
     if reflectance is not None:
-        fitted = _transmitting(fitted, reflectance)
+        # The transmission that explains the object's light by an object of this reflectance.
+        coating = dataclasses.replace(fitted.coating, transmission=min(fitted.through / reflectance, 1.0))
+        fitted = dataclasses.replace(fitted, coating=coating, object_reflectance=reflectance)
     used = dataclasses.replace(photographs, presses=tuple(search.presses))
     tried = evaluate_unit(fitted, used, ball_diameter / 2, search_radius=False)
     progress(total, total)
@@ -111,12 +113,6 @@ def calibrate(
     if trouble:
         warnings = (f"fitted by the fast picture alone: {trouble}", *warnings)
     return Calibrated(calibration, tried, warnings)
-
-
-def _transmitting(unit: Calibration, reflectance: float) -> Calibration:
-    """Return the unit with the transmission that explains the object's light by an object of this reflectance."""
-    coating = dataclasses.replace(unit.coating, transmission=min(unit.through / reflectance, 1.0))
-    return dataclasses.replace(unit, coating=coating, object_reflectance=reflectance)
 
 
 def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
@@ -203,9 +199,8 @@ class _Search:
 
     def _minimise(self, x: np.ndarray, steps: int) -> None:
         done = self._done
-        self._x, _ = minimise(
-            self._problem, x, most=steps, tolerance=TOLERANCE, progress=lambda step: self._progress(done + step)
-        )
+        shown = lambda step: self._progress(done + step)  # noqa: E731
+        self._x, _ = minimise(self._problem, x, most=steps, tolerance=TOLERANCE, progress=shown)
         self._problem.cost(self._x)
         self._done += steps
 
@@ -220,9 +215,8 @@ class _Search:
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted
         errors[self._free] = MODEL_ERROR * np.sqrt(np.diag(np.linalg.inv(matrix)))[: self._free.sum()]
-        unknown = [
-            name for name, error, spread in zip(NAMES, errors, SPREAD, strict=True) if error > IDENTIFIED * spread
-        ]
+        found = zip(NAMES, errors, SPREAD, strict=True)
+        unknown = [name for name, error, spread in found if error > IDENTIFIED * spread]
         named = dict(zip(NAMES, errors.tolist(), strict=True))
         for name in ("px_per_mm_x", "px_per_mm_y"):
             named[name] *= factor
