@@ -72,7 +72,7 @@ def _of_nothing(depth: float) -> Errors:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Read the table of measured errors: how it was made, and ms and errors by tier, sensor and depth."""
+    """Read the table of measured errors: ["tiers"][tier][sensor] holds ``ms`` per contact and ``bins`` by depth."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 

@@ -257,7 +257,7 @@ _HARDLY_APART = 0.1e-3  # m: at first touch a node is mostly this near
 
 
 def thickness_under(sensor: str, indenter: Indenter, pose: Pose) -> float:
-    """Return ``sensors.thickness_at``, m, of the resting surface's node nearest to an indenter at first touch."""
+    """Return the thickness, m, of gel, or of skin and fluid, at the node nearest to an indenter at first touch."""
     surface, reach = sensors.sensor_surface(sensor), _HARDLY_APART
     nodes, gap = surface.blocks.near(indenter, pose, reach)
     while not len(nodes):

@@ -94,7 +94,7 @@ def write_vtu(
 
 
 def solid_data(solid: FiniteStrainSolid, state: State) -> tuple[Data, Data]:
-    """Return the point data and the cell data of a solved state by name, as listed in ``write_vtu``."""
+    """Return data of a solved state: at points displacement, force, stress, von_mises; of cells von_mises, pressure."""
     cauchy = stress.cauchy(solid, state)
     at_nodes = stress.at_nodes(solid, cauchy)
     six = [at_nodes[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
@@ -166,7 +166,7 @@ SUFFIXES = (".ply", ".stl", ".vtu")
 
 
 def check_suffix(path: str | os.PathLike) -> None:
-    """Raise TactileError for a file name that ends in none of ``SUFFIXES``, whatever the case."""
+    """Raise TactileError for a file name that ends in none of .ply, .stl and .vtu, in capitals or not."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"the ending {Path(path).suffix!r}", " or ".join(SUFFIXES), "It chooses the format")
 
@@ -184,7 +184,7 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
     """Write a solved contact on a sensor, in the format that the ending of ``path`` says.
 
     Of a tier that solves the volume: ``.vtu`` that volume, ``.ply`` and ``.stl`` its surface at its own nodes, with the
-    force on each (N) and its von Mises stress (Pa). Of the fast tier the deformed surface, with the touching nodes.
+    force on each (N) and its von Mises stress (Pa). Of the fast tier the deformed surface, ``contact`` 1 where touched.
     Raises what the writers raise."""
     check_suffix(path)
     if solution.volume is None:

@@ -75,7 +75,7 @@ USUAL_RADIUS = 4e-3  # m, the median of translated patches of the test contacts
 
 @dataclass(frozen=True)
 class BodyContact:
-    """A body pressed into a sensor. body : its shape; place : where, and which way it leans; force : N, its size"""
+    """A body pressed into a sensor. body : its shape; place : where, and how it leans; force : N, along its motion"""
 
     body: Indenter
     place: Placement
@@ -100,8 +100,8 @@ def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Plac
 
 
 def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
-    """Radius, m, of the ball whose paraboloid fits a pressed patch best, within ``RADII``; ``USUAL_RADIUS`` if the
-    patch has less than 5 nodes.
+    """Radius, m, of the ball whose paraboloid fits a pressed patch best, 1.5 to 14 mm; 4 mm for a patch of less
+    than 5 nodes.
     points : (k, 3) m of its nodes, displaced; outward : (3,), normal of the patch"""
     if len(points) < LEAST_NODES:
         return USUAL_RADIUS
@@ -151,9 +151,8 @@ class _Trial:
 
 
 def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> BodyContact:
-    """Find the body pressed into a BioTac's skin: the most likely of `likely_contacts`, whose arguments and errors
-    hold.
-    displacement : (3650, 3) m of the skin's nodes
+    """Find the body pressed into a BioTac's skin: the most likely of `likely_contacts`, whose errors hold.
+    displacement : (3650, 3) m of the skin's nodes; bodies : shapes that it may be, beside a ball of any size
     >>> contact = skin_contact(displacement, [tactile.indenters.Sphere(2e-3)])
     >>> gel = contact.on_gel().displacement
     """

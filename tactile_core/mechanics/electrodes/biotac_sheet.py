@@ -155,7 +155,7 @@ _PAD = -2e-3  # m, y below which dents lie
 
 
 class ReducedSheet:
-    """Resistances of ``sheet`` where potentials are sums of r fields (n - 1, r); the first of n nodes is at 0."""
+    """A ``sheet`` that is quick to solve: its n potentials, V, the first 0, are sums of r fields (n - 1, r)."""
 
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields

@@ -82,7 +82,7 @@ class ThinSheet:
 
 
 def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
-    """Return the resistances (sensing,) ohm between each of the first electrodes and all others, joined by a wire.
+    """Return the resistances (sensing,) ohm from each of the first ``sensing`` electrodes to all later ones, joined.
 
     potentials : (k, k), of ``ThinSheet.potentials``. The joined electrodes are at one potential, and their currents
     sum to the one electrode's: a linear system for these currents and that potential.

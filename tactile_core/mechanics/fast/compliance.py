@@ -188,7 +188,7 @@ def compact_file(sensor: str) -> pathlib.Path:
 
 
 def condensed(solid: Solid) -> tuple[Half, Half]:
-    """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, in a skin, the fluid's swell.
+    """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, last in a skin, the fluid at 1 Pa.
 
     Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where memory is too small.
     """
@@ -223,8 +223,8 @@ def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
-    """Join the halves of a solid, of ``condensed``, and add the fluid; yield name and values of each of ``ARRAYS``, one
-    by one to save memory. Overwrites the halves."""
+    """Join the halves of a solid, of ``condensed``, and add the fluid; yield names and values of
+    ``Compliance``'s float arrays, one by one to save memory. Overwrites the halves."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
     kept, column, sign = kept_loads(solid)

@@ -17,16 +17,16 @@ _INNER = 2**40  # more than a surface has degrees of freedom
 
 
 class Rows(Protocol):
-    """Compliance among points near an indenter, listed in ``near`` (n,): nodes, or nodes and points between them."""
+    """Compliance among points near an indenter: nodes, by position in ``touchable``, and perhaps points between."""
 
     near: np.ndarray  # sorted indices (n,): a touchable node's, or their count plus that of a point between
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among points; numbers : (k,) sorted indices, in ``near``"""
+        """Return the compliance (3 k, 3 k) float32 m/N among points; numbers : (k,) sorted, some of ``near``"""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        points; numbers : (k,) their indices, in ``near``"""
+        points; numbers : (k,) sorted, some of ``near``; inner : positions among all sensing points"""
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
         """Return the points' displacements (n, 3) m by force (k, 3) N at sorted nodes (k,) and inner_force (c,) N at
@@ -34,7 +34,7 @@ class Rows(Protocol):
 
 
 class ComplianceRows:
-    """Response of nodes near an indenter to forces on some of them. ``near`` (n,) are sorted touchable indices."""
+    """Response of nodes near an indenter to forces on some of them. near : (n,) positions in ``touchable``, sorted"""
 
     def __init__(self, compliance: Compliance, near: np.ndarray) -> None:
         self.compliance, self.near = compliance, near
@@ -48,7 +48,7 @@ class ComplianceRows:
         self._known = np.zeros(len(near), bool)
 
     def block(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among sorted touchable nodes (k,), all of them near ones."""
+        """Return the compliance (3 k, 3 k) float32 m/N among nodes (k,), sorted, some of ``near``."""
         return self._rows(nodes).take(axes_of(np.searchsorted(self.near, nodes)), axis=1)
 
     def sensing_motion(self, nodes: np.ndarray, inner: np.ndarray) -> np.ndarray:
@@ -56,7 +56,7 @@ class ComplianceRows:
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the near nodes' displacements (n, 3) m; for nodes, force, inner, inner_force see ``Rows.moved``."""
+        """Return ``near``'s displacements (n, 3) m: force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
         moved = self._under(nodes, force)
         if len(inner):
             moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
@@ -146,8 +146,8 @@ def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.n
 def surface_motion(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
-    """Return the surface's motion (n, 3) float32 m by force (k, 3) N at sorted touchable nodes (k,) and inner_force
-    (c,) N at sensing points ``inner`` (c,)."""
+    """Return the surface's motion (n, 3) float32 m by force (k, 3) N at nodes (k,), sorted positions in
+    ``touchable``, and inner_force (c,) N at sensing points ``inner`` (c,)."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
     moved = _sum_motion(compliance.move, row, mirrored, image, force, compliance.inner_move, inner, inner_force)

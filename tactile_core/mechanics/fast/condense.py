@@ -189,7 +189,7 @@ def axes_of(nodes: np.ndarray) -> np.ndarray:
 
 
 class MirrorSymmetry:
-    """Joins the even and the odd half of a motion. half : (k,) surface nodes with z >= 0; image : (n,) of each node"""
+    """Joins a motion's even and odd half. half : (k,) surface nodes, z >= 0; image : (n,) of each surface node"""
 
     def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
         count = 3 * len(half)

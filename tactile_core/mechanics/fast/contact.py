@@ -105,12 +105,12 @@ class ContactProblem:
 
     @property
     def near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of the nodes that are followed."""
+        """Sorted positions (n,) in ``compliance.touchable`` of the nodes that are followed."""
         return self._rows.near
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of followed nodes: ``near`` without ``EdgeContactProblem``'s points between."""
+        """Followed nodes (n,), by position in ``touchable``: ``near`` without an edge contact's points between."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:

@@ -24,8 +24,8 @@ class Contact:
 
     pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
-    nodes : (k,) touchable indices that carry force; nodal_force : (k, 3). Forces between nodes are spread over the
-        nodes whose cubic interpolation gives their places: some nodes then have a small outward force
+    nodes : (k,) positions in ``touchable`` of nodes that carry force; nodal_force : (k, 3). Forces between nodes are
+        spread over the nodes whose cubic interpolation gives their places: some nodes then have a small outward force
     slipping : (k,) bool, nodes whose friction is at its limit; without friction all
     converged : false if the solve ended early: do not use it; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
@@ -93,8 +93,8 @@ def sideways_share(force: np.ndarray, normal: np.ndarray) -> float:
 
 
 def borne(before: Contact, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return forces (k, 3) N that ``nodes`` (k,), touchable indices, bore in the contact ``before``, 0 for others, and
-    which of them slipped (k,)."""
+    """Return forces (k, 3) N that ``nodes`` (k,), positions in ``Compliance.touchable``, bore in the contact
+    ``before``, 0 for others, and which of them slipped (k,) bool."""
     force, slipping = np.zeros((len(nodes), 3)), np.zeros(len(nodes), bool)
     same = among(nodes, before.nodes)
     at = np.searchsorted(before.nodes, nodes[same])
@@ -122,7 +122,7 @@ _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well be
 @dataclasses.dataclass
 class Candidates:
     """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
-    nodes : (k,) touchable indices; displacement : (k, 3) m, first guess
+    nodes : (k,) positions in ``Compliance.touchable``; displacement : (k, 3) m, first guess
     probe : (k, 3) m, offset beside a node in a crease at which its face's distance is measured, else 0
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
     looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known"""

@@ -67,7 +67,7 @@ class EdgeContactProblem(ContactProblem):
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Sorted touchable indices (n,) of the followed nodes, without the points between them."""
+        """Sorted positions (n,) in ``touchable`` of the followed nodes, without the points between them."""
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
@@ -133,7 +133,7 @@ class EdgeContactProblem(ContactProblem):
 
 
 class InterpolatedPoints(NamedTuple):
-    """v points between nodes, each a weighted sum of 16. nodes : (v, 16), touchable indices; weights : (v, 16)"""
+    """v points between nodes, each a sum of 16. nodes : (v, 16), positions in ``touchable``; weights : (v, 16)"""
 
     nodes: np.ndarray
     weights: np.ndarray
@@ -158,7 +158,7 @@ def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> Interpolated
 class SpringRows:
     """Compliance among nodes near an indenter and points between them: see ``ComplianceRows``.
 
-    near : (n,) sorted indices: of touchable nodes, then their count plus that of points, whose nodes are all among them
+    near : (n,) sorted: nodes by position in ``touchable``, then points, numbered on from its end, with all their nodes
     softness : m/N, of the springs, all alike
     """
 
@@ -171,7 +171,7 @@ class SpringRows:
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N with springs; numbers : (k,) sorted indices in ``near``"""
+        """Return the compliance (3 k, 3 k) float32 m/N with springs; numbers : (k,) sorted, some of ``near``"""
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -185,20 +185,20 @@ class SpringRows:
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
         """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        points; numbers : (k,) their sorted indices, in ``near``"""
+        points; numbers : (k,) sorted, some of ``near``"""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the displacement (n, 3) m of ``near``, nodes and points; see ``Rows.moved``."""
+        """Return ``near``'s displacements (n, 3) m: force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Share force (k, 3) N on nodes and points out to nodes: return those (j,), sorted, and forces (j, 3) N on
         them.
-        numbers : (k,), where force acts, distinct and sorted, as in ``near``"""
+        numbers : (k,), where force acts, distinct and sorted, some of ``near``"""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
         np.add.at(loads, self._nodes[at], self._weights[at][:, :, None] * force[:, None])

@@ -27,7 +27,7 @@ _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # most nodes, least curvature x force 
 
 
 class Friction:
-    """Solves for the k nodes and c points over the core of one block.
+    """Solves for the k nodes and c points over the core of one ``ComplianceBlock``.
     rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
     spots : (k, 3) m, where nodes stick, in the indenter's frame; friction : Coulomb's coefficient
     stiffness : inverse of the previous solve, of whatever block, which this one updates"""

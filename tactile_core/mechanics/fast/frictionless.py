@@ -101,10 +101,10 @@ class Pace:
 
 
 class Frictionless:
-    """Solves for the k nodes and c points over the core of one block.
+    """Solves for the k nodes and c points over the core of one ``ComplianceBlock``.
 
     rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
-    probe, faced : (k, 3) m and (k,) bool, see ``Candidates``
+    probe : (k, 3) m, offset at which a node in a crease is measured; faced : (k,) bool, nodes whose faces are known
     most_curved : most tangent directions in the Newton step; more of them cost more time than they save"""
 
     most_curved = 20

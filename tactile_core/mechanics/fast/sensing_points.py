@@ -63,8 +63,8 @@ def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
     """Points of the inner skin nearest to each of e electrodes: there the fluid film over the electrode ends.
-
-    face : (e,) triangle; weights : (e, 3) of its nodes; outward : (e, 3) unit, from the electrode; gap : (e,) m"""
+    face : (e,) triangle in the inner surface's ``faces``; weights : (e, 3) of its nodes
+    outward : (e, 3) unit, from the electrode; gap : (e,) m"""
 
     face: np.ndarray
     weights: np.ndarray
@@ -114,7 +114,7 @@ def _beside(sensor: str, mesh: HexMesh) -> np.ndarray:
 
 
 def facing_nodes(sensor: str, mesh: HexMesh) -> np.ndarray:
-    """Return the inner nodes (f,) that may come to press on the core, each with its mirror image."""
+    """Return the inner lattice's nodes (f,), ascending, that may press on the core; mirror images are among them."""
     inner = _inner(sensor)
     faces = facing_core(sensor, inner) & ~mesh.clamped[mesh.inner]
     return np.flatnonzero(faces & faces[mirror_nodes(inner)])

@@ -274,9 +274,9 @@ class PlacedIndenter:
     pose: Pose
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the distance (n,) m and unit normal (n, 3); see ``Obstacle.distance``."""
+        """Return the distance (n,) m, positive outside, and unit normal (n, 3) at points (n, 3) m."""
         return self.pose.distance(self.indenter, points)
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance's second derivatives (n, 3, 3) 1/m; see ``Obstacle.curvature``."""
+        """Return the distance's second derivatives (n, 3, 3) 1/m at points (n, 3) m."""
         return self.pose.curvature(self.indenter, points)

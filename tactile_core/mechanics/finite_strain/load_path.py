@@ -66,7 +66,7 @@ class LoadPath:
         self.last = self.problem.start()
 
     def to(self, step: Step, guess: float) -> Solution:
-        """Solve the next step, see ``solve_path``; guess : m, about the depth at which a given force is found.
+        """Solve the path's next step; guess : m, about the depth at which the force of a ``step`` by force is found.
         Where no contact is found, tries in turn: a finer mesh, from the start (full tier); then, in a contact without
         friction, friction that fades to 0; short steps from the start; penalty points at every edge (full tier)."""
         before = self.last

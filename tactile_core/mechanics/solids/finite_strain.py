@@ -207,7 +207,7 @@ class Linearised:
     residual : (n_cells, 81) N, internal forces; condensed : those plus what the pressures' own residual adds as they
         are eliminated
     stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
-    to_pressure, pressure_gap : (n_cells, 4, 81) Pa/m and (n_cells, 4) Pa, for ``pressure_step``"""
+    to_pressure : (n_cells, 4, 81) Pa/m, change of pressure per step; pressure_gap : (n_cells, 4) Pa, without one"""
 
     solid: FiniteStrainSolid
     residual: np.ndarray

@@ -82,8 +82,8 @@ def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: 
 
 
 def inner_faces(mesh: HexMesh) -> np.ndarray:
-    """Return the quadratic faces (n, 9) of the inner skin, the undersides of its cells, in the node order that
-    ``FluidCavity`` takes: outward from the fluid."""
+    """Return the quadratic faces (n, 9) of the inner skin, the undersides of its cells, node 3 a + b at
+    (xi, eta) = (a, b) - 1, as ``FluidCavity`` takes them: outward from the fluid."""
     faces = mesh.cells[:, :9]
     faces = faces[np.isin(faces, mesh.inner).all(axis=1)]
     return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)

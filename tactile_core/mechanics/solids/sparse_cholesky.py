@@ -174,7 +174,7 @@ class DampedFactor:
 
 
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Return the curvature terms ``bending`` (k, 3, 3) N/m, limited to a share of their nodes' stiffness (k, 3, 3) N/m.
+    """Return the curvature terms ``bending`` (k, 3, 3) N/m, at most 0.3 of their nodes' stiffness (k, 3, 3) N/m.
 
     At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it only costs steps."""
     size = np.abs(bending).max(axis=(1, 2))
