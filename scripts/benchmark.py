@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
 def stage_measured(
     stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
 ) -> Iterator[Method]:
-    """Measure every method of a stage, with ``quick`` on less; those that cannot run here are noted in ``missing``.
+    """Measure every method of a stage, with ``quick`` on less; for those that cannot run, ``missing`` gets why.
 
     file : where the first method of pictures and chain leaves the others' truth
     only : words that name a stage, or a stage and a method; none for all"""

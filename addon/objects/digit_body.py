@@ -27,7 +27,7 @@ def has_body(gel: bpy.types.Object) -> bool:
 
 
 def leds_of(gel: bpy.types.Object) -> dict[str, bpy.types.Object]:
-    """Return the gel's LED objects by colour, whatever their names."""
+    """Return the gel's LED objects by colour ("red", "green", "blue"), whatever they are called in the scene."""
     return {thing.tactile.colour: thing for thing in parts_of(gel) if thing.tactile.role == "LED"}
 
 

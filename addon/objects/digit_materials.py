@@ -46,7 +46,7 @@ def keep_leds_inside(material: bpy.types.Material) -> None:
 
 
 def set_coating(material: bpy.types.Material, coating: Coating) -> None:
-    """Write a coating's numbers; a matte one has no gloss."""
+    """Write a coating's numbers into its material, whose keys and drivers are removed; a matte coating gets gloss 0."""
     if material.node_tree.animation_data:
         material.node_tree.animation_data_clear()
     sockets = sockets_of(material)
@@ -56,7 +56,7 @@ def set_coating(material: bpy.types.Material, coating: Coating) -> None:
 
 
 def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
-    """Return the coating's numbers as sockets, by name, without those whose node was deleted."""
+    """Return the sockets of a coating's "Albedo", "Roughness" and "Gloss", by name, but for deleted nodes'."""
     nodes = material.node_tree.nodes
     return {name: nodes[name].outputs[0] for name in _PLACES if name in nodes}
 
@@ -101,7 +101,7 @@ def toward_camera(nodes: Nodes, value: bpy.types.NodeSocket | float) -> bpy.type
 
 
 def surface_of(material: bpy.types.Material) -> bpy.types.NodeSocket:
-    """Return the material's output, which takes the shader of its surface."""
+    """Return the socket of a material's output node that takes the shader of its surface."""
     return next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL").inputs["Surface"]
 
 

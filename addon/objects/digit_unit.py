@@ -110,7 +110,7 @@ def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormat
 
 
 def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") -> list[str]:
-    """Say what a gel's pictures by a preset ("": any) ignore of the scene: lamps, blur, frames at rest, colours."""
+    """List in words what a gel's pictures by a preset ("": any) leave out of the scene, and what changes levels."""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     if preset == "fast":

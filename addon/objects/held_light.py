@@ -23,7 +23,7 @@ _DARKEST = 1e-3  # least albedo or radiance to divide by
 
 
 def attribute(colour: str) -> str:
-    """Return the name of the mesh attribute that holds the light of the LED of a colour."""
+    """Return the name of the mesh attribute of one LED's held light; colour : "red", "green" or "blue", the LED's"""
     return f"{NODE} {colour}"
 
 
@@ -41,7 +41,7 @@ def write(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def held_light(unit: Calibration) -> np.ndarray:
-    """Compute the grey levels (n, channel, LED) that the picture at rest has at the nodes beyond its lamps' light."""
+    """Return grey levels (n, channel, LED), both red, green, blue, of the resting picture less its lamps' light."""
     radiance = open_radiance(unit)
     levels = by_led(unit, radiance)
     diagonal = np.arange(3)
@@ -103,9 +103,9 @@ def add_nodes(material: bpy.types.Material) -> None:
 
 
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
-    """Let each part follow its LED's power in its own colour; works without the add-on.
+    """Let each LED's held light in a coating follow that LED's power, by drivers, which work without the add-on.
 
-    full : Blender's power, W, of each LED's lamp in the calibration
+    leds, full : by colour ("red", ...), the LED objects, and Blender's power, W, of their lamps in the calibration
     """
     for k, name in enumerate(COLOURS):
         socket = material.node_tree.nodes[attribute(name)].outputs[0]

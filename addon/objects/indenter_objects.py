@@ -93,7 +93,7 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return triangles (m, 3, 3), Blender units, modifiers applied, from the object's origin, in the sensor's axes.
+    """Return triangles (m, 3, 3), Blender units, modifiers applied, from its origin, in a sensor object's axes.
     relative : (3, 3), of ``world_axes``"""
     nodes, corners = surfaces.triangles_of(thing.evaluated_get(depsgraph).data)
     if not len(corners):
@@ -110,8 +110,8 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return the vector (3,), Blender units, from the object's origin to its first touch; zero for a spec's body.
-    relative : (3, 3), of ``world_axes``"""
+    """Return the vector (3,), Blender units, in the sensor object's axes, z outward, from the indenter's origin to its
+    first touch; zero for a spec's body. relative : (3, 3), of ``world_axes``"""
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
@@ -120,7 +120,7 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """Return the axes (3, 3) of the object, scaled, in those of a sensor object."""
+    """Return the axes of the object, scaled, as columns (3, 3) in a sensor object's own axes, z out of the sensor."""
     return np.array(axes.from_world(sensor) @ thing.matrix_world)[:3, :3]
 
 

@@ -29,7 +29,7 @@ def check_rest(*things: bpy.types.Object) -> None:
 def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarray, motion: str) -> str:
     """Let an object play a movement at the scene's frames (T,); returns words for the user on what plays it.
 
-    motion : one of ``properties.MOTIONS``; empty, as for the compact keys of older files, is SHAPE_KEYS
+    motion : "SHAPE_KEYS" or "MESH_CACHE"; empty, as for the compact keys of older files, is "SHAPE_KEYS"
     Raises TactileError where a mesh cache cannot be written.
     """
     about = thing.tactile

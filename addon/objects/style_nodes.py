@@ -34,7 +34,7 @@ _EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, between which its colour fades
 
 
 def group(style: str) -> bpy.types.NodeTree:
-    """Return the node group of a style, a key of NAMES, made where the file lacks it."""
+    """Return the node group of a style, or of "FORCE_ARROW", by its key in ``NAMES``; made where the file lacks it."""
     found = bpy.data.node_groups.get(NAMES[style])
     return found if found is not None else _BUILD[style](style)
 

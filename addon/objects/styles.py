@@ -31,7 +31,7 @@ def get_ready(thing: bpy.types.Object) -> None:
 
 
 def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
-    """Give a sensor a style, a key of STYLES, in place of another.
+    """Give a sensor a style, "DISPLACEMENT", "CONTACT_PATCH", "ELECTRODES" or "NONE", in place of another.
 
     largest : value at the colours' upper end, object's units or counts; exaggeration : how many times the dent is drawn
     """
@@ -54,7 +54,7 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
 
 
 def style_of(thing: bpy.types.Object) -> str:
-    """Name a sensor's style; "NONE" for one of the user's own, too."""
+    """Return a sensor's style by its key, as ``set_style`` takes it; "NONE" for nodes of the user's own, too."""
     modifier = thing.modifiers.get(MODIFIER)
     names = [name for name, _, _ in STYLES if name != "NONE"]
     shown = None if modifier is None else modifier.node_group

@@ -77,9 +77,9 @@ def _drawn_of(
 
 
 def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Compute what a picture's pixels see of a gel, float32 (H, W, channels), vectors in the gel object's axes.
+    """Compute what pixels see of a gel, float32 (H, W, channels) by name; size : (width, height) px; raises as ``draw``
 
-    Height and Displacement, mm; Normal; Contact, the share that is touched. Raises as ``draw`` does.
+    Height (1), Displacement (3), mm; Normal (3); Contact (1), share touched, 0 to 1; in the gel object's axes
     """
     shown, moved = shown_state(gel, depsgraph, size)
     unit = shown.unit
@@ -98,7 +98,7 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 
 
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Start the worker of a preset of Mitsuba's, in a window, so that it has compiled before its first picture.
+    """Start the worker of a scene's Mitsuba preset, to compile before its first picture; not without a window.
 
     Raises nothing where no picture can be drawn: ``draw`` will.
     """

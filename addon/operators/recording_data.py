@@ -54,7 +54,7 @@ class Translated:
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return the skin's custom properties by name, (T,) or (T, k); forces are in Blender's axes."""
+        """Return the skin's custom properties (T,) or (T, k) by name; ``curves.PROPERTIES`` has units and axes."""
         translation = self.translation
         values = {
             "electrodes": self.signals.change,
@@ -137,7 +137,7 @@ def load(
     """Read, tare and translate a recording; repeats return the result kept.
 
     progress : called with the share done, 0 to 1
-    motion : one of ``properties.MOTIONS``; "" stores displacements in mesh caches (files) above ``LONG`` frames
+    motion : "SHAPE_KEYS", "MESH_CACHE" (displacements in files), or "" for the latter above ``LONG`` frames
     per_metre : Blender units per metre of such files. Raises TactileError for unreadable files and missing frames."""
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32

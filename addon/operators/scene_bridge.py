@@ -144,8 +144,8 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
 
 
 def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
-    """Return apex (P, 3) m in the sensor's frame and force (P,) N of the indenter ``thing`` at frames (P,), fractional
-    ones too; the scene keeps its current frame."""
+    """Return "apex" (P, 3) m, where the indenter ``thing`` touches, in the sensor's frame, and "force" (P,) N at frames
+    (P,), fractional ones too; the scene keeps its current frame."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
     try:

@@ -95,7 +95,7 @@ def follow(thing: bpy.types.Object, before: float) -> None:
 def animate(thing: bpy.types.Object, moved: Motion, frames: np.ndarray, how: str, values: dict[str, np.ndarray]) -> str:
     """Let a sensor play a movement at frames (T,), its contact patch, style and properties with it.
 
-    how : one of ``MOTIONS``; values : (T,) or (T, k) by name of ``curves.PROPERTIES``. Returns a sentence for the user.
+    how : "SHAPE_KEYS" or "MESH_CACHE"; values : (T,) or (T, k) by name of ``curves.PROPERTIES``. Returns a sentence.
     """
     before = thing.tactile.largest
     summary = motion.animate(thing, moved, frames, how)

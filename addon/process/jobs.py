@@ -30,8 +30,8 @@ class Job:
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
-        """Start the worker on a job of a kind, one of ``worker.JOBS``. folder : of its input and output; options :
-        what else job.json says; listening : true if it waits for what ``tell`` sends"""
+        """Start the worker. kind : of job, a key of ``worker.JOBS``, such as "simulate"; folder : of its input
+        and output; options : what else job.json says; listening : true if it waits for what ``tell`` sends"""
         self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
         self.drawn = 0
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
@@ -55,7 +55,7 @@ class Job:
         return self.done / self.total
 
     def tell(self, message: dict) -> None:
-        """Send a message to a listening worker; if it has died, the next ``poll`` raises its error."""
+        """Send a listening worker a message that its job reads; if it has died, the next ``poll`` raises its error."""
         with contextlib.suppress(OSError), _alive_on_broken_pipe():
             self._process.stdin.write(json.dumps(message) + "\n")
             self._process.stdin.flush()

@@ -22,7 +22,7 @@ from .jobs import Job, JobFolder
 
 
 def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Recording:
-    """Read a recording as ``tactile_core.recordings.read`` does; columns : file of a map, or empty."""
+    """Read a recording of ``sensor`` as ``recordings.read`` does; columns : file that maps its columns, or empty"""
     if _is_hdf5(path) and not _hdf5_works():
         return _read_elsewhere(os.fspath(path), sensor, columns)
     return recordings.read(path, column_map.read(columns) if columns else None, sensor)

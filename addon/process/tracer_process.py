@@ -35,7 +35,7 @@ class Stopped(Exception):
 
 
 class Tracer:
-    """A worker that draws height maps by one preset, until closed; each may have another unit and surroundings."""
+    """A worker that draws pictures of height maps by one preset, until closed; unit and surroundings may change."""
 
     def __init__(self, preset: str) -> None:
         self._folder, self._count, self._unit = JobFolder(), 0, ""
@@ -56,7 +56,7 @@ class Tracer:
     ) -> np.ndarray:
         """Draw the picture (H, W, 3) uint8 of heights (H, W) m; those before it, noisier, are given to ``better``.
 
-        Raises TactileError, or Stopped when asked to stop.
+        Raises TactileError, or Stopped once stopped() returns true, which is asked again and again.
         """
         self._count += 1
         drawn = self._job.drawn

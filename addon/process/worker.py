@@ -47,7 +47,7 @@ def say(**message: Any) -> None:
 
 
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
-    """Simulate FOLDER/scene.toml into recording.h5 and result.npz: its truth, and the indenter's place on each frame.
+    """Simulate FOLDER/scene.toml into recording.h5 and result.npz: true forces and displacements, indenter's places.
 
     job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None;
     job["seed"] : of the noise; job["placed_on"] : sensor that places refer to; job["first_frame"], job["rate"] : of the
@@ -167,9 +167,9 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
 
 
 def _result(folder: Path, sensor: str, picked: list[str]) -> None:
-    """Write result.npz: the truth; what was picked, in words; apex (T, 3) m and axes (T, 3, 3) of the indenter.
-
-    It is lowered until it touches the dented surface of the sensor on which it is placed."""
+    """Write result.npz: seconds (T,), force (T, 3) N, "moved SENSOR" (T, n, 3) m; tiers picked, in words; apex (T, 3) m
+    and axes (T, 3, 3) of the indenter, which
+    is lowered until it touches the dented surface of the sensor on which it is placed."""
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
     from tactile_core.recordings.simulated import read_truth
@@ -201,8 +201,8 @@ def _result(folder: Path, sensor: str, picked: list[str]) -> None:
 def render(folder: Path, job: dict, progress: Progress) -> None:
     """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8.
 
-    A line without a number of a picture lets the renderer get ready alone. Unit and surroundings are those in the
-    folder, read when the line names others than the one before. Noisier pictures come first, where the preset has some.
+    A line is {"unit": name, "picture": number}; without a number the renderer only gets ready. Unit and surroundings
+    are read from the folder when "unit" changes. Noisier pictures come first, where the preset has some.
     """
     renderer, known = None, None
     for line in sys.stdin:
@@ -243,8 +243,8 @@ def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
-    """Solve the contacts of frames.npz, which networks found on the gel job["found_on"], on the gel job["gel"].
-
+    """Solve contacts that networks found on the gel job["found_on"], on the gel job["gel"], from FOLDER/frames.npz, a
+    translation's displacement_digit, contact_center, force, flags.
     FOLDER/gel.npz then holds displacement (T, n, 3) m and flags (T,).
     """
     from tactile_core.jobs import solved_gel

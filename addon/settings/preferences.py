@@ -46,7 +46,7 @@ class TACTILE_OT_clear_cache(TactileOperator):
 
 
 def size_of(folder: Path) -> int:
-    """Return how many bytes the files in a folder take."""
+    """Return how many bytes the files directly in a folder take, subfolders not counted."""
     return sum(file.stat().st_size for file in folder.iterdir() if file.is_file())
 
 

@@ -1,4 +1,4 @@
-"""Properties that the add-on stores in a .blend: the role of each object, and the path of its recording."""
+"""Properties in a .blend: each object's role, a key of ROLES ("BIOTAC": any skin, "DIGIT": any gel), its recording."""
 
 import functools
 import math

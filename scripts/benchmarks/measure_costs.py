@@ -47,7 +47,7 @@ class Part(NamedTuple):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print and write the results."""
+    """Measure, print and write the results; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="the DIGIT alone, and leave the table as it is")
     options = parser.parse_args(arguments)
@@ -74,7 +74,7 @@ def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, flo
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """Return a part's cost per frame and at its start; costs, sizes (bytes), frames : of runs on few and on many"""
+    """Return a part's cost at its start and per frame; costs (of ``run``), bytes, frames : of few, then of many"""
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
@@ -94,7 +94,7 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Measure, by name, `tactile convert` for each thing kept, and the fast `tactile render`; folder : for scratch"""
+    """Measure "convert_KEEP" of latent, displacement, height and image, and "render_fast"; folder : scratch"""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}

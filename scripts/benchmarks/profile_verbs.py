@@ -108,7 +108,7 @@ class Cost(NamedTuple):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print and write the results."""
+    """Measure, print and write the results; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help=f"without the {LONG} frames")
     options = parser.parse_args(arguments)

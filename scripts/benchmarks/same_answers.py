@@ -75,7 +75,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def contacts() -> dict[str, str]:
-    """Return the SHA-256 of the displacement under a ball of 3 mm radius, by sensor and force."""
+    """Return SHA-256 of the displacement under a ball of 3 mm radius, by a key such as "solve digit 0.5 N"."""
     ball, found = tactile.indenters.Sphere(radius=3e-3), {}
     for sensor, place in PLACES.items():
         for force in FORCES:

@@ -36,7 +36,7 @@ _TRIES = 12  # reductions by a fifth to a depth that both sensors bear: to a fou
 
 @dataclasses.dataclass(frozen=True)
 class TestPress:
-    """Press ``number`` of the test set: indenter ``which`` of the scene, place, depth m on the BioTac, slide (2,) m."""
+    """Press ``number`` of the test set. which : of the indenters; depth : m, on the BioTac; slide : (2,) m or None"""
 
     __test__ = False  # not a test, whatever pytest takes its name for
 
@@ -98,7 +98,7 @@ def _turn(scene: Scene, number: int) -> int:
 
 
 def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Solve a press; return its rows as in the file, see ``pairs_writer.units``, and a record of the solving.
+    """Solve a press; return arrays of each contact, as a file of pairs has them (``pairs_writer.units``), and a record.
 
     The record: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
     """

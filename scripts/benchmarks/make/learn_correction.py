@@ -58,8 +58,8 @@ _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no 
 
 
 class Known(NamedTuple):
-    """n samples. x : (n, f) features; log_ratio : (n,), natural, of the full tier's force to the fast one's
-    fields : (n, g, 3), as ``Learned.field``; fold : (n,) when it is held out; rubbing : (n,) bool, with friction"""
+    """n samples. x : (n, f) features; log_ratio : (n,), ln of full tier's force over fast's; fold : (n,), held out in
+    fields : (n, g, 3), full less fast displacement over depth, at g = LINES^2 places; rubbing : (n,) bool, friction"""
 
     x: np.ndarray
     log_ratio: np.ndarray
@@ -73,7 +73,7 @@ class Known(NamedTuple):
 
 
 def mirrored(field: np.ndarray) -> np.ndarray:
-    """Mirror ``field`` across z = 0: (..., LINES * LINES, 3), vectors on the patch's grid."""
+    """Mirror ``field`` (..., LINES * LINES, 3), vectors at places first along x, then along z, across z = 0."""
     grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
     return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
 
@@ -173,8 +173,8 @@ class Sample:
 def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[str, np.ndarray]:
     """Solve the full tier's contacts of a press at its ``SHARES`` with Coulomb's ``friction``, as far as they converge.
 
-    Returns depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
-    iterations (c,), load steps (c,) and seconds (c,)."""
+    By name: depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
+    iterations (c,), steps (c,), of load, and seconds (c,)."""
     pose = pose_at(sensor, press.indenter, press.place)
     deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
@@ -231,8 +231,8 @@ def _holds(problem: ContactProblem, contact: Contact) -> bool:
 
 
 def residual_on_grid(sensor: str, at: PatchFrame, residual: np.ndarray) -> np.ndarray:
-    """Interpolate a residual (n, 3) at a sensor's nodes to the grid (g, 3) of the patch frame ``at``, in the nodes' own
-    axes; 0 beyond the surface."""
+    """Interpolate a residual (n, 3) at a sensor's nodes to the g = LINES^2 places of the patch frame ``at``: (g, 3) in
+    the nodes' own axes and the residual's unit; 0 beyond the surface."""
     import scipy.interpolate
 
     local = np.einsum("kji,kj->ki", correction.node_frames(sensor), residual)

@@ -83,10 +83,10 @@ def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution
 
 
 def by_depth(misses: Iterable[Miss], edges: Sequence[float]) -> list[Bin]:
-    """Return median and 95 % of the errors in bins of depth over thickness with upper ends edges; empty ones are left
-    out.
+    """Return median and 95 % of the errors in bins of depth over thickness with upper ends edges; empty ones left out.
 
-    shape_um, force : rms um and relative, the median; shape_95_um, force_95 : 95 of 100 contacts have less"""
+    depth_share_to : the upper end; contacts : how many; shape_um, force : rms um and relative, the median;
+    shape_95_um, force_95 : 95 of 100 have less; baseline_um : of no displacement, median"""
     misses, found = list(misses), []
     for low, high in itertools.pairwise((0.0, *edges)):
         here = [each for each in misses if low < each.share <= high]

@@ -25,7 +25,7 @@ RADIUS, DEPTH, PITCH = 4.0, 0.5, 0.0295  # mm, mm, mm per pixel
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure the picture's time and memory by one program of ``NAMES``; quick changes nothing. Raises
+    """Measure the picture's time and memory by a program, "ours", "taxim", "taxim_shadows"; quick is unused. Raises
     ModuleNotFoundError where it is not installed."""
     draw = _ours() if name == "ours" else _taxim(name == "taxim_shadows")
     ms, mb = best_ms(draw), peak_mb()

@@ -41,7 +41,7 @@ indenters = [
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
     """Return rows of each set's ``count`` contacts: median errors of place, force (of firm contacts, too) and depth,
     the median overlap, and the mean of the gel's error, divided by that of no displacement.
-    known : contacts among which the nearest example is sought; bodies : for the place, see ``test_set.seen_rows``"""
+    known : contacts among which the nearest example is sought; bodies : surfaces of gel and skin"""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
         "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),

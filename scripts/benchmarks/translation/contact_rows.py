@@ -37,8 +37,8 @@ DRAWS = 200  # of each posterior: a share is known to .035 per contact, to .002 
 
 
 def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Measure medians over contacts that press without sliding, of three answers to signals read as ``change`` (C, 19)
-    counts, beside the nearest example."""
+    """Measure medians over contacts that press without sliding, of three answers to signals read as ``change``
+    (C, 19) counts, beside the nearest example. bodies : holds the gel's surface, for place and patch"""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
     answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, slice(None), bodies)
@@ -116,7 +116,7 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
 
 
 def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw ``count`` places (count, T, PLACE) of each of T contacts from a posterior, by the generator ``rng``."""
+    """Draw ``count`` places (count, T, 2) of T contacts from a posterior, in its units (see ``Posterior``)."""
     edges = np.cumsum(posterior.weight, -1)
     which = (rng.random((count, len(edges), 1)) > edges / edges[:, -1:]).sum(-1)
     frames = np.arange(len(edges))
@@ -161,7 +161,7 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
     """Return errors (B,) by name of gel (B, M, 3) m and force (B,) N, its size, on a part of the pairs; ``name`` begins
-    their names, which end in the unit."""
+    their names: place_mm, iou, force_size_percent, peak_percent. bodies : holds the gel's surface"""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {

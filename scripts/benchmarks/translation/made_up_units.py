@@ -211,7 +211,7 @@ def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSE
 
 
 def translated_contacts(network: Translator, made: Sequence[Played], taken: str) -> Translation:
-    """Translate the contacts of recordings, joined; taken : how their units are treated, a key of TAKEN"""
+    """Translate the contacts of recordings, joined; taken : their units, "given", "found" or "unknown" (typical)"""
     answers = []
     for each in made:
         options, unit = TAKEN[taken](each.unit)

@@ -82,7 +82,7 @@ def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def stepped(count: int, by: float) -> Fault:
-    """Return a fault: some electrodes move by ``by`` counts from some frame on; count : how many electrodes"""
+    """Return a fault, called as ``stuck`` is: some electrodes, ``count``, move by ``by`` counts from some frame on."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by

@@ -57,7 +57,7 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
 
 
 def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
-    """Return errors of ``judged`` frames, tracked and each alone; rest_off : counts, largest error of the rest."""
+    """Return ``judged``'s errors: contacts followed, then frames alone; rest_off : counts, largest error of the rest"""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
     followed, alone = [], []
     for number, signal in enumerate(truth["signal"]):
@@ -69,7 +69,7 @@ def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[
 
 
 def read(file: Path = FILE) -> Truth:
-    """Read the arrays of the test set, as ``make_sequences.described`` names them."""
+    """Read the test set's arrays (S, 40, ...): signal counts, force N, center m, peak m, patch, packed bits."""
     with np.load(file, allow_pickle=False) as found:
         return {name: found[name] for name in found.files}
 

@@ -135,7 +135,7 @@ def lowpass(values: np.ndarray) -> np.ndarray:
 
 
 def metrics(slide: Slide, found: Translation) -> dict[str, tuple[float, float]]:
-    """Return metrics of a translated recording by name, each beside that of the electrodes alone, untranslated."""
+    """Return (translation, electrodes alone) of rank, silence, missed (0 to 1), along, across (spread, mm)."""
     frames = slide.recording.start_time + slide.recording.time
     lost = ~np.isfinite(found.contact_center)
     columns = (accuracy.lengths(found.force), lost.any(axis=1), *1e3 * fill(found.contact_center, lost).T)
