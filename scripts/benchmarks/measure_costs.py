@@ -74,7 +74,7 @@ def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, flo
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """Return a part's cost at its start and per frame; costs (of ``run``), bytes, frames : of few, then of many"""
+    """Return a part's cost at its start and per frame; costs, sizes (bytes), frames : of a run on few, then on many"""
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
