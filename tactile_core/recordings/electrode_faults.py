@@ -42,7 +42,7 @@ def without_absent(
     """Fill electrodes that a file lacks with the rest of a sensor's typical unit, as if they never changed.
 
     electrodes : (T, e) float, in any unit of measurement, with NaN; names : of their columns, empty for none
-    Returns electrodes, a mask (e,) of the filled ones, and a sentence on them. TactileError where half are missing."""
+    Returns electrodes, a mask (e,) of filled ones, 0 or 1 sentence on them. TactileError where half are missing."""
     unread = ~np.isfinite(electrodes)
     empty = unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES) & ~unread.all()  # where all are, rows are to blame
     absent = np.array([not name for name in names]) | empty
@@ -152,7 +152,7 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark rows (T,) of electrodes (T, e) equal to the row before; also return true if noise makes them faults."""
+    """Mark rows (T,) of electrodes (T, e) equal to the row before; also true if others' noise proves these faults."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 

@@ -35,7 +35,7 @@ def describe(
 ) -> str:
     """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
     A sensor without a typical rest is described by its readings alone. unit : rest and gains, of `tactile adapt`
-    Raises TactileError where the file is no recording, or of another sensor than the unit's."""
+    options : of preparation. Raises TactileError where the file is no recording, or not of the unit's sensor."""
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
     recording = read(path, columns, sensor, lean=True)

@@ -190,7 +190,7 @@ def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
 
 
 def contact_signals(sensor: str = SOURCE) -> np.ndarray:
-    """Return changes (P, e) float64 counts of simulated contacts, as raw. Raises TactileError where there are none."""
+    """Return changes (P, e) float64 counts of simulated contacts, signed as raw. Raises TactileError where none are."""
     found = contacts_of(sensor)
     if found is None:
         raise TactileError(f"sensor {sensor!r}", "no simulated contacts", "a table that [electrodes] contacts names")

@@ -33,7 +33,7 @@ SCALED_PEAK = 150.0
 
 
 def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Prepare a recording whose finger responds in all frames; arguments as of ``preparer.prepare``."""
+    """Prepare a recording whose finger responds in all frames, by options; frames : those whose signals are returned"""
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)

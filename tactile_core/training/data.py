@@ -23,7 +23,7 @@ class Batch:
     """A batch of B contacts of e electrodes.
 
     rows : (B,) contact indices; SILENT none, C + i mirrored i   signal : (B, e + 1) counts; last 1 if rectified
-    biotac, digit : (B, K) inputs of the mesh encoders           force : (B, 3) N
+    biotac, digit : (B, K + 4) inputs of the mesh encoders       force : (B, 3) N
     pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
     signed : (B,) as rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
 
@@ -72,7 +72,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate readings (B, 20) of contacts rows (B,); rectified, unit : shares of lost signs, of real fingers"""
+        """Simulate readings (B, 20), counts and 1 if rectified, of rows (B,); rectified, unit : shares, of real ones"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]

@@ -83,7 +83,7 @@ def _rest_entry(contacts: Contacts) -> dict[str, list[float]]:
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
-    """Return the tensors of network `net` under the names of `networks.py`, in float16; scales and turns in float32."""
+    """Return the tensors of network `net` under the names of `networks.py`, in float16; scale, turn in float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
     if net == "SVB" or net in POSTERIORS:
         return state
@@ -117,7 +117,7 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
 
 
 def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
-    """Return, for the card, the sizes of a surface's lattice, window and bases, by name."""
+    """Return, for the card, a surface's numbers of rows, columns, half, nodes, wide and near basis fields, by name."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
     lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
     return {**lattice, "wide": wide, "near": near}
@@ -159,7 +159,7 @@ def assemble(tensors: dict, sizes: dict) -> Networks:
 
 
 def versions(device: torch.device) -> dict[str, str]:
-    """Return versions that the numbers depend on, besides data, seed and options."""
+    """Return versions that the numbers depend on: device, tactile, torch, numpy, python."""
     return {
         "device": label(device),
         "tactile": __version__,

@@ -51,7 +51,7 @@ BAD = Flag.SATURATED | Flag.DEAD_CHANNEL
 class LabelledRecording:
     """Frames in contact, F of them.
     change : (F, 19) float32 counts; rectified : true if they have lost their sign
-    place : (F, 2) float32, as the first two numbers of a DIGIT latent; force : (F,) float32 N, magnitude
+    place : (F, 2) float32, row and column from the gel's middle in tens of cells; force : (F,) float32 N, magnitude
     split : of the frames, by press; dropped : sentences on what was left out"""
 
     change: np.ndarray
@@ -148,7 +148,7 @@ def fine_tune(
     """Write weights with S2MPN fine-tuned on the recording; returns the rows before and after on held-out presses.
 
     out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of.
-    weights_folder : the weights to begin with, None for those that ship; progress : see `train.train`
+    weights_folder : the weights to begin with, None for those that ship; progress : takes the share done, a text
     seed : of the split and of the order of training; overwrite : true replaces weights in out_folder
     Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that
     holds weights already, unless `overwrite`."""

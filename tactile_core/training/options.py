@@ -100,7 +100,7 @@ class Options:
     checkpoint_seconds: float = 30.0
 
     def epochs(self, stage: str) -> int:
-        """Return the passes over the data in a stage, at least one unless the stage is left out."""
+        """Return the passes over the data in a stage, such as "SVB", at least one unless the stage is left out."""
         if stage in self.left_out:
             return 0
         return max(1, round(self.effort * getattr(self, f"{stage.lower()}_epochs")))
@@ -117,7 +117,7 @@ class Options:
 
 
 def device_of(name: str) -> torch.device:
-    """Return the torch device of a name in DEVICES. TactileError for another, and for a GPU that torch does not see."""
+    """Return the torch device of name auto, cpu or cuda. TactileError for others, or a GPU that torch does not see."""
     import torch
 
     if name not in DEVICES:

@@ -74,7 +74,7 @@ class Model(nn.Module):
         return self.D2BPN(self.MVD.placed(latent_target))
 
     def to_signal(self, latent_source: Tensor) -> Tensor:
-        """Map latent_source (B, L) to changes (B, 19) on the networks' scale, see `layers.compress`."""
+        """Map latent_source (B, L) to changes (B, 19) on the networks' scale, arcsinh(counts / 15)."""
         return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_source)))
 
     def expected_error(self, signal: Tensor) -> Tensor:

@@ -46,7 +46,7 @@ def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: 
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
-    ``D2S`` (meshes to signal). Metrics: see `mesh_columns`; ``baseline_*`` are those of no displacement."""
+    ``D2S`` (meshes to signal), ``force``, ``pressure``. Columns as ``MVB_max_um``; ``baseline_*`` : no displacement."""
     return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
 
 
@@ -215,7 +215,7 @@ def metric_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and mask (C,) over ``rows`` (C,) of each subset with rows of its own: light, by depth, sliding ..."""
+    """Yield name and mask (C,) over ``rows`` (C,) of each subset: lighter than 0.1 mm, by depth, deeper, sliding."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -60,7 +60,7 @@ def train(
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
     frame : sensor, half a window's cells -> the frame that moves over its surface
-    device : of `options.DEVICES`; contacts stay in the host's memory, networks and batches go there
+    device : auto, cpu or cuda; contacts stay in the host's memory, networks and batches go there
     Raises TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used."""
     options, out, where = options or Options(), Path(out_folder), device_of(device)
     pairs = read_pairs(pairs_path)
@@ -161,7 +161,7 @@ def deterministic() -> Iterator[None]:
 
 def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress: Progress) -> list[list]:
     """Run the stages that are left; returns the log rows (stage, epoch, train, validation).
-    path : the checkpoint, read at first and written now and then; progress : see `train`"""
+    path : the checkpoint, read at first and written now and then; progress : takes the share done, a text"""
     identity = {
         "pairs": contacts.pairs.sha256,
         "seed": seed,
@@ -182,7 +182,7 @@ def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress
 def run_stage(
     stage: Stage, model: Model, contacts: Contacts, seed: int, state: checkpoint.State, path: Path, progress: Progress
 ) -> None:
-    """Train a stage's networks for its epochs, from state on, saved to path now and then. progress : see `train`"""
+    """Train a stage's networks for its epochs, from state on, saved to path. progress : takes the share done, a text"""
     options = contacts.options
     groups = [
         {"params": list(model.get_submodule(net).parameters()), "weight_decay": options.decay(net)}

@@ -67,8 +67,8 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return the layer sizes of the network, from ``network_input`` of so many electrodes to half the difference of
-    both parts' signals and the logit of there being two."""
+    """Return inputs, outputs, width, blocks of the `Residual` from ``network_input`` of so many electrodes to half the
+    difference of both parts' signals and the logit of there being two."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 

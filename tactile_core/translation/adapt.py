@@ -186,7 +186,7 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
 
 
 def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
-    """Return a unit of which only the rest is known, from a recording of it untouched; see `read_rest`."""
+    """Return a unit of which only the rest is known, from a recording (path) of it untouched. Raises as `read_rest`."""
     name = os.path.basename(path)
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 

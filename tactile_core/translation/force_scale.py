@@ -99,7 +99,7 @@ def with_stiffness(
 
 def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: str) -> ForceScale:
     """Fit the scale of translated forces (n,) N, in order of time, to measured(lag), the measured ones (n,) N if they
-    come `lag` s late, NaN where unknown. where : source of the force, for errors, as of `with_stiffness`"""
+    come `lag` s late, NaN where unknown. where : the force's file or columns, for errors"""
     half = len(translated) // 2
     correlations = {lag: _correlation(translated[:half], measured(lag)[:half]) for lag in map(float, LAGS)}
     lag = max(correlations, key=lambda one: (correlations[one], -abs(one)))

@@ -32,7 +32,7 @@ _MARGIN = 20  # cells of zero padding round the lattice, as the Fourier transfor
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """Return positions (T, 2) = (x, z) m on the resting gel, bilinearly; place : (T, 2), of ``ContactFrame.place``"""
+    """Return positions (T, 2) = (x, z) m on the resting gel; place : (T, 2) row, column from middle, tens of cells"""
     return between_nodes(_grid(frame.sensor, frame.rows, frame.columns), place)
 
 
@@ -53,7 +53,7 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """Return the places (T, 2), of ``ContactFrame.place``, of point (T, 2) = (x, z) m, inverse of `on_gel`; points
+    """Return the places (T, 2), as `on_gel` takes them, of point (T, 2) = (x, z) m, its inverse; points
     beside the gel get its rim's places."""
     grid = _grid(frame.sensor, frame.rows, frame.columns)
     size = np.array(grid.shape[:2])

@@ -67,7 +67,7 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode change (T, 19) counts, signed as `sensors.COUNT_SIGN` or, where rectified (T,) or one is true, without
+        """Encode change (T, 19) counts, below 0 where a film thins or, where rectified (T,) or one is true, without
         signs, to latent_signal (T, K), the mean that SVB infers."""
         return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 

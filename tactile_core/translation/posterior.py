@@ -20,8 +20,8 @@ SEED = 0  # of contacts that are drawn: the same recording, the same contacts
 class Posterior:
     """Posterior of a contact's state given the signals: a mixture of C Gaussians in each of T frames.
 
-    A state (STATE,) is the place of the gel's dent (2 numbers, of ``ContactFrame.place``), asinh(force / 0.1 N) and
-    asinh(depth of that dent / 20 um); all zero without contact. The place is that on the gel, which is flat: at the
+    A state (STATE,) is the gel's dent's place (row, column from the middle, tens of cells), asinh(force / 0.1 N) and
+    asinh(its depth / 20 um); all zero without contact. The place is that on the gel, which is flat: at the
     BioTac's tip, where most real contacts lie, the skin's lattice has a pole, and a place on it says little.
     weight : (T, C), sum 1 over C; mean, spread : (T, C, STATE)"""
 

@@ -54,7 +54,7 @@ def second_contact(
     """Translate the weaker of two contacts from its change (T, e) counts, NaN where there is none, each frame alone.
     silent : (T,) bool, frames without a first contact, which get no second
     mounted : function that moves gels (n, M, 3) m by the mount's shift
-    least : m, smallest displacement of the deepest node that counts as contact; stiffness : of `Signals`"""
+    least : m, smallest displacement of the deepest node that counts as contact; stiffness : of the skin, 1 typical"""
     center, force = np.full((len(change), 2), np.nan, np.float32), np.zeros((len(change), 3), np.float32)
     rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
     if not len(rows):

@@ -92,13 +92,13 @@ def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Pattern
 
 
 def two_contacts(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that two contacts explain and one does not; shares : (T, 3), of `residual_shares`"""
+    """Mark (T,) bool the frames that two contacts explain and one does not; shares : (T, 3), of one, two, drift"""
     one, two, _ = shares.T
     return (two < LEFT_BY_TWO) & (one - two > MORE_BY_ONE)
 
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool frames like no simulated contact, or that drift explains better; shares : of `residual_shares`
+    """Mark (T,) bool frames like no simulated contact, or more like drift; shares : (T, 3), of one, two, drift
     change : (T, 19) counts; in faint changes a larger share is allowed, for noise"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)

@@ -120,7 +120,7 @@ class Translator:
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
         """Draw contacts on the gel for each frame from its posterior, by the names of ``SAMPLES``; ``answer.samples``
         of them.
-        frames : (T,) int, indices into the recording, which are the seeds; stiffness : of `Signals`
+        frames : (T,) int, indices into the recording, which are the seeds; stiffness : of the skin, 1 typical
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
         states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
@@ -243,7 +243,7 @@ class Translator:
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool the frames of change (T, 19) counts that lie outside the training's in any of the distances.
+        """Mark (T,) bool the frames of change (T, 19) counts beyond 99 % of validation's in a `SignalDistance`.
         rectified : (T,) bool or one for all, true where signs are lost"""
         return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 

@@ -35,7 +35,7 @@ def share(keys: Collection[str], wanted: Collection[str]) -> float:
 
 
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
-    """Build the recording of a table with pdc, tac and tdc. time, electrodes, channels : names of their columns
+    """Build a table's recording, pdc, tac, tdc included. layout : in words; time, electrodes, channels : columns' names
 
     Missing channels are None, missing electrodes dead. TactileError for other missing columns, and as of `assemble`."""
     _check_numbers(table, electrodes)

@@ -77,7 +77,7 @@ class Film:
         return cls(thickness, "given", np.zeros(1), np.zeros(1))
 
     def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
-        """Return the changes (T, e) counts that a unit of typical films would show from the same rest.
+        """Convert change (T, e) counts from rest to what a unit of typical films would show from the same rest.
 
         They are zero where they are no larger than what the largest drift leaves, and like no simulated contact. A rest
         from another recording may be off by `REST_OFF`: then smaller ones are zero, too, in the frames perhaps_idle.
