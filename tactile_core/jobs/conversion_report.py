@@ -71,7 +71,7 @@ class ConversionReport:
             self._shown[int(frames[row])] = kept
 
     def warnings(self) -> tuple[str, ...]:
-        """Return warnings for the user: of the weights, the recording, the options, and its translated frames."""
+        """Return sentences that warn the user: of weights, recording, options and translated frames."""
         return *self._of_weights(), *self._of_recording()
 
     def _of_weights(self) -> list[str]:
@@ -101,7 +101,7 @@ class ConversionReport:
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None
 
     def describe_traction(self) -> str:
-        """Describe the difference between kept traction and force; empty where traction is not kept."""
+        """Return a sentence on how far the sum of kept traction is from the force; "" where traction is not kept."""
         if not self._forces:
             return ""
         from .solved_gel import describe_miss

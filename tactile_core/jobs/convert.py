@@ -47,9 +47,9 @@ REVERSED = {
 class Options:
     """Options of the conversion of a recording.
 
-    frames : slice of its frames, the same for every recording; keep : words of results.KEEPABLE
+    frames : slice of its frames; keep : out of latent, displacement, height, image, traction, marker_motion
     prepare : options of the preparation; overwrite : replace an older result
-    sensor : the unit's rest, gains and offsets, from `tactile adapt`"""
+    sensor : the unit's rest, gains and offsets, from `tactile adapt`; None for a typical unit"""
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
     keep: tuple[str, ...] = results.DEFAULT_KEEP
@@ -66,7 +66,7 @@ class ToolOptions:
     calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     answer : options of the estimated contact, see ``Answer``
-    gel : "networks", or the found contact solved on the target (``solved_gel``), as for any target without weights
+    gel : "translated" by the networks, or "solved", the found contact on the target, as where no networks lead to it
     target : the gel; weights must translate to it unless it is solved"""
 
     weights: str | None = None
@@ -80,7 +80,7 @@ class ToolOptions:
     object_reflectance: float | None = None
 
     def load_networks(self) -> tuple[Translator, bool]:
-        """Load the networks; also return whether the target is solved under the contacts that they find."""
+        """Return the networks, and true if contacts that they find are to be solved on the target."""
         must_lead_to = None if self.gel == SOLVED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
         solves = self.gel == SOLVED or translator.target != self.target
@@ -225,8 +225,8 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
 
 
 def weights_entry(translator: Translator) -> dict:
-    """Return, for JSON, the hash of the weights' card and, if it states them, the rms error of the gel on contacts kept
-    apart and that of no deformation, um."""
+    """Return sha256, of the weights' card, and, if it states them, kept_apart_rms_um, the error of the gel on contacts
+    not trained on, and baseline_rms_um, that of no deformation."""
     from ..translation.card import chain_error
 
     found = chain_error(translator.card)
@@ -243,9 +243,9 @@ def reverse(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file of ``REVERSED``.
-    translator : its networks lead from the skin to that gel; frames : slice of the input's; overwrite : true replaces
-     `out`; progress : called with (frames done, frames in all)
+    """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file: frame (T,), displacement
+    (T, N, 3) m of skin, force (T, 3) N, electrodes (T, e) counts. translator : leads to that gel; frames : slice of the
+    input's; overwrite : true replaces `out`; progress : called with (frames done, frames in all)
     Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
     if os.path.lexists(out) and not overwrite:
         raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")

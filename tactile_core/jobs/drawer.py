@@ -24,9 +24,9 @@ Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 class Drawer:
     """Camera and lights of a gel, ready to draw it; the same for every recording.
 
-    height_map : (T, M, 3) m -> (T, H, W) m
-    shade : (H, W) m, and the ``marks`` of dots if there are any -> (H, W, 3) uint8, by a preset of ``pictures.presets``
-    preset : name of that preset; camera : of the gel that is drawn; contacts outside its picture are flagged
+    height_map : displacement (T, M, 3) m of the gel's M nodes -> heights (T, H, W) m under the camera
+    shade : heights (H, W) m, and the share (H, W) of light that dots leave, if any -> picture (H, W, 3) uint8
+    preset : name of that of ``shade``; camera : of the gel that is drawn; contacts outside its picture are flagged
     solve : arrays by the names of frames.h5 -> the same with solved gels; None keeps the networks' gels
     dots : on the gel that is drawn; None for no dots
     target : the gel; found_on : the networks' gel, on which contacts are found before they are solved on another

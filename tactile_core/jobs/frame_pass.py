@@ -33,7 +33,7 @@ class Tools:
 
     @property
     def pair(self) -> tuple[str, str]:
-        """Return the sensor whose recordings are translated, and the gel that is drawn."""
+        """Return (the sensor whose recordings are translated, the gel that is drawn), by name."""
         return self.translator.source, self.drawer.target
 
 
@@ -57,7 +57,7 @@ class FramePass:
         take: Take | None = None, labels: dict[str, np.ndarray] | None = None, room: int = 0,
     ) -> None:  # fmt: skip
         """Translate and draw frames (T,), ascending indices, chunk by chunk, and write their arrays to a new file.
-        signals : of any frame of the recording, whose rest and kind hold for all; about : attributes of the file
+        signals : of any frame, for the recording's rest and kind; about : attributes of the file
         take : called with each chunk's frames and arrays; labels : name -> (T,) texts; start_time : unix s
         room : bytes before the HDF5 part, as in `FramesFile`"""
         words = kept(self._keep, self._translator.answer)

@@ -87,12 +87,12 @@ LARGE = 4096  # numbers per frame, from which on a shard gives each frame a chun
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Return words of KEPT: `keep`, and the posterior's samples and the second contact if the options ask for them."""
+    """Return `keep`, words of --keep, and "samples" (of the posterior), "second" (contact) where `answer` has any."""
     return (*keep, *[SAMPLES] * (answer.samples > 0), *[SECOND] * (answer.contacts > 1))
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
-    """Return (unit, meaning) of each dataset, by name, of a file that keeps words of KEPT; shards have pictures too."""
+    """Return name -> (unit, meaning) of the datasets of a file that keeps `kept`'s words; shards have pictures too."""
     kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 

@@ -42,7 +42,7 @@ class GelContact(Summary):
     depth : m, past first touch along +y; below zero the indenter stands in front of the sensor
     pressure : Pa, rise of the BioTac's fluid pressure; 0 for the DIGIT
     pose : (4, 4) of the indenter, deeper than the given one where a force was asked for
-    flags : names out of ``FLAGS`` of what is wrong with it, none for a sound contact"""
+    flags : what is wrong with it, none for a sound contact: names such as "too deep", explained in ``FLAGS``"""
 
     force: np.ndarray
     displacement: np.ndarray
@@ -62,7 +62,7 @@ class GelContact(Summary):
 
 
 def too_far(before: Pose | None, pose: Pose) -> bool:
-    """Return true if a pose is too far from the one before, or turned too far, to continue its contact; None: false."""
+    """Return true if a pose is over 3 mm or 0.13 rad from the one before: too far to go on with its contact."""
     if before is None:
         return False
     turn = np.arccos(np.clip((np.trace(pose.axes.T @ before.axes) - 1) / 2, -1, 1))
@@ -81,7 +81,7 @@ def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
 
 
 def matrix_of(pose: Pose) -> np.ndarray:
-    """Return a pose as a matrix (4, 4)."""
+    """Return a pose as a matrix (4, 4): axes in its columns, apex, m, in the last one."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = pose.axes, pose.apex
     return matrix

@@ -32,7 +32,7 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 class Frames:
     """Frames of an input: displacements of a gel's nodes, or height maps.
     kind : of the input, in words; numbers : (T,) frame numbers; of the two arrays below one is None
-    displacement : (T, M, 3) m, or integers times scale; heights : (T, H, W) m"""
+    displacement : (T, M, 3) m of M nodes, once multiplied by scale; heights : (T, H, W) m"""
 
     kind: str
     numbers: np.ndarray
@@ -52,7 +52,7 @@ def read_frames(
     path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
     """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
-    gel : whose displacement is read, or solved. Raises TactileError for anything else, or an unreadable file."""
+    gel : sensor that is read or simulated. Raises TactileError for anything else, or an unreadable file."""
     path = Path(path)
     if path.is_dir() or path.suffix == ".toml":  # a scene, which is simulated first
         return _of_scene(path, progress, gel)

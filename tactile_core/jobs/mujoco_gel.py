@@ -105,7 +105,7 @@ class MujocoGel:
         self._shift = np.clip(self._shift + step, -_MOST_SHIFT, _MOST_SHIFT)
 
     def forces(self, data: mujoco.MjData) -> dict[int, np.ndarray]:
-        """Return MuJoCo's force (3,) N on the gel by each geom that touches it, in the sensor's frame."""
+        """Return MuJoCo's force (3,) N on the gel, in the sensor's frame, by the id of each geom that touches it."""
         import mujoco
 
         found: dict[int, np.ndarray] = {}
@@ -206,8 +206,8 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 
 
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return, by name, the last contact's force (3,) N, markers (rows, columns, 2) m, their motion along x and z, and
-    picture; markers : (rows, columns) int, of ``marker_nodes``"""
+    """Return the last contact's "force" (3,) N, "markers" (rows, columns, 2) m, motion along x and z, and, if asked,
+    "picture" (H, W, 3) uint8; markers : (rows, columns) int, nodes of ``marker_nodes``"""
     moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
     seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}
     return seen | {"picture": gel.picture()} if picture else seen

@@ -54,7 +54,7 @@ def make_pairs(
     progress : called with (blocks of presses done, known so far). Blocks are kept in ``<out>.parts``, a folder as of
         ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
     place : function from the job's folder to the executor of tasks
-    pair : the sensors, source and target; keep : words of ``pairs_file.KEEPABLE``
+    pair : the sensors, source and target; keep : ("traction",) to keep it, else ()
     Raises TactileError for a bad scene or count, and for parts of another scene or seed."""
     out = Path(out)
     job, names, text = plan(scene_path, count, seed, out, pair, keep)
@@ -72,7 +72,7 @@ def plan(
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> tuple[Job[Pairs], list[str], str]:
-    """Return the job, the names of the indenters and the scene's text; raises as ``make_pairs``."""
+    """Return the job, the indenters' names and the scene's text. Arguments and errors as of ``make_pairs``."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, GelSensor)
     scene, text, inputs, files = read_scene(scene_path, ["presses"])

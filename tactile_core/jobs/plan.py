@@ -60,12 +60,12 @@ class Plan(NamedTuple):
 
 @functools.cache
 def costs() -> dict[str, Any]:
-    """Read the shipped costs.json, which ``scripts/benchmarks/measure_costs.py`` writes."""
+    """Read the shipped costs.json: ``parts``, name -> ms and kb a frame, mb, start s; full_ms by sensor; machine."""
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 
 def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[str, TierChoice]) -> Plan:
-    """Plan `tactile simulate`. keep : words of ``scene_recording.outputs``; choices : the tier of each of its sensors.
+    """Plan `tactile simulate`. keep : its words of --keep; choices : sensor that is solved -> its tier of mechanics.
     Raises TactileError for a scene that cannot be read."""
     from ..simulation import scene_recording
     from ..simulation.scene import load_scene
@@ -100,7 +100,7 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Estimate what a conversion of frames costs. keep : words of ``results.KEEPABLE``; preset : of the pictures"""
+    """Estimate what a conversion of frames costs. keep : words of --keep; preset : of the pictures"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]

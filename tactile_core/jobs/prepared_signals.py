@@ -1,8 +1,8 @@
 """A recording's signals, ready for the networks, in a checksummed file of which shards read a few rows.
 
-Datasets, T first: ``time`` float64 s; ``change`` float64 and ``electrodes`` float32 (T, e) counts; ``quiet`` bool;
-``flags`` uint16; ``pdc`` float64 counts. ``part`` (P,) first frame of each part of the recording, ``rest`` (P, e)
-counts. ``about``: JSON of the recording's reports. Chunks carry checksums, so a shard reads no damaged ones."""
+Datasets, T first: ``time`` s; ``change`` from rest and ``electrodes`` as read (T, e) counts; ``quiet``, no contact;
+``flags``; ``pdc`` counts, the fluid's pressure over rest. ``part`` (P,) first frame of each part of the recording,
+``rest`` (P, e) counts. ``about``: JSON of the recording's reports. Chunks carry checksums: a damaged one is refused."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording; prepared : its parts' reports; frames, labels : of all of it (``recordings.labels``)
+    """Facts of a recording. prepared : ``Signals.report`` of each part; frames, labels : of all parts
     start_time : unix s, 0 if unknown; film, stiffness : divided by a typical unit's"""
 
     recording: str

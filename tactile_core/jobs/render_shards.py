@@ -39,7 +39,7 @@ def render_in_parts(
     place: Callable[[Path], Place],
     progress: Callable[[int, int], None],
 ) -> Path:
-    """Do ``render.render`` in a job, kept in ``<out>.parts`` until complete; the same call resumes it. Raises alike.
+    """Render `path` into `out` as ``render.render`` does, in a job in ``<out>.parts``; the same call resumes it.
     place : function from the job's folder to the executor of tasks; progress : (tasks done, known so far)"""
     out = Path(out)
     job = plan(path, out, options)
@@ -85,7 +85,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
-    """Read the input (a scene is simulated) and keep the values to render; returns as ``recipes`` says."""
+    """Read the input (a scene is simulated) and keep its values; return the number of shards, and true if read now."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None

@@ -36,7 +36,7 @@ DEFAULT_KEEP = ("latent", "displacement", "image")
 
 
 def parse_keep(text: str) -> tuple[str, ...]:
-    """Parse ``"latent,image"`` to words of KEEPABLE, in its order. Raises TactileError for an unknown word."""
+    """Parse ``"image,latent"`` to ("latent", "image"), words of --keep in KEEPABLE's order. TactileError for others."""
     return parse_words(text, KEEPABLE, least=0)
 
 

@@ -133,8 +133,8 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write above each column its number, from 1, and its time; seconds : (k,), of a figure made with
-        ``snapshots`` their numbers"""
+        """Write above each column its number, from 1, and its time; seconds : (k,) s from the start; where
+        the figure was made with ``snapshots``, their numbers"""
         for k, at in enumerate(seconds):
             text = f"{k + 1}:  {self._heading.format(at)}"
             self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")
@@ -151,7 +151,7 @@ class SheetFigure:
         self.top += GAP
 
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
-        """Draw maps of displacement (k, M, 3) m on the gel after a label, the picture's border, centers (k, c, 2) m."""
+        """Draw maps of displacement (k, M, 3) m of the gel after a label, the picture's border, centers (k, c, 2) m."""
         gel, z = self._gel, self._gel_z
         mesh, largest = (gel.rest[:, [0, 2]], gel.faces), scale(displacement)
         axes = self._surface_row(label, *mesh, displacement, largest, self._gel_x, z, centers)

@@ -172,7 +172,7 @@ def plan(
 ) -> Job[Simulate]:
     """Return the job: the [recording] of a scene for each combination of the values in ``grid``, words
     such as ``force_n=0.2:2:5``.
-    seed : of the first recording, each next one has one more; keep : words of ``scene_recording.outputs``
+    seed : of the first recording, the next ones count on; keep : electrodes, displacement_<sensor>, traction_<sensor>
     Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)
     scene, _, inputs, files = read_scene(scene_path, [name_of(one) for one in values])

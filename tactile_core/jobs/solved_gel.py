@@ -88,7 +88,7 @@ def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray
 
 
 def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, np.ndarray]:
-    """Return arrays ``traction_digit`` (T, M, 3) Pa, ``traction_force`` (T, 3) N of translated frames.
+    """Return ``traction_digit`` (T, M, 3) Pa at M nodes, and its sum ``traction_force`` (T, 3) N, of translated frames.
 
     arrays : by the names of frames.h5, T first. Solved frames bring their traction. For others in contact it is
         derived: pattern and direction from the displacement, size from the networks' force, which is nearer the truth

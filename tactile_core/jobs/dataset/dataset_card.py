@@ -43,7 +43,7 @@ def card_of(
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
     """Return the card as Markdown. named : the recipe, as the user named it; found : files of the folder
-    source : all translated recordings; rows : survival of labels, None without scikit-learn
+    source : all translated recordings; rows : accuracies of classifiers, None without scikit-learn
     layouts : names of the exported ones"""
     of = recipe.source
     sections = {

@@ -111,7 +111,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     files : patterns of paths below the folder, at any depth; {label} stands for any text, which becomes the label. The
         first pattern that fits a file counts
-    format : FORMAT; sensor : that made the recordings, biotac or biotac_sp
+    format : "tactile-dataset-1"; sensor : that made the recordings, biotac or biotac_sp
     tasks : labels to learn; values : columns of numbers of the recordings' files, which become labels too
     force : file of newtons beside a recording, with {label} in its name, used where it exists; "" for none
     every : translate one frame in ``every``; snapshots : true where frames do not follow each other in time

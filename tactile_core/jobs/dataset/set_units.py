@@ -25,7 +25,7 @@ UNFIT = re.compile(r"[^A-Za-z0-9_-]")  # of a unit's name in that of its files
 
 
 def file_name(unit: str) -> str:
-    """Name a unit's files: its own name if plain, else with a hash, which keeps names apart."""
+    """Return the stem of a unit's files: its name if plain, else made so, with a hash that keeps names apart."""
     plain = UNFIT.sub("_", unit)[:60]
     return plain if plain == unit else f"{plain}-{hashlib.sha256(unit.encode()).hexdigest()[:8]}"
 

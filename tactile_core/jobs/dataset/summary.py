@@ -34,8 +34,8 @@ class Summary:
     flagged : flag -> share of all frames, without flags that no frame bears
     explained, confidence, force : medians over frames in contact, force in N; NaN without contact
     labels : label -> its text, "" where it changes within the recording
-    features : kind -> (n, k) numbers of n examples: the whole recording, by its changes since its first 0.1 s, or each
-        frame of snapshots; told : task -> (n,) labels of the examples"""
+    features : kind (electrodes, estimates, gel's code, picture) -> (n, k) of n examples: the recording, by its changes
+        since its first 0.1 s, or each snapshot; told : task -> (n,) labels of the examples"""
 
     recording: Recorded
     touched: float
@@ -113,7 +113,7 @@ def _squares(picture: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Row:
-    """Accuracy of a classifier. task : label it predicts; by : kind of features it reads; examples, classes : numbers
+    """Accuracy of a classifier. task : label it predicts; by : features or baseline; examples, classes : their numbers
     right : share of examples predicted right, 0..1; error : its standard error"""
 
     task: str
@@ -138,8 +138,8 @@ def installed() -> bool:
 
 
 def survival_rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
-    """Classify the label `task` by each kind of features of summaries, and by RANDOM and ALWAYS, groups held out whole.
-    apart : label whose values are held out together; "" holds out single recordings (of snapshots, tenths of each)
+    """Classify the label `task` by each kind of features, the best of ten random maps, and always the commonest label.
+    apart : label whose values are groups, held out whole; "" holds out single recordings (of snapshots, tenths of each)
     progress : called with (classifiers made, in all)
     Needs scikit-learn. Returns no row where the label has one value, one group or too few examples."""
     told = [(one, one.told[task]) for one in summaries if task in one.told]

@@ -32,7 +32,7 @@ CONFIGURED = "distributed.comm.timeouts.connect"  # Dask's own setting of how lo
 
 
 class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A TOML file that starts a cluster. jobs : to ask the queue for; options : of dask_jobqueue's cluster."""
+    """A TOML file that starts a cluster. jobs : number to ask it for; options : keywords of dask_jobqueue's cluster"""
 
     queue: Literal["slurm", "pbs", "sge", "lsf", "htcondor"]
     jobs: int

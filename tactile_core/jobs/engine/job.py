@@ -31,7 +31,7 @@ R = TypeVar("R")
 
 class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
     """A job: `inputs` by `recipe`. weights, calibration : folder and file, None for those that ship
-    format : FORMAT; versions : of this package and its libraries when it was made"""
+    format : of job.json; versions : of Python, this package and its libraries when it was made, by name"""
 
     format: str
     inputs: list[Input]
@@ -83,7 +83,7 @@ def read_to_run(folder: Path) -> Job:
 
 
 def completion(job: Job) -> str:
-    """Return the words on how a job that is not complete is completed."""
+    """Return words, for a message, on which command completes a job that is not complete."""
     same = job.recipe.version == __version__
     return "the same command goes on" if same else f"version {job.recipe.version}, which began it, goes on with it"
 

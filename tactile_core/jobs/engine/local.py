@@ -28,7 +28,7 @@ Start = Callable[[], "subprocess.Popen[str]"]
 
 class Local:
     """Pool of `workers` processes for the job in `folder`, each with one thread.
-    restart : number of tasks after which a process is replaced; command : starts a process, with the folder added"""
+    restart : number of tasks after which a process is replaced; command : its words, to which the folder is added"""
 
     def __init__(
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None

@@ -53,10 +53,10 @@ class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """Recordings to shards of translated frames.
 
-    keep : words of results.KEEPABLE; weights : sha256 of the weights' card; shard_frames : frames per shard
+    keep : as of ``convert.Options``; weights : sha256 of the weights' card; shard_frames : frames per shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
-    preset, variant : of the pictures, as in ``presets`` and ``variant``; variant is empty for fast ones
-    answer : options of the estimated contact; gel : the networks' gel, or the contact solved on the target
+    preset : of pictures: fast, standard, quality, reference; variant : of Mitsuba: llvm_ad_rgb, scalar_rgb, "" for fast
+    answer : options of the estimated contact; gel : "translated" by the networks, or "solved" on the target
     source, target : the sensors; every : translate one frame in ``every``; sensor : calibration of the source's unit
     version : of this package, when the job was made, as in the other recipes"""
 
@@ -77,8 +77,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`; electrodes : their law.
-    surfaces, files : sha256 of sensors' nodes and of meshes; keep : words of ``pairs_file.KEEPABLE``"""
+    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`; keep : ["traction"] or [].
+    surfaces : sha256 of the sensors' nodes; files : of meshes; electrodes : "sheet", law of counts"""
 
     count: Annotated[int, Meta(ge=1)]
     seed: int
@@ -94,7 +94,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """A scene to one recording for each input, with values of its own; see ``jobs.simulate``.
     seed : of the first input, each next one has one more; values : one dict per input, name -> value
-    keep : words of ``scene_recording.outputs``; files : sha256 of the scene's meshes"""
+    keep : electrodes, displacement_<sensor>, traction_<sensor>; files : sha256 of the scene's meshes"""
 
     seed: int
     values: list[dict[str, float | str]]
@@ -105,7 +105,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
 
 
 class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """Deformed gels to pictures; fields as of ``render.Options``, calibration as of ``Translate``."""
+    """Deformed gels to pictures; fields as of ``render.Options``, frames "A:B:STEP", calibration as of `Translate`."""
 
     preset: str
     variant: str

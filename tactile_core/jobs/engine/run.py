@@ -38,7 +38,7 @@ class Place(Protocol):
 
 @dataclasses.dataclass
 class Outcome:
-    """Outcome of a run; made, kept : numbers of shards; aside : why, for each task that could not be done."""
+    """Outcome of a run. made, kept : numbers of shards, new and there before; aside : task's name -> why it failed"""
 
     made: int = 0
     kept: int = 0
@@ -125,11 +125,11 @@ class _Work:
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
-        """Return the tasks whose reply has not come."""
+        """Return the number of tasks whose reply has not come."""
         return self.known - self.finished
 
     def first_tasks(self) -> list[Task]:
-        """Return the recordings to prepare; a part of an array begins with its own, for the others to use."""
+        """Return a task to prepare each input; a part of an array begins with its own, for the others to use."""
         count = len(self._job.inputs)
         own = [index for index in range(count) if index % self._parts == self._part]
         others = [index for index in range(count) if index % self._parts != self._part]

@@ -55,7 +55,7 @@ class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def name(job: jobs.Job, task: Task) -> str:
-    """Return the task's name for files and messages."""
+    """Return the task's name, INPUT or INPUT-000007 for its shard 7, for files and messages."""
     recording = job.inputs[task.recording].name
     return recording if task.shard is None else f"{recording}-{task.shard:06d}"
 

@@ -40,7 +40,7 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 @dataclasses.dataclass(frozen=True)
 class Recorded:
     """Recording of a finished job; name : in the job; frames : their number; shards : its files, in order
-    labels : name -> (T,) object array of str; split : its part of the data set
+    labels : name -> (T,) object array of str; split : "train" or "test"
     every : one frame in ``every`` was translated; pair : sensor and gel, which some arrays are named after"""
 
     name: str
@@ -74,7 +74,7 @@ class Recorded:
         raise IndexError(frame)
 
     def arrays(self) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-        """Return, by name, the shape of one frame's array and its type."""
+        """Return (shape, dtype) of one frame's array by name, called biotac and digit as in `blocks`."""
         return {self._plain(name): kind for name, kind in _kinds(self.shards[0]).items()}
 
     def stored(self, name: str) -> str:

@@ -64,7 +64,7 @@ class EpisodeStats:
                 self._pictures += len(values)
 
     def summarise(self) -> Stats:
-        """Return min, max, mean, std, quantiles and count of each feature; a picture's have shape (3, 1, 1)."""
+        """Return feature -> min, max, mean, std, q01, q10, q50, q90, q99 (k,), of pictures (3, 1, 1); count (1,)."""
         return {
             **{name: _of_numbers(np.concatenate(parts)) for name, parts in self._numbers.items()},
             **{name: _of_levels(counts, self._pictures) for name, counts in self._levels.items()},
@@ -94,7 +94,7 @@ def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
 
 
 def aggregate(episodes: list[Stats]) -> Stats:
-    """Return the statistics of all episodes together; quantiles are the episodes' means, as in LeRobot."""
+    """Join the episodes' statistics to those of all together; quantiles are the episodes' means, as in LeRobot."""
     return {name: _together([episode[name] for episode in episodes]) for name in episodes[0]}
 
 
@@ -115,13 +115,13 @@ def listed(stats: Stats) -> dict[str, dict[str, Any]]:
 
 class Layout(Protocol):
     """Writer of the files of one version of LeRobot's layout, called for each episode by ``write_set``.
-    version : as info.json names it; picture : type of its pictures"""
+    version : as info.json names it; picture : pictures are in the rows (image), or in a file each episode (video)"""
 
     version: str
     picture: Literal["image", "video"]
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows of an episode (its number). rate : frames per second"""
+        """Add rows, name -> column, of an episode (its number). features : name -> dtype and shape; rate : Hz"""
 
     def end_episode(self) -> dict[str, Any]:
         """Close an episode's files; returns its place for the list of episodes."""
@@ -258,7 +258,7 @@ def _rate(one: Recorded) -> float:
 
 
 def table(rows: dict[str, Any], features: Features) -> pa.Table:
-    """Return rows, without videos, in Arrow's types, with features for Hugging Face's datasets library."""
+    """Return rows, name -> column, without videos, as Arrow's table; features : name -> dtype, shape: its metadata."""
     import pyarrow as pa
 
     fields: list[Any] = []

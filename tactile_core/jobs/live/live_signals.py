@@ -34,7 +34,7 @@ class LiveSignals:
 
     Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
     polarity; until then it is the given one, or "falls".
-    rate : Hz; options : of the preparation; drift, repair and smoothing do not count, tare is of the first LONGEST s
+    rate : Hz; options : of the preparation; drift, repair and smoothing do not count, tare is of the first 10 s
     unit : gains, offsets and rest; its rest counts where the first window is not calm near it
     sensor : whose counts they are
     found : source of the rest, in words, once it is known
@@ -111,7 +111,7 @@ class LiveSignals:
 
     @property
     def held(self) -> bool:
-        """Return true if the last `STALE` rows are equal though noise should differ: the driver stands still."""
+        """Return true if the last 3 rows are equal though noise should differ: the driver stands still."""
         return self._noisy and self.known.kind == "raw" and repeats(self._last)[0].sum() == STALE - 1
 
     @property
@@ -122,7 +122,7 @@ class LiveSignals:
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return signals of electrodes (T, 19), pdc (T,), as in the file or NaN. ValueError before rest is known."""
+        """Return signals of electrodes (T, 19), pressures pdc (T,) or NaN, as in the file. ValueError if no rest."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)

@@ -28,7 +28,7 @@ REMEMBERED = 1000  # latencies whose quantiles are reported
 @dataclass(frozen=True, eq=False)
 class Shown:
     """Picture on display.
-    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : both in words
+    frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : a text on both
     picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
     latency : s from rows to picture; work : s of computation in it"""
 

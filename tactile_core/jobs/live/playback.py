@@ -169,7 +169,7 @@ Say = Callable[[str], None]
 
 def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequence[Output], say: Say, tell: Say) -> None:
     """Show a view's frames until `source`, as of `followed`, or an output ends. camera : of a real DIGIT, or None
-    outputs : called with each frame and its pictures by name; say, tell : with lines of progress, with the summary"""
+    outputs : called with each frame and its picture and camera (H, W, 3); say, tell : with progress, with a summary"""
     reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
         for rows, came in source:
@@ -219,7 +219,7 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield the rows of a finished recording at their times, one part in memory at a time.
-    speed : times as fast as recorded, 0 without waiting; say : called with warnings; columns, sensor : as `read` has"""
+    speed : times as fast as recorded, 0 without waiting; say : called with warnings; columns, sensor : as `followed`"""
     began = time.perf_counter()
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated
