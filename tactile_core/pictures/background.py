@@ -27,7 +27,7 @@ MOST_PIXELS = 50_000_000  # of a photograph: 150 MB; a DIGIT's have 0.08 to 0.3 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
     """Picture (H, W, 3) float32, levels, of the untouched gel: the calibration's photograph, if there is one, times the
-    modelled effect of LEDs or albedo changed since; else the model's picture. radiance : (H, W, 3) of its coating
+    modelled effect of LEDs or albedo changed since; else the model's picture. radiance : (H, W, LED), at rest
 
     Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
     if not unit.photograph:
@@ -42,8 +42,8 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Return ``mean_levels`` and ``largest_levels`` by which a picture at rest (H, W, 3) differs from the one that a
-    radiance (H, W, 3) gives."""
+    """Return ``mean_levels`` and ``largest_levels`` by which a picture at rest (H, W, 3) differs from the one that
+    the coating's radiance (H, W, LED), levels, gives."""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
@@ -53,7 +53,7 @@ def _open_light(unit: Calibration) -> np.ndarray:
 
 
 def open_radiance(unit: Calibration) -> np.ndarray:
-    """Radiance (H, W, 3) of the untouched gel without shadows, as on a smooth dome."""
+    """Radiance (H, W, LED), levels, of the untouched gel without shadows, as on a smooth dome."""
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
     right, down = unit.camera.right.astype(np.float32)[None, :], unit.camera.down.astype(np.float32)[:, None]
     surface = Surface(right, down, height, *slopes(height, unit.camera))
@@ -61,7 +61,7 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Return the ambient light (3, H, W) float32, levels in each LED's band, that rises with seen heights (H, W) m."""
+    """Return the part of ambient light (LED, H, W) float32, levels, in proportion to the seen heights (H, W) m."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 
@@ -83,8 +83,8 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 def fit_ambient(
     picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
 ) -> tuple[tuple[float, ...], ...]:
-    """Fit the ambient light (3, n) by least squares of the modelled picture at rest from ``picture`` (H, W, 3).
-    radiance : (H, W, 3) of the coating at rest; degree : of the polynomial, AMBIENT_DEGREE or PHOTOGRAPHED_DEGREE"""
+    """Fit the ambient light (LED, n), factors of ``terms``, by least squares to a ``picture`` (H, W, 3) at rest.
+    radiance : (H, W, LED) of the coating at rest; degree : of the polynomial, 5 or, for a photograph, 7"""
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)
     left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)

@@ -111,14 +111,14 @@ def open_light(surface: Surface, unit: Calibration) -> np.ndarray:
 
 
 class Lamps:
-    """Light of LEDs on a camera's gel, with shadows. Raises TactileError for LEDs that ``ShadowCaster`` refuses."""
+    """LEDs' light on a gel, with shadows. Raises TactileError for one over the picture or as high as the camera."""
 
     def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
         self._casters = [ShadowCaster(camera, led) for led in leds]
         self._positions = np.array([led.position for led in leds])
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
-        """Return the light (L, H, W) float32, with soft shadows, on gel seen at height (H, W) m; see ``Lit``."""
+        """Return the light (L, H, W) float32, as ``Lit.light`` but in soft shadows, on gel seen at height (H, W) m."""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):

@@ -32,7 +32,7 @@ class Gather:
 class Preset:
     """Settings of a Mitsuba render.
 
-    says : it in words; points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
+    says : the preset in words; points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
     bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
     paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths per pixel; 0 for our own integrator
 
@@ -79,7 +79,7 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Return the table of ``measure_presets.py``: "presets" holds, by name, ms by variant and error in grey levels."""
+    """Return the table of ``measure_presets.py``: "presets" holds, by name, ``ms`` by variant and ``error``, levels."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 

@@ -215,7 +215,7 @@ class Renderer:
 
 
 def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
-    """Draw noise (H, W, 3) float32, levels, as strong as the unit's: one colour for each square of half a GRAIN."""
+    """Draw noise (H, W, 3) float32, levels, as strong as the unit's: one colour for each 2 x 2 px (at 240 wide)."""
     height, width = unit.camera.shape
     side = max(GRAIN * width // 240, 2) // 2
     white = random.standard_normal((height // side + 2, width // side + 2, len(COLOURS)), np.float32)

@@ -24,7 +24,7 @@ NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A shape given by its sizes; the struct of each ``SceneForm`` has the form's kind and fields. name : the user's"""
+    """A shape given by its sizes, mm, to which the struct of each kind of shape adds fields. name : the user's"""
 
     name: str
 

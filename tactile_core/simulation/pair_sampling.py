@@ -98,7 +98,7 @@ def press_rows(
     slides ends with the slide, at constant force along the same path on both sensors. A scene with ``depth_steps``
     pairs contacts of equal depth instead of equal force.
     seed, press : numbers that decide the draw; pair : the sensors, source and target
-    keep : words of ``KEEPABLE``, both solutions' fields to add"""
+    keep : ``("traction",)`` adds that of both surfaces, (n, 3) Pa"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)
@@ -195,8 +195,8 @@ def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET
 def pair_row(
     biotac: Solution, digit: Solution, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
-    """Return arrays stored of a contact of both sensors of ``pair``, see ``pairs_writer.units``.
-    biotac, digit : solutions of source and target; keep : words of ``KEEPABLE``, both solutions' fields to add"""
+    """Return what a file stores of one contact on both sensors of ``pair``, by the names of ``pairs_writer.units``.
+    biotac, digit : solutions of source and target; keep : ``("traction",)`` adds that of both surfaces"""
     source, target = pair
     both = (source, biotac), (target, digit)
     return {

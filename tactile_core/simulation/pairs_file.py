@@ -232,7 +232,7 @@ def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Spl
 
 
 def quantise(displacement: np.ndarray) -> np.ndarray:
-    """Convert displacement (...) m to int16 steps of ``SCALE`` m. Raises TactileError beyond 3.2767 mm."""
+    """Convert displacement (...) m to int16 steps of 0.1 um. Raises TactileError beyond 3.2767 mm."""
     steps = np.round(displacement / SCALE)
     if not np.all(np.abs(steps) <= np.iinfo(np.int16).max):  # false for NaN too
         found = f"{1e3 * np.abs(displacement).max():.2f} mm"

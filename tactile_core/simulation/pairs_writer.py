@@ -32,7 +32,7 @@ _TILTS_DEG = tuple(range(0, 46, 5))
 
 
 def card(path: str | os.PathLike, source: str = SOURCE, target: str = TARGET) -> dict:
-    """Return counts, hash and histograms of a file of pairs, without its name; source, target : its sensors"""
+    """Return a file's card: scene, seed, sha256, counts, histograms, not its name; source, target : its sensors"""
     import h5py
 
     with h5py.File(path) as file:
@@ -78,8 +78,8 @@ def _plain(value: object) -> object:
 
 
 def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
-    """Return the unit of each dataset that is written; the leading axis counts contacts. Some are named after the two
-    sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : words of ``KEEPABLE``, datasets to add"""
+    """Return the unit of each dataset of a file, by name; the leading axis counts contacts. Some are named after the
+    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : ``("traction",)`` adds tractions"""
     fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
     return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
@@ -90,8 +90,8 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """Origin of contacts. scene : its text; indenters : their names; pair : source and target; keep : words of
-    ``KEEPABLE``, fields that are in the file beside"""
+    """Origin of contacts. scene : its text; indenters : their names; pair : source and target
+    keep : ``("traction",)`` where the file holds the surfaces' tractions"""
 
     scene: str
     indenters: list[str]
@@ -101,7 +101,7 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks, array packs ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts, which
+    """Join blocks, shards ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts, which
     states where they were ``made``. Raises TactileError where it cannot be written."""
     about = {
         "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,

@@ -67,7 +67,7 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Content of a scene file. format : ``FORMAT``; indenters : the bodies, by different names
+    """Content of a scene file. format : "tactile-scene-1"; indenters : the bodies, by different names
     pairs, recording : presses to draw, and a motion to record; None where the file has no such table"""
 
     format: str

@@ -33,8 +33,8 @@ _FIELDS = ("displacement", "traction")  # of a sensor
 
 
 def outputs() -> dict[str, Sensor]:
-    """Return the optional outputs of a recording, by the words that ``keep`` names them with, and the sensor that each
-    needs. Always there are time, force and, where a gel is solved, the contact's centre."""
+    """Return the sensor that each optional output needs: ``electrodes``, ``displacement_SENSOR``, ``traction_SENSOR``;
+    ``keep`` takes these words. Always there are time, force and, where a gel is solved, the contact's centre."""
     fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
     return {"electrodes": ELECTRODES_OF, **fields}
 
@@ -70,7 +70,7 @@ def simulate_recording(
     scene_path : scene.toml or its folder; seed : of the electrodes' rest, drift and noise
     progress : called with (frames done, frames)
     keep : words of ``outputs()``; a sensor that none of them needs is not solved
-    tiers : of mechanics, by sensor; fast for others
+    tiers : "fast", "full" or "reference" by sensor; "fast" for others
     loaded : a scene and its text in place of the file's, whose name then only serves messages
     Raises TactileError for a scene without a recording, forces beyond the linear model's range, and tractions of
     another tier than the fast one."""

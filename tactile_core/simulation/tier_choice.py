@@ -38,8 +38,8 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return each tier's name, its largest error of shape, um, up to a depth that is ``share`` of the thickness (fast
-    adds full's, against which it was measured), and ms per contact.
+    """Return "the fast tier", full and reference, each with its largest error of shape, um, up to ``share`` of the
+    thickness (fast adds full's, against which it was measured), and ms per contact.
     Raises TactileError for a sensor without measured errors."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"

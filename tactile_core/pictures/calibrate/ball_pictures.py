@@ -59,7 +59,7 @@ class BallPictures(abc.ABC):
         seen : (H, W) m, the heights that the pixels see"""
 
     def heights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the gel's heights (H, W) float32, m, see ``print_on``; ball : (right, down, depth, radius), m"""
+        """Return the heights (H, W) float32, m, of gel under a ball; ball : (right, down, depth, radius), m"""
         return print_on(self.rest, self.right, self.down, ball, self.thickness)
 
     def deepest(self, radius: float) -> float:
@@ -67,7 +67,7 @@ class BallPictures(abc.ABC):
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return ``raised_light`` (3, H, W) of seen heights (H, W) m, divided by ``Calibration.facing``."""
+        """Return the ambient light (3, H, W) that rises with seen heights (H, W) m, over a facing coating's light."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -168,5 +168,5 @@ class _OfUnit(BallPictures):
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:
-    """Return a preset for pictures reduced by ``factor``, with a bounce at the same number of places or half of it."""
+    """Return a preset for pictures reduced by ``factor``, its bounce at the same places, or at fewer, 4 px apart."""
     return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

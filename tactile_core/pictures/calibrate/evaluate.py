@@ -34,7 +34,7 @@ class Evaluation:
     """Result of a calibration on one photograph.
 
     ball : three numbers fitted, the radius known
-    picture : (H, W, 3) uint8, rendered; metrics, baseline : by the names of TARGETS; flags : in words
+    picture : (H, W, 3) uint8, rendered; metrics, baseline : roi_l1 and others of ``TARGETS``; flags : doubts in words
     through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; the
         ``through_*`` metrics use the median share of the set's other photographs, all others the calibration's"""
 

@@ -35,7 +35,7 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
     """Result of `calibrate`. calibration : of the unit; tried : evaluations of it on the presses it was fitted to
-    warnings : sentences"""
+    warnings : sentences on what makes it doubtful"""
 
     calibration: Calibration
     tried: list[Evaluation]
@@ -43,7 +43,7 @@ class Calibrated:
 
 
 def check_diameter(ball_diameter: float) -> None:
-    """Raise TactileError where a ball of ``ball_diameter``, m, does not fit on the gel (MM_LIMITS)."""
+    """Raise TactileError where a ball of ``ball_diameter``, m, does not fit on the gel: 0.5 to 16 mm do."""
     if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
         expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
         raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
@@ -230,7 +230,7 @@ class _Search:
 
 
 def unexplained_share(sight: Sight, left: float) -> float:
-    """Return the share of a photograph's squares that a fit leaves; left : mean square, grey levels squared"""
+    """Return the share of the change's mean square that a fit leaves; left : what it leaves, grey levels squared"""
     return left / max(float(np.square(sight.change[sight.counts]).mean()), 1e-9)
 
 

@@ -13,8 +13,8 @@ _C1, _C2 = (0.01 * PEAK) ** 2, (0.03 * PEAK) ** 2
 
 
 def metrics(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray, region: np.ndarray) -> dict:
-    """Compute metrics by name of a picture (H, W, 3) against a photograph (H, W, 3), levels: in a region, the mean
-    absolute difference roi_l1, roi_psnr (dB), structural similarity roi_ssim, overlap of shadows lobe_iou; frame_l1.
+    """Compare a picture (H, W, 3) with a photograph (H, W, 3), levels, by name: in a region, the mean absolute
+    difference roi_l1, roi_psnr (dB), structural similarity roi_ssim, overlap of shadows lobe_iou; in all, frame_l1.
     region : (H, W) bool; background : (H, W, 3), untouched gel. lobe_iou is NaN where neither of the two has a lobe."""
     picture, photograph = picture.astype(float), photograph.astype(float)
     error = picture - photograph
@@ -33,7 +33,7 @@ def psnr(error: np.ndarray) -> float:
 
 
 def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray) -> float:
-    """Return the intersection over union of shadow lobes (changes below LOBE), mean over colours that have any.
+    """Return the intersection over union of shadow lobes (under -10 levels), mean over colours that have any.
     change, true_change : (H, W, 3) grey levels against the background; region : (H, W) bool"""
     overlaps = []
     for channel in range(len(COLOURS)):

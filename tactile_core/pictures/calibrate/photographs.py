@@ -133,7 +133,7 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
     """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half. At
-    each pixel it is the median of values within CHANGE of the plain median, which presses on a third of the pictures
+    each pixel it is the median of values within 18 levels of the plain median, which presses on a third of the pictures
     pull by up to that much."""
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
@@ -144,8 +144,8 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses. Means over
-    NOISE_WINDOW, which hold the drift of light, are subtracted first; a photographed background adds its own noise."""
+    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses. Means over 41 px
+    (at 240 wide), which hold the drift of light, are subtracted first; a photographed background adds its own noise."""
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:

@@ -82,7 +82,7 @@ class Sight:
         self.untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown
 
     def missed(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual, levels, of a change (n, 3) of linear light, and the slope of the camera's curve."""
+        """Return the residual (n, 3), levels, of a change (n, 3) of linear light, and the curve's slope (n, 3)."""
         seen, slope = bent(change, self.untouched)
         return seen - self.shown, slope
 

@@ -43,7 +43,7 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 0.1, 8.0  # mm; the gel's window is 18 mm wide
 
 
 def parameters_of(calibration: Calibration) -> np.ndarray:
-    """Return the vector (22,) of a calibration, in the order of NAMES."""
+    """Return a calibration's numbers (22,) by ``NAMES``: of camera, dome, coating, then of each LED in turn."""
     camera = calibration.camera
     lights = zip(calibration.leds, calibration.ambient_rise, strict=True)
     leds = [value for led, rise in lights for value in (*(1e3 * mm for mm in (*led.position, led.radius)), 1e-3 * rise)]
@@ -53,7 +53,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return a calibration with other numbers (22,), as NAMES, and its ``gain``; raises TactileError out of range."""
+    """Return a calibration with other numbers (22,), by ``NAMES``, its gain kept; raises TactileError out of range."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()

@@ -21,7 +21,7 @@ SHALLOW = 0.3  # of the deepest press's change; a weaker peak is part of another
 
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:
-    """Return frames (H, W, 3) uint8 of a video by name: the deepest of each press, and some of the untouched gel.
+    """Return frames (H, W, 3) uint8 by "FILE#NUMBER": the deepest of each press, and some of the untouched gel.
     Raises TactileError for no video of OpenCV's, or one too long or large; ModuleNotFoundError without OpenCV."""
     installed.require("camera", "cv2")
     small = np.stack([_small(frame) for frame in _read(path)])

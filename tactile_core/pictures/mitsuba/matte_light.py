@@ -29,7 +29,7 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
 class MatteLight:
     """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; the caller checks the arguments.
-    variant : see ``make_tracer``; rest : (H, W) m, heights that the scene starts with; seed : of the light points"""
+    variant : llvm_ad_rgb or scalar_rgb; rest : (H, W) m, heights to start with; seed : of the light points"""
 
     def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
         self.unit, self.preset = unit, preset
@@ -37,12 +37,12 @@ class MatteLight:
         self._start = np.random.default_rng(seed).random(4)
 
     def radiance(self, height_map: np.ndarray) -> np.ndarray:
-        """Return the radiance (H, W, 3) float32, levels, of a height_map (H, W) m."""
+        """Return the radiance (H, W, LED) float32, levels, of a height_map (H, W) m."""
         height = np.asarray(height_map, np.float32)
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
-        """Return the radiance (H, W, 3) float32, by the LEDs alone, of ``height`` (H, W) m, and the surface seen."""
+        """Return the radiance (H, W, LED) float32, by the LEDs alone, of ``height`` (H, W) m, and the surface seen."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)

@@ -62,8 +62,8 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """Return the ``cheapest`` preset for a largest error, grey levels, by a variant of Mitsuba; None for the variant
-    that works here, or the one without LLVM where Mitsuba is missing."""
+    """Return the name of the fastest preset within an ``error``, grey levels, by a variant of Mitsuba; None for the
+    variant that works here, or the one without LLVM where Mitsuba is missing."""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:
