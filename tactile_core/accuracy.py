@@ -154,9 +154,9 @@ class Candidate(NamedTuple):
 
 
 def cheapest(candidates: Sequence[Candidate], bound: float, unit: str, what: str = "") -> Candidate:
-    """Return the candidate of least cost whose error is at most the bound; what : the errors' subject, for the message.
+    """Return the candidate of least cost whose error is at most the bound, in ``unit``.
 
-    Raises TactileError, naming the most exact candidate, where none is exact enough.
+    what : the errors' subject, for the message. Raises TactileError, naming the most exact one, where none fits.
     """
     good = [each for each in candidates if each.error <= bound]
     if not good:

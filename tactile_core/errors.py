@@ -42,8 +42,8 @@ class TactileError(Exception):
 def finite_number(
     value: Any, where: str, expected: str, least: float = -math.inf, most: float = math.inf, advice: str = ""
 ) -> float:
-    """Return a value as a float; raises TactileError unless it is a finite number from ``least`` to ``most``. Decimals
-    and fractions are none: numpy's functions fail on those."""
+    """Return a value as a float; raises TactileError of where, expected, advice unless it is a finite number from
+    ``least`` to ``most``. Decimals and fractions are none: numpy's functions fail on those."""
     try:
         known = isinstance(value, int | float) or hasattr(value, "__array__")
         number = float(value) if known and not isinstance(value, bool) else math.nan
@@ -55,7 +55,7 @@ def finite_number(
 
 
 def path_text(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:
-    """Return the name of a file as text; raises TactileError unless it is text or an ``os.PathLike``."""
+    """Return a file's name as text; TactileError of where, expected, advice unless it is text or an ``os.PathLike``."""
     if not isinstance(value, str | os.PathLike):
         raise TactileError(where, f"a {type(value).__name__}", expected, advice)
     return os.fspath(value)

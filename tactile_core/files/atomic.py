@@ -30,7 +30,7 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
     Folders above it that are missing are made. An error inside the block removes what was made and leaves what was at
     `path` untouched. A killed process leaves `.<name>.tactile-partial`, which the next writer of the file replaces.
     shared : several processes may write the same file at once; each has its own temporary name, and `sweep_files`
-        clears those of killed ones. Their folder is there: where it was removed, the file is no longer wanted
+        clears those of killed ones. Their folder must be there: one that was removed is not made again
     """
     path = Path(path)
     partial = _beside(path, "partial")
@@ -139,7 +139,7 @@ def _recover(path: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Hold the lock of a folder's only writer; raises TactileError when another process holds it."""
+    """Hold the lock of the only writer of the folder `path`; raises TactileError when another process holds it."""
     file = _beside(path, "lock")
     while True:
         try:

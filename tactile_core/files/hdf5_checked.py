@@ -91,7 +91,7 @@ def _visit(place: h5py.File | h5py.h5g.LinkProxy, path: str | os.PathLike, check
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
-    """Raise TactileError for a dataset that declares more data than its stored bytes can unpack to."""
+    """Raise TactileError, of ``where``, for a dataset that declares more data than its stored bytes can unpack to."""
     stored = data.id.get_storage_size()
     if data.size * data.dtype.itemsize > MAX_RATIO * stored + STEP:
         found = f"shape {data.shape} in {stored} stored bytes"
@@ -99,7 +99,7 @@ def declared(data: h5py.Dataset, where: str) -> None:
 
 
 def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
-    """Read a dataset, or some rows, at most MOST_CHUNKS chunks at a time. Raises TactileError for a row of more."""
+    """Return a dataset's array, or some rows, in small parts. TactileError for a row of over MOST_CHUNKS chunks."""
     if data.chunks is None or not data.ndim:
         return data[()] if rows is None else data[rows]
     start, stop, _ = (rows or slice(None)).indices(len(data))

@@ -63,7 +63,7 @@ class ToolOptions:
     """Options of the networks, the gel and its pictures, for all recordings of a command.
 
     weights : folder of networks, None for those that ship; source : the sensor they must translate, None for any
-    calibration : file of camera and lights, None for those that ship; preset, variant : of ``renderer.Renderer``
+    calibration : file of camera and lights, None for those that ship; preset, variant : as ``render.Options``
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     answer : options of the estimated contact, see ``Answer``
     gel : "translated" by the networks, or "solved", the found contact on the target, as where no networks lead to it

@@ -89,7 +89,7 @@ def load_drawer(
 ) -> Drawer:
     """Load camera and lights of a gel: the unit's that ships, or a file's.
 
-    preset, variant : of ``renderer.Renderer``; target, found_on : of `Drawer`; solves : true if contacts are solved
+    preset, variant : as ``render.Options``; target, found_on : of `Drawer`; solves : true if contacts are solved
     object_reflectance : of what touches the gel; None for the calibration's
     The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
     Raises TactileError for a bad calibration, and as ``renderer.Renderer`` does."""

@@ -44,8 +44,8 @@ class FramePass:
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None
     ) -> None:
-        """Store read(frames), which returns their times, s, and signals; count : frames of the whole recording
-        keep : words of results.KEEPABLE. Raises TactileError for motion of dots on a gel without dots."""
+        """Store tools and read(frames), which returns their times, s, and signals; count : of frames of the recording
+        keep : words of --keep. Raises TactileError for motion of dots on a gel without dots."""
         self._translator, self._drawer, self._pair = tools.translator, tools.drawer, tools.pair
         self._keep, self._clock = tuple(keep), clock or Stopwatch()
         self._decoded = RecordingPass(tools.translator, read, count)

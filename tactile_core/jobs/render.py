@@ -50,10 +50,10 @@ MAKER = "tactile render"  # in the note
 class Options:
     """Options of rendering.
 
-    preset : its name, None to choose by levels; levels : acceptable error, grey levels rms, None for the default preset
+    preset : fast, standard, quality or reference; None to choose by levels : error, grey levels rms, None for standard
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
-    frames : part of the input; exr : true writes OpenEXR too; variant : None for the faster one
+    frames : part of the input; exr : true writes OpenEXR too; variant : of Mitsuba, None for the faster
     noise : true adds the camera's noise to PNG pictures, the same in every run; overwrite : true replaces a result
     scene_out : file for the first frame as a Mitsuba scene, None for none"""
 
@@ -146,7 +146,7 @@ def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tup
 @dataclasses.dataclass(frozen=True)
 class Pictures:
     """Writer of frames as files.
-    about : attributes of EXR files; heights : true if frames are height maps, false for displacements
+    clock : times stages; about : attributes of EXR files; heights : true for height maps, false for displacements
     noise : true adds the camera's noise to PNG pictures; exr : true writes OpenEXR too"""
 
     renderer: Renderer

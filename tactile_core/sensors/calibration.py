@@ -175,7 +175,7 @@ class Calibration:
     dome_scale : heights of the resting gel over its lowest point, as a multiple of the public mesh's
     photograph : path of a photograph of the untouched gel, which then is the picture at rest; "" for none
     markers : dots printed on the gel; None for none
-    photographed : LEDs and albedo of the photograph, if they have changed since; None for the calibration's own
+    photographed : (LEDs, albedo) when the photograph was taken, if they have changed since; None for the present ones
     noise : standard deviation of the camera's noise, grey levels, per channel; pictures have none unless asked for"""
 
     unit: str

@@ -61,8 +61,8 @@ def _skin_axes(sensor: str) -> np.ndarray:
 
 
 def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.ndarray]:
-    """Find the point (3,) m and outward unit normal (3,) of a fluid sensor's resting skin at an unrolled place (x, z)
-    m. The place is clamped to the pad: unrolled x between the poles, angle within 90 degrees."""
+    """Find the place (3,) m and outward unit normal (3,) of a fluid sensor's resting skin at point (2,) = (x, z) m of
+    the unrolled plane, clamped to the pad: x between the poles, angle within 90 degrees."""
     skin = skin_of(sensor)
     stations, angles, radius = rolled_x(sensor), skin.angles, skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
@@ -74,8 +74,8 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
 
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Find the nearest places on a surface to points (n, 3) m: face index (n,), barycentric weights and places (n, 3)
-    m. Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
+    """Return the nearest places on a surface to points (n, 3) m: index of the face (n,), barycentric weights (n, 3) and
+    places (n, 3) m. Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
     faces, weights, places = [], [], []
     a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
     for point in points:

@@ -18,7 +18,7 @@ _ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # axis -> axes across
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder(Indenter):
-    """An upright cylinder that touches with its flat end. Lengths in m; ``edge`` is the radius of its rounded rims.
+    """An upright cylinder that touches with its flat end. radius, length : m; edge : m, radius of its rounded rims
     axis : index of the own axis that the shape is round about, set by the class"""
 
     radius: float

@@ -98,7 +98,7 @@ class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Origin of the data; licence : as stated, and where."""
+    """Origin of the data, in words for the card; licence : as stated, and where."""
 
     title: str
     url: str = ""

@@ -23,7 +23,7 @@ def layouts() -> dict[str, ModuleType]:
 def export(
     job: str | os.PathLike, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None]
 ) -> finished_job.Finished:
-    """Write the finished job in a folder as `layout` into the new folder `out`, whole or not at all.
+    """Write the finished job in the folder `job` as `layout`, a name, into the new folder `out`, whole or not at all.
     progress : called with (frames done, frames in all)
     Raises TactileError: a job that is not finished, an unknown layout, an existing folder, a full disk."""
     if layout not in layouts():
@@ -37,7 +37,7 @@ def write(
     source: finished_job.Finished, layout: str, out: str | os.PathLike, progress: Callable[[int, int], None],
     overwrite: bool | None = None,
 ) -> None:  # fmt: skip
-    """Write recordings of finished jobs as `layout` into the new folder `out`; progress : see `export`
+    """Write ``source``, of one or more finished jobs, as `layout` into the new folder `out`; progress : see `export`
     overwrite : true replaces an older `out`; false and None refuse it, None without advice to use an option"""
     with atomic.writing(out), atomic.new_folder(out, overwrite=overwrite) as partial:
         layouts()[layout].write(source, partial, progress)
