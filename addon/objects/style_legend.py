@@ -16,6 +16,7 @@ _GAP = 1.5  # mm between sensor and card, as the camera sees them
 _INK, _CARD = (0.95, 0.95, 0.95), (0.03, 0.03, 0.035)
 _MIDDLE, _HALF = "Middle", "Half"
 _NEAR = 3.0  # times half a sensor's diagonal: a nearer camera is the sensor's own, or a new file's hidden one
+_STRAIGHT = 0.999  # cosine: a camera that looks up so straight is in another sensor
 # Rotation of a new file's view, used without a camera.
 _NO_CAMERA = Quaternion((0.7124, 0.4411, 0.2874, 0.4641)).normalized().to_euler()
 _Part = tuple[np.ndarray, np.ndarray, np.ndarray]  # corners (n, 2) mm, triangles (m, 3), colours (n, 3)
@@ -88,6 +89,9 @@ def _facing() -> bpy.types.NodeTree:
     away = nodes.vector("DISTANCE", seen.outputs["Location"], given.outputs[_MIDDLE])
     half = nodes.vector("LENGTH", given.outputs[_HALF])
     near = nodes.math("MULTIPLY", half, _NEAR)
+    ahead = nodes.output("FunctionNodeRotateVector", (0.0, 0.0, -1.0), seen.outputs["Rotation"])
+    slanted = nodes.math("LESS_THAN", nodes.vector("DOT_PRODUCT", ahead, (0.0, 0.0, 1.0)), _STRAIGHT)
+    away = nodes.math("MULTIPLY", away, slanted)
     there = nodes.output("FunctionNodeCompare", away, near, operation="GREATER_THAN")
     turn = nodes.output("GeometryNodeSwitch", there, _NO_CAMERA, seen.outputs["Rotation"], input_type="ROTATION")
     down = nodes.output("FunctionNodeRotateVector", (0.0, -1.0, 0.0), turn)

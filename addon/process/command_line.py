@@ -46,7 +46,8 @@ def main(arguments: list[str]) -> int:
             work(path, folder, options)
             print(folder)
         except (TactileError, RuntimeError, OSError) as error:  # Blender's operators raise RuntimeError
-            print(f"tactile: error: {path}: {' '.join(str(error).split())}", file=sys.stderr)
+            words = " ".join(str(error).removeprefix("Error: ").split())
+            print("tactile: error:", words if str(path) in words else f"{path}: {words}", file=sys.stderr)
             failed.append(path)
     if failed:
         print(f"tactile: {len(failed)} of {len(inputs)} failed: {', '.join(map(str, failed))}", file=sys.stderr)

@@ -43,7 +43,8 @@ def test_colours_fade_below_the_expected_error(gel, part):
 
 
 NEW_FILE = (7.3589, -6.9258, 4.9583)  # of its hidden camera, inside the skin: nothing is looked at by it
-VIEWS = [(150, -60, 100), (-150, 20, 60), (10, 200, 30), (60, 35, -150), NEW_FILE, None]
+OTHER = (0, 205, -25)  # in a sensor of another recording, straight up
+VIEWS = [(150, -60, 100), (-150, 20, 60), (10, 200, 30), (60, 35, -150), NEW_FILE, OTHER, None]
 
 
 @pytest.mark.parametrize("place", VIEWS)
@@ -57,10 +58,11 @@ def test_legends_face_the_camera_below_their_sensors_and_apart(gel, nodes_of, pl
         camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
         scene.collection.objects.link(camera)
         camera.location = place
-        camera.rotation_euler = (Vector(place) - gel.location).to_track_quat("Z", "Y").to_euler()
+        looks = gel.location if place != OTHER else camera.location + Vector((0, 0, 1))
+        camera.rotation_euler = (Vector(place) - looks).to_track_quat("Z", "Y").to_euler()
         scene.camera = camera
         bpy.context.view_layer.update()
-        turn = turn if place == NEW_FILE else np.array(camera.matrix_world.to_3x3())
+        turn = turn if place in (NEW_FILE, OTHER) else np.array(camera.matrix_world.to_3x3())
     boxes = []
     for sensor in (thing for thing in scene.objects if thing.tactile.role in ("BIOTAC", "DIGIT")):
         legend = next(thing for thing in sensor.children if "text" in thing)
