@@ -171,7 +171,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
 
 def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> str:
-    """Let a skin and its electrodes play a recording at frames (T,) of the scene; returns a sentence."""
+    """Let a skin and its electrodes play ``found`` at frames (T,) of the scene; returns a sentence on how they play."""
     rows = unit_rows(found.signals) or [("unit", "nothing is known of it by this recording")]
     skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in rows)
     if table_of(properties.sensor_name(skin)).is_file():

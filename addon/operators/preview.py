@@ -25,7 +25,7 @@ def is_on() -> bool:
 
 
 def failure() -> str:
-    """Return why the last picture could not be drawn, or nothing."""
+    """Return why the last picture could not be drawn, "" where it was."""
     return _failed
 
 

@@ -107,8 +107,8 @@ def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[F
 
 
 def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
-    """Measure ``count`` random contacts, each reached in ``steps`` even steps of depth, from 2 on the first not timed.
-    Returns times of the steps, and the contacts at the ends, None where none is found."""
+    """Measure ``count`` random contacts, WARM before, in ``steps`` even steps of depth, the first of several untimed.
+    Returns times of the steps, and contacts at the ends, those of WARM first, None where none is found."""
     times: Times = []
     last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):

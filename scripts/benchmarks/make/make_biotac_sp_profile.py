@@ -34,7 +34,7 @@ def main() -> int:
 
 
 def table(name: str = "biotac_sp") -> str:
-    """Return the table of radii, CSV; the skin's thickness and middle are of the descriptor of sensor ``name``."""
+    """Return the CSV of radii, mm, by x, mm, and angle, deg; the skin's thickness and middle are of sensor ``name``."""
     skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
     outer, core = 1e3 * RESTING, 1e3 * CORE

@@ -70,7 +70,7 @@ def write(path: Path, solid: compliance.Solid, even: Half, odd: Half, step: floa
 
 
 def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
-    """Order the unknowns: touched nodes, sensing points, feet and swell (which have no clusters), the other nodes.
+    """Order the unknowns: touched nodes, sensing points, electrode feet and fluid (no clusters), the other nodes.
     half : of the solid, whichever; step : m/N, to which entries are rounded"""
     rows, columns = solid.lattice.shape
     number = np.arange(len(solid.lattice.rest))

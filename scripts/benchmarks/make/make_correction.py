@@ -36,7 +36,7 @@ def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction:
 
 
 def solve_one(job: tuple[pathlib.Path, str, int, int, float]) -> str:
-    """Solve a press in the full tier unless its file is there; return a line to print. job : ``file_of``'s five"""
+    """Solve a press unless its file is there; return a line to print. job : folder, sensor, seed, number, friction"""
     _, sensor, seed, number, friction = job
     path = file_of(*job)
     if path.exists():

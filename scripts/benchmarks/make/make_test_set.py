@@ -38,7 +38,7 @@ def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
 
 
 def solve_one(job: Job) -> str:
-    """Solve one press, unless its file is there; return a line to print. job : ``file_of``'s arguments"""
+    """Solve one press, unless its file is there; return a line to print. job : folder, seed, number"""
     path = file_of(*job)
     if path.exists():
         return f"{path.name}: was there"

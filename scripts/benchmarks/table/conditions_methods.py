@@ -52,8 +52,8 @@ class Condition:
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one condition, of ``NAMES``: CPU time of a translated frame, preparing included, and errors; quick : of
-    fewer contacts"""
+    """Measure one condition, as "unit_found": CPU time of a translated frame, preparing included, and errors;
+    quick : of fewer contacts"""
     condition = _units(name, quick) if name in UNITS else _flat(quick) if name == "flat_bodies" else _two(name)
     found = condition.translated()
     ms = best_ms(condition.translated, len(condition.force), most=3)

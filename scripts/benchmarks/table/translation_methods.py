@@ -26,7 +26,7 @@ Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure a translation, ``name`` as "numpy_1": one of KINDS, and the frames in a call; quick : on less"""
+    """Measure a translation, ``name`` as "numpy_solved_1": a key of KINDS, and the frames in a call; quick : on less"""
     kind, batch = name.rsplit("_", 1)
     pairs = read_pairs(TEST_SET)
     if quick:

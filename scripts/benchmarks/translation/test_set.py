@@ -1,4 +1,4 @@
-"""Rows of the translation on a test set: paired contacts that the full tier of mechanics solved."""
+"""Rows of the translation on a test set, contacts paired by the full tier; `bodies` : surfaces, of ``our_bodies``."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def rows(pairs: Pairs) -> list[Row]:
 def pairs_apart(
     pairs: Pairs, felt: np.ndarray, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Draw rows (COUNT,) of a first and a second contact out of ``felt``, and how far they are apart, m."""
+    """Draw rows (COUNT,) of a first and a second contact from ``felt`` (k,), rows of pairs, and their distances, m."""
     first, second = random.choice(felt, (2, 40 * COUNT))
     size = lengths(pairs.signal)
     apart = lengths(pairs.place[first, :2] - pairs.place[second, :2])
