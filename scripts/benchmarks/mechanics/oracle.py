@@ -36,7 +36,7 @@ def disturbed(solid: FiniteStrainSolid) -> State:
 
 
 def differences() -> dict[str, float]:
-    """Return largest differences over largest entry: energy, force, condensed_force, tangent, pressure_step."""
+    """Return largest differences from scikit-fem, relative: energy, force, condensed_force, tangent, pressure_step."""
     solid = skewed()
     state = disturbed(solid)
     other = _Other(solid.mesh, state)
