@@ -11,7 +11,7 @@ from . import preferences, properties
 
 
 def budget_of(scene: bpy.types.Scene) -> Budget:
-    """Return the bounds on error (surface um, picture levels) in a scene's panel. Raises TactileError for other text."""
+    """Return bounds on error (surface um, picture levels) of a scene's panel. Raises TactileError for other text."""
     text = scene.tactile_render.error.strip()
     return parse_budget(text) if text else Budget()
 
