@@ -56,7 +56,7 @@ def check(folder: Path, venv: Path) -> int:
 
 
 def install(venv: Path) -> Path:
-    """Return the environment's Python, after installing what it lacks."""
+    """Return the Python of the environment ``venv``, which is made, with PACKAGES, where it is missing."""
     python = venv / ("Scripts" if sys.platform == "win32" else "bin") / "python"
     if not python.exists():
         call(sys.executable, "-m", "venv", venv)
