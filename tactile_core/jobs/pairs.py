@@ -96,7 +96,7 @@ def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]
 
 
 def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
-    """Solve the contacts of block `number` of presses and write them; returns false if the block was there already."""
+    """Solve the contacts of block `number` of presses and write them; returns false if it was there already."""
     from ..simulation.pair_sampling import press_rows
 
     one = job.inputs[index]

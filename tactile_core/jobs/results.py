@@ -95,7 +95,7 @@ def is_result(folder: Path, maker: str = "") -> bool:
 
 
 def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
-    """Parse ``"image,electrodes"`` to known words, in order; None: all. TactileError for others, or too few (least)."""
+    """Parse ``"image,electrodes"`` to words in known's order; None: all. TactileError for others, or under least."""
     words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in known:

@@ -280,7 +280,7 @@ class SheetFigure:
 
 
 def scale(*displacements: np.ndarray | None) -> float:
-    """Return the largest length of displacements (k, n, 3) m, at least SMALLEST_SCALE; None counts as zero."""
+    """Return the largest length, m, of displacements (k, n, 3) m, at least 1e-6; None counts as zero."""
     lengths = [np.linalg.norm(d, axis=-1).max(initial=0) for d in displacements if d is not None]
     return max(SMALLEST_SCALE, *lengths)
 

@@ -133,7 +133,7 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def known() -> dict[str, Path]:
-    """Return the recipes that ship, by name."""
+    """Return the files of the recipes that ship, by the recipes' names."""
     return {file.stem: file for file in sorted(shipped(SHIPPED).glob("*.toml"))}
 
 

@@ -214,7 +214,7 @@ def wait() -> float:
 
 @functools.cache
 def loop() -> Any:
-    """Start a tornado loop in a thread that lasts as long as this process. (Dask's own gives up after 10 s whatever its
+    """Return a tornado loop, in a thread that lasts like this process. (Dask's own gives up after 10 s whatever its
     settings, too little on a very busy machine.) Raises TactileError where it does not start."""
     from tornado.ioloop import IOLoop
 

@@ -177,7 +177,7 @@ def folder_of(out: Path) -> Path:
 
 @contextlib.contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Lock <out>.parts, the folder of a new job or of the same one begun before. TactileError for another job's."""
+    """Lock and yield <out>.parts, folder of a new job or the same one begun before. TactileError for another job's."""
     folder = folder_of(out)
     with opened(folder, None):
         if not jobs.exists(folder):

@@ -124,7 +124,7 @@ class Layout(Protocol):
         """Add rows, name -> column, of an episode (its number). features : name -> dtype and shape; rate : Hz"""
 
     def end_episode(self) -> dict[str, Any]:
-        """Close an episode's files; returns its place for the list of episodes."""
+        """Close an episode's files; returns chunk and file that hold it, for the list of episodes."""
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
         """Close all files and write the lists of episodes and stats; returns the layout's entries of info.json."""

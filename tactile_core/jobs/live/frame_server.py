@@ -32,7 +32,7 @@ class FrameServer:
     """Publisher of frames at a port of this machine, open to all its users; readers, fast or slow, do not affect the
     view.
 
-    port : 0 for any free one. Raises TactileError for a port that is not available.
+    port : 0 for any free one; address : tcp://127.0.0.1:PORT. Raises TactileError for a port that is not available.
     Whatever readers send is ignored: their libraries drop what they did not subscribe to. A slow one misses frames."""
 
     def __init__(self, port: int) -> None:

@@ -50,7 +50,7 @@ class _Together:
         self._writer.write_table(added)
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the file if it has become large; returns where the episode lies, for the list of episodes."""
+        """Close the file if it has become large; returns chunk_index and file_index of the episode's data and meta."""
         place = {f"data/{name}": number for name, number in self._place().items()}
         if self._path.stat().st_size > FILE_MB * 1e6:
             self._close()

@@ -57,7 +57,7 @@ class _Apart:
                 self._video.write(picture[..., ::-1].copy())  # OpenCV has blue first
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the episode's files; returns no entries: its place follows from its number."""
+        """Close the episode's files; returns {}: its place follows from its number."""
         self._data.close()
         if self._video is not None:
             self._video.release()
