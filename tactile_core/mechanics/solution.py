@@ -42,7 +42,7 @@ class OnDemand:
 @dataclasses.dataclass(frozen=True, repr=False)
 class Solution(Summary):
     """A solved contact, SI units, whatever the tier.
-    tier : the solver; converged : false if the iteration ended early: do not use it; iterations : of its last step
+    tier : fast, full or reference; converged : false if it ended early: do not use it; iterations : of its last step
     displacement : (n, 3) m of the sensor's surface nodes; contact_patch : (n,) bool, nodes that carry force
     thickness : m, of the sensor at the place of first touch
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch

@@ -49,7 +49,7 @@ def solve(
     friction : Coulomb's coefficient, 0 or more
 
     Returns a :class:`Solution`: ``displacement`` (n_nodes, 3) m, ``force`` (3,) N, ``depth`` m, ``pressure`` Pa, and
-    the errors expected of the tier.
+    the tier's ``shape_error`` and ``force_error``.
     Raises TactileError for an impossible request, or for one beyond what the tier finds; UnreachableError beyond 60 %
     of the thickness; ModuleNotFoundError without the extra [fem].
 

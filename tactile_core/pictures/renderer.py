@@ -140,7 +140,7 @@ class Renderer:
 
     def radiance(self, height_map: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
         """Return each LED's radiance (H, W, LED) float32, levels, of what pixels see of a height_map (H, W) m.
-        reflectance : see ``__call__``"""
+        reflectance : (H, W), 0 black to 1 white, of the object behind; None for the calibration's"""
         if reflectance is not None:
             grey = checked_reflectance(reflectance, "reflectance")
             reflectance = camera_array(grey, self.camera.shape, "reflectance")

@@ -53,7 +53,7 @@ class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A simulated recording: which indenter moves, linearly between points, how it leans, and the electrodes' defects.
+    """A simulated recording: which indenter, by name, moves linearly between points, how it leans, its defects.
     noise_counts : standard deviation; drift_counts : the most, from first to last frame; friction : Coulomb's
         coefficient
     tilt_deg : between the indenter's axis and the surface normal, its upper end toward +x"""

@@ -63,8 +63,8 @@ def simulate_recording(
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
 ) -> int:
-    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with its true meshes; return the number
-    of frames that press.
+    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with the kept displacements; return the
+    number of frames that press.
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
     scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
     scene_path : scene.toml or its folder; seed : of the electrodes' rest, drift and noise
@@ -209,7 +209,7 @@ def _pressure(frames: list[_Frame]) -> np.ndarray:
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
-    """Convert the fluid's pressure (...,), Pa above the surrounding air's, to PDC (...,) int16 counts, 0..4095."""
+    """Convert the fluid's pressure (...,), Pa above the air's, to counts (...,) int16, 0..4095, of PDC, its sensor."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 

@@ -27,7 +27,7 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 @dataclasses.dataclass(frozen=True)
 class Half:
-    """The even (or odd) motion of a solid, by the nodes (k,) with z >= 0 that are kept.
+    """The even (or odd) motion of a solid, by the nodes (k,) with z >= 0 that are kept, r of them touched.
 
     answer : (3 r, 3 k) m/N, motion of the kept nodes under unit forces on touched ones; zero where nothing can move
     under_loads : (3 k, w), their motion under the unit loads; among : (w, w), work of each load on another's motion"""

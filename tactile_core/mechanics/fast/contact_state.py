@@ -124,7 +124,7 @@ class Candidates:
     """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
     nodes : (k,) positions in ``Compliance.touchable``; displacement : (k, 3) m, first guess
     probe : (k, 3) m, offset beside a node in a crease at which its face's distance is measured, else 0
-    active : (k,) bool, first guess of which touch; inner : (c,) sensing points of the inner skin that may press
+    active : (k,) bool, first guess of which touch; inner : (c,) sensing points that may press on the core
     looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known"""
 
     nodes: np.ndarray

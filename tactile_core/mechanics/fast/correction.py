@@ -37,7 +37,7 @@ FILE = "mechanics_correction.npz"
 
 @dataclasses.dataclass(frozen=True)
 class PatchFrame:
-    """A frame that moves with a contact: centre (2,) m in unrolled coordinates, radius m of its patch."""
+    """A frame that moves with a contact: centre (2,) = (x, z) m, unrolled, and radius m of its patch."""
 
     centre: np.ndarray
     radius: float

@@ -51,7 +51,7 @@ class _Sprung(Frictionless):
 
 class EdgeContactProblem(ContactProblem):
     """Contact problem without friction whose candidates are the m touchable nodes and, numbered from m on, points
-    between them. pose, reach (m), work : as in ``ContactProblem``"""
+    between them. pose : at depth 0; reach : m, how far in nodes are followed; work : what contacts may cost, or None"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None

@@ -15,7 +15,7 @@ _POINT_STEP = (0.05e-3, np.radians(1.0))  # m and rad between points that stand 
 
 
 class Core:
-    """Gap and normal of a core's surface r = R(x, theta) about the axis (y, z) = (``axis_y``, 0)."""
+    """Gap and normal of a core's surface r = R(x, theta), from a table, about the axis (y, z) = (``axis_y``, 0)."""
 
     def __init__(self, sensor: str) -> None:
         self.sensor, self._skin = sensor, skin_of(sensor)

@@ -21,7 +21,7 @@ def quadratic(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the Gauss points (27, 3), weights (27,) and shape gradients (point, node, axis) in the reference cube."""
+    """Return the Gauss points (27, 3), weights (27,) and shape gradients (27, 27, 3), by node and axis, in a cube."""
     points = np.stack(np.meshgrid(_POINTS, _POINTS, _POINTS, indexing="ij"), -1).reshape(-1, 3)
     weights = np.einsum("a,b,c->abc", *[_POINT_WEIGHTS] * 3).ravel()
     (fx, dx), (fy, dy), (fz, dz) = (quadratic(points[:, k]) for k in range(3))

@@ -56,7 +56,7 @@ class Press:
 
 @dataclasses.dataclass(frozen=True)
 class Photographs:
-    """Photographs of one unit, prepared.
+    """Photographs of one unit, prepared; folder : the one that holds all, or the video
     background : (H, W, 3) float32, grey levels; estimated : true if it was estimated from the set
     untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel"""
 

@@ -61,7 +61,7 @@ def bounced(
 ) -> np.ndarray:
     """Return the radiance (n, 3) of n surface interactions by light that other places reflect onto them, once.
     meet : function that intersects rays; scene : occluders; emitters : lights
-    hit : the interactions, each DIRECTIONS times; phase : 0..1 of each, rotates its directions
+    hit : the interactions, each 16 times; phase : 0..1 of each, rotates its directions
     lobe : cosine of the half vector at the reflecting place beyond which light is left out, or None"""
     import drjit as dr
 
@@ -108,7 +108,7 @@ def mirrored(
 ) -> np.ndarray:
     """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
     meet : function that intersects rays; scene : the occluders; shape : (h, w)
-    hit : the mirroring places, each DIRECTIONS times, each standing for as much of the picture as a cell of the result
+    hit : the mirroring places, each 16 times, each standing for as much of the picture as a cell of the result
     phase : 0..1 of each, rotates its directions; lobe : alpha, and the cosine at its end
     camera_height : mm; to_cell : (column, row) at which the camera sees a point"""
     import drjit as dr

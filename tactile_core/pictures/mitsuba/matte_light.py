@@ -51,7 +51,7 @@ class MatteLight:
         return total / np.float32(self.preset.passes), first
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Surface) -> np.ndarray:
-        """Return the radiance (H, W, 3) with the preset's other effects: interreflection, refraction at the window.
+        """Return the radiance (H, W, LED) with the preset's other effects: interreflection, refraction at the window.
         height : (H, W) m, of the gel; direct, hits : what ``direct`` returned for it"""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
@@ -149,8 +149,8 @@ REACH = 16e-3  # m, the whole picture and its rim: in a bowl each distance contr
 def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
-    """Return the radiance (H, W, 3) float32 that the gel's own light adds to the pixels.
-    height : (H, W) m; direct : (H, W, 3) radiance of the pixels by the LEDs alone; hits : the surface that they see
+    """Return the radiance (H, W, LED) float32 that the gel's own light adds to the pixels.
+    height : (H, W) m; direct : (H, W, LED) radiance of the pixels without it; hits : the surface that they see
     gather : resolution, here and in ``irradiance``"""
     camera, step = unit.camera, gather.step
     spacing = camera.pixel_size[0] * step, camera.pixel_size[1] * step
