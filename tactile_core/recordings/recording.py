@@ -141,7 +141,7 @@ class Recording(Summary):
 
 
 class Chosen(NamedTuple):
-    """One of a file's recordings; finger, topic : None and empty where the path names none"""
+    """One of a file's recordings; file : its path; finger, topic : None and empty where the path names none"""
 
     file: str
     finger: int | None

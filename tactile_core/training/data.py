@@ -72,7 +72,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate readings (B, 20), counts and 1 if rectified, of rows (B,); rectified, unit : shares, of real ones"""
+        """Read rows (B,) as (B, 20): counts, and 1 if rectified. rectified, unit : shares of lost signs, real units"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]

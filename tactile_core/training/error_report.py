@@ -54,7 +54,7 @@ class Measure:
 
 
 def error_rows(measure: Measure, model: Model) -> list[Row]:
-    """Return all rows of the card: each step of the chain, the chain, the direct network, each beside its baseline."""
+    """Return the card's rows (name, value, unit, target, baseline, set) of each step, the chain, the direct network."""
     pairs, rows = measure.contacts.pairs, measure.rows
     columns = translation_metrics(measure.networks, pairs, rows, measure.change, measure.bodies)
     columns |= direct_columns(model, measure)

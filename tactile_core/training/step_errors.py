@@ -208,7 +208,7 @@ def _baseline(columns: Columns, name: str) -> np.ndarray:
 
 def metric_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
     """Make one row of a report; the unit is the last word of name. Larger is better for an intersection over union.
-    value, baseline, target : the metric, that without a translation, and its limit; None where there is none"""
+    value, baseline, target : the metric, that without a translation, its limit, or None; set_name : of contacts"""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target
     return row(name, value, unit, target, baseline=baseline, of=set_name, at_least=name.endswith("iou"))

@@ -66,7 +66,7 @@ def adapt(
 
     rest : the unit's rest; None estimates it from all recordings. It is used where a recording is never calm near it
     Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
-    in contact, an estimated rest that looks like a contact."""
+    in contact, an estimated rest that looks like a contact. options : of preparation"""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings, options) if rest is None else rest
@@ -97,7 +97,7 @@ def adapt_hand(
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
     """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings.
-    typical, options : as of `adapt`; of a sensor without a typical rest, rest and film are found, but no gains
+    typical : of simulated contacts; options : of preparation. Without a typical rest, rest and film alone are found
     untouched : path of a recording without contact, where there is one unit; None finds rest in all recordings
     Raises TactileError like `adapt`, and for a mixture of hands and single fingers."""
     columns = None if options is None else options.columns

@@ -44,7 +44,7 @@ class Networks:
     """The trained networks. Arrays are float32, T first; displacements in m, forces in N, changes in counts.
 
     tensors : network -> tensor name -> array
-    card : the model card (fields: `training/export_weights.py`); source, target : the sensors that it names
+    card : the model card: sizes, hashes, quantiles, bounds, errors; source, target : the sensors that it names
     electrodes : number of the source's electrodes; shapes below say 19, as of a BioTac
     sha256 : hash of the card, which identifies these weights
 
@@ -107,7 +107,7 @@ class Networks:
     def likely_latents(
         self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Compute latent_source (T, L) and latent_target (T, L') of the most plausible contact: see `latents`."""
+        """Map latent_signal (T, K) to latent_source (T, L), latent_target (T, L') of the most plausible contact."""
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:

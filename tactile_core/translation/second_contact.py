@@ -33,7 +33,7 @@ class SecondContact(NamedTuple):
 
 
 def told_apart(nets: Networks, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Separate change (T, e) counts into the stronger contact's and the weaker one's, NaN where there is only one.
+    """Split change (T, e) counts into the stronger contact's part and the weaker's: all and NaN where one is alone.
     unsigned : (T,) bool, frames whose signs are lost; they are not separated"""
     tensors, blocks = nets.tensors[PARTS], nets.sizes[PARTS]["blocks"]
     change = np.asarray(change, np.float32)

@@ -144,7 +144,7 @@ class Translator:
         return signals.typical if rest is None else signals.relative_to(np.array(rest))
 
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
-        """Translate all frames of ``signals``; see `decode`."""
+        """Translate all frames of ``signals``; state : (T, STATE) tracked, None estimates each frame alone"""
         return self.decode(signals, self.encode(signals), state)
 
     def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:

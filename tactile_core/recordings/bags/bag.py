@@ -96,7 +96,7 @@ def open_bag(path: str, file: BinaryIO) -> Iterator[Bag]:
 
 @contextmanager
 def refused(path: str) -> Iterator[None]:
-    """Turn errors of the library into a TactileError; it speaks of damage only where the library found damage."""
+    """Turn rosbags' errors in the block into a TactileError; it speaks of damage only where rosbags found damage."""
     try:
         with damage_reported(path, "bag"):
             yield

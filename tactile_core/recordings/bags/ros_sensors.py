@@ -94,7 +94,7 @@ def stamp_of(message: dict[str, Any]) -> float:
 
 
 def not_read(definition: Definition, fields: list[SensorFields]) -> list[str]:
-    """Return the names of the fields of a message that nothing here reads."""
+    """Return the names of a message's fields that are not read: all beside its sensors' fields, and others in these."""
     used = {each.path[0] for each in fields if each.path}
     beside = [
         name for name, kind in definition.fields(definition.root) if used and name not in used and not _is_time(kind)

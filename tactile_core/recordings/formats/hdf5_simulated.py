@@ -19,5 +19,5 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(store: Store) -> Recording:
-    """Read counts and the truth. Raises the errors of ``read_simulated``."""
+    """Read counts and true values. Raises the errors of ``read_simulated``."""
     return read_simulated(store, NAME)

@@ -58,7 +58,7 @@ LEAST_APART = 100.0  # counts, norm of a level's difference without conductivity
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return the mean share of change (n, 19) counts that no simulated contact explains, and the contacts' number."""
+    """Return the mean share of change (n, 19) counts that no simulated contact explains, and how many differ."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
@@ -110,7 +110,7 @@ def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tu
 
 
 def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
-    """Count the simulated contacts nearest to change (n, 19) counts that are mutually dissimilar."""
+    """Count the different contacts in change (n, 19) counts: mutually dissimilar ones among the nearest simulated."""
     known = patterns(sensor)
     near, counts = np.unique((unit(change[spread_out(len(change), MOST)]) @ known.T).argmax(axis=1), return_counts=True)
     kept: list[int] = []
