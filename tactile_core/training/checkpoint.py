@@ -25,7 +25,7 @@ class State:
     """State of a training.
     identity : what must be equal to resume it: data, seed, options, versions
     stage, epoch : the next to run; log : rows (stage, epoch, train, validation)
-    arrays : weights and optimiser"""
+    arrays : ``model/...``, weights, and ``optimiser/...``, moments"""
 
     identity: dict
     stage: int = 0

@@ -82,7 +82,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """Return SVB's rows: rms over electrodes of its reconstruction against the noisy signal, mean over contacts."""
+    """Return SVB's row of a report: rms over electrodes of reconstruction less noisy signal, mean over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))

@@ -180,7 +180,7 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """Return rows of each metric over the contacts rows (C,) that press without sliding, averaged as `in_bins`.
+    """Return a report's row per metric over the contacts rows (C,) that press without sliding, averaged as `in_bins`.
     columns : metric -> (C,); targets : metric -> limit, in the metric's unit; set_name : of these contacts"""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]

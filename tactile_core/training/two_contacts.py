@@ -32,7 +32,7 @@ SINGLES = 20_000  # contacts that determine the threshold for it
 
 @dataclass(frozen=True)
 class Presses:
-    """Simulated contacts: true changes signal (C, e) counts, place (C, 2) m on the gel, force (C,) N."""
+    """Simulated contacts: true changes signal (C, e) counts, place (C, 2) = (x, z) m on the gel, force (C,) N."""
 
     signal: np.ndarray
     place: np.ndarray

@@ -107,7 +107,7 @@ class Networks:
     def likely_latents(
         self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K) to latent_source (T, L), latent_target (T, L') of the most plausible contact."""
+        """Map latent_signal (T, K), rectified (T,) or one, to latent_source, latent_target of the likeliest contact."""
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
