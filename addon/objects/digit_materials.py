@@ -62,7 +62,7 @@ def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
 
 
 def acrylic() -> bpy.types.Material:
-    """Make clear acrylic: it passes all light, as its losses are in the calibration, and adds reflections."""
+    """Make or find clear acrylic: it passes all light, as its losses are in the calibration, and adds reflections."""
     found = bpy.data.materials.get("DIGIT acrylic")
     if found is not None:
         return found

@@ -54,7 +54,7 @@ def fingerprint(thing: bpy.types.Object) -> str:
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
     """Raise TactileError for an object that cannot press: mirrored, or a spec's body scaled, turned or edited.
 
-    relative : (3, 3), the object's axes in those of the sensor
+    relative : (3, 3), of ``world_axes``
     """
     if np.linalg.det(relative) <= 0:
         advice = "Apply the scale (Ctrl A) and flip normals"
@@ -70,7 +70,7 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
     """Return the spec of an indenter object, and the bytes of its mesh file, None for a shape without one.
 
-    relative : (3, 3), the object's axes in the sensor's. Raises TactileError as `check_pose` does, and for a mesh
+    relative : (3, 3), of ``world_axes``. Raises TactileError as `check_pose` does, and for a mesh
     file that cannot be read.
     """
     import msgspec

@@ -77,7 +77,7 @@ def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
 
 
 def material() -> bpy.types.Material:
-    """Make a material of the attribute ``Tactile colour``."""
+    """Return the material that shows the colours of the attribute ``Tactile colour``, lit; made where it is missing."""
     return _material(MATERIAL, "Base Color")
 
 

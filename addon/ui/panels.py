@@ -101,7 +101,7 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
 
 
 def numbers_of(skin: bpy.types.Object) -> list[str]:
-    """Return an imported skin's numbers of the current frame in words: confidence, what is explained, all flags."""
+    """Return an imported skin's numbers of this frame in words: confidence, share explained, second contact, flags."""
     lines = [f"Confidence {skin['confidence']:.2f}"]
     if any(skin["force"]) and "explained" in skin:
         lines[0] += f", {100 * skin['explained']:.0f} % of the signals explained"

@@ -81,7 +81,7 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
 
 
 def main() -> int:
-    """Solve the presses, learn the correction, write and report it."""
+    """Solve the presses, learn the correction, write and report it; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("--work", type=pathlib.Path, required=True, help="folder for the solved presses")
     parser.add_argument("--presses", type=int, default=155, help="presses a sensor, three contacts each (155)")

@@ -72,8 +72,8 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
 
 
 def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
-    """Solve a contact from rest, without friction; return it, its depth over the thickness, and CPU s. Raises
-    TactileError where ``solve_path`` does."""
+    """Solve a contact from rest, without friction, its depth stretched from DEEPEST to DEPTH_LIMIT; return it, its
+    depth over the thickness, and CPU s. Raises TactileError where ``solve_path`` does."""
     pose = pose_at(sensor, contact.indenter, contact.place)
     share = contact.depth / DEEPEST * DEPTH_LIMIT * _ALMOST
     depth, thick = depth_at(share, sensor, contact.indenter, pose), thickness_under(sensor, contact.indenter, pose)

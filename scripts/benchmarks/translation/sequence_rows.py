@@ -69,7 +69,7 @@ def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[
 
 
 def read(file: Path = FILE) -> Truth:
-    """Read the test set's arrays (S, 40, ...): signal counts, force N, center m, peak m, patch, packed bits."""
+    """Read by name signal counts, force N, center, peak m, patch bits, (S, 40, ...); motion (S,), index of MOTIONS."""
     with np.load(file, allow_pickle=False) as found:
         return {name: found[name] for name in found.files}
 
