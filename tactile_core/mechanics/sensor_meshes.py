@@ -116,7 +116,7 @@ def write_cells(
 ) -> None:
     """Write cells of one kind as VTK's XML unstructured grid, base64 inside.
 
-    nodes : (n, 3) m; cells : (m, k) int in VTK's order; kind : VTK's cell type, such as TRIANGLE
+    nodes : (n, 3) m; cells : (m, k) int in VTK's order; kind : number of VTK's cell type, 5 for triangles
     point_data, cell_data : values (n or m,) or (n or m, k) by name; floats become float32
     Raises what ``write_ply`` raises.
     """

@@ -54,7 +54,7 @@ def reflectance_on(
 ) -> np.ndarray:
     """Return the reflectance (H, W) float32 of the body behind gel at heights (H, W) m.
 
-    texture : (h, w) of ``light.checked_reflectance``, projected along the body's own z over its ``bounds``:
+    texture : (h, w), 0 black to 1 white, projected along the body's own z over its ``bounds``:
         columns along own x, rows against own y, so that the first row is at the greatest y; 0 beside the body"""
     own = pose.to_own(_points(camera, heights))
     lower, upper = indenter.bounds()

@@ -71,7 +71,7 @@ DEFAULT = STANDARD.name
 
 
 def preset_named(name: str) -> Preset:
-    """Return one of Mitsuba's presets; raises TactileError for another name."""
+    """Return Mitsuba's preset ``standard``, ``quality`` or ``reference``; raises TactileError for another name."""
     if name not in PRESETS:
         raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
     return PRESETS[name]

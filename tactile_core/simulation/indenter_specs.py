@@ -53,7 +53,7 @@ def _spec_of(form: SceneForm) -> type[SizedSpec]:
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):
     """A closed triangle mesh (STL, PLY, OBJ, OFF) in the scene's folder or below it.
     unit_mm : mm per unit of the file; up : the file's axis that points out of the sensor
-    spacing_mm : of the grid that holds its distance; file : name in that folder, / between folders"""
+    spacing_mm : of the grid that holds its distance; file : path from that folder, by /; name : the user's"""
 
     name: str
     file: str

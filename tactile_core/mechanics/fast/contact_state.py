@@ -144,7 +144,7 @@ class Candidates:
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let more nodes (j,) enter, all touching at first; displacement, probe : (j, 3) m, see the class"""
+        """Let nodes (j,) enter, at first touching; displacement, probe : (j, 3) m, first guess and measured offset"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")

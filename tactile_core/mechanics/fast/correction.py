@@ -49,7 +49,7 @@ class Learned:
     likeness to n supports (contacts learned from), to a factor and k fields on a grid of g = LINES x LINES places.
     shift, scale : (f,); a scaled feature is (feature - shift) / scale; supports : (n, f) scaled features
     support_rubs : (n,), friction of the supports, 0 without to 1
-    widths : (3,), of the kernels of force on all features, on the ``ESSENTIAL`` ones, and of fields
+    widths : (3,), of the kernels of force on all features, on 7 of them (depth, force, radius, ...), and of fields
     force_weights : (2, n), of two estimates of the log of the force factor, then averaged; field_weights : (n, k)
     fields : (k, g, 3), per metre of depth, in the surface's own frames
     trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1

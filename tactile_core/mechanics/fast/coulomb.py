@@ -109,7 +109,7 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
     """Reduce a guessed force and core to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
 
     Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; nodes without one stick from now on.
-    force, core, active, slips, normal : see ``Points``; friction : mu"""
+    force : (k, 3) N; core : (c,) N; active : (k + c,), slips : (k,), bool; normal : (k, 3); friction : mu"""
     k = force.shape[0]
     lean = np.zeros((k, 3))
     for a in range(k):
@@ -137,8 +137,8 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
 
 @Loop
 def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
-    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m to ``moved`` (k, 3) m, by their off (k, 3) m, gap (k,) m
-    and normal (k, 3) at ``place``, see ``Points``."""
+    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m to ``moved`` (k, 3) m, by their gap (k,) m, normal (k, 3)
+    and off (k, 3) m, their offset from the spots where they stick, all at ``place``."""
     moves, slip, gap_then = np.empty(place.shape), np.empty(place.shape), np.empty(len(gap))
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0

@@ -32,8 +32,8 @@ def change_of(
     direction: np.ndarray, *, deepens: bool,
 ) -> Change:  # fmt: skip
     """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey friction.
-
-    stiffness : see ``ContactStiffness.among``; direction : (3,), in which the indenter moves if it ``deepens``
+    stiffness : (j, j) N/m, and the places (j,) of its rows, of ``ContactStiffness.among``
+    direction : (3,), in which the indenter moves if it ``deepens``
     Raises UnsolvedError where no motion of the slipping nodes balances their forces."""
     inverse, rows = stiffness
     known = known_motion(points, motion, slipping, direction, 2 if deepens else 1)

@@ -1,4 +1,4 @@
-"""Stress in a deformed solid of 27-node cells: Cauchy and von Mises, at quadrature points and at nodes."""
+"""Stress in a deformed solid of 27-node cells: Cauchy and von Mises, at Gauss points and at nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB per point
 
 
 def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
-    """Return the Cauchy stress (n_cells, 27, 3, 3) Pa at the quadrature points, tension positive: P F^T / J.
+    """Return the Cauchy stress (n_cells, 27, 3, 3) Pa at the Gauss points, tension positive: P F^T / J.
 
     P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError where a cell is
     turned inside out.
@@ -44,7 +44,7 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 
 
 def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
-    """Return the values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the quadrature points.
+    """Return the values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the Gauss points.
 
     In each cell a trilinear function is fitted (local L2 projection); a node has the mean over its cells, by volume. A
     field that is linear in a cell's own coordinates is reproduced. For a smooth von Mises stress, smooth the tensor

@@ -82,7 +82,7 @@ def read_photographs(
     """Read all pictures of folders or videos, by name; without a background photograph it is estimated.
 
     radii : m, of each folder's ball; None where one ball, given elsewhere, made all presses
-    only : names of the presses to keep, see ``chosen``; None for all
+    only : names of the presses to keep, in that order; None for all
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
     pictures to estimate the background; ModuleNotFoundError for a video without OpenCV."""
     paths = [Path(each) for each in ([folders] if isinstance(folders, str | os.PathLike) else folders)]

@@ -69,7 +69,7 @@ class Ball(NamedTuple):
 class Sight:
     """Data of a fit: a photograph's change (h, w, 3) in working pixels, and the pixels that count (h, w).
     shown : (n, 3) levels of change in pixels that count; untouched : (n, 3) of the gel at rest, in that day's light
-    factor : by which the photograph is reduced; None for the usual one of fits"""
+    factor : by which the photograph is reduced; None for ``working_factor``"""
 
     def __init__(self, press: Press, factor: int | None = None) -> None:
         factor = factor or working_factor(press.picture.shape[1], press.picture.shape[0])

@@ -45,8 +45,8 @@ class Choice:
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """Choose the variant ``wanted``, or for None the faster one that works on this machine. Raises TactileError for an
-    unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
+    """Choose the variant ``wanted``, llvm_ad_rgb or scalar_rgb, or for None the faster one that works here. Raises
+    TactileError for an unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
     import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
     if wanted not in (None, LLVM, SCALAR):
