@@ -221,7 +221,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,): SATURATED where one of readings (T, 19), "raw", is an end of 12 bits; extends warnings."""
+    """Return flags (T,), SATURATED where one of readings (T, 19), of kind "raw", is 0 or 4095; extends warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)

@@ -1,4 +1,4 @@
-"""Registry of file layouts, and the function that reads all: ``read(path)``. `columns` is a map, None without."""
+"""Registry of file layouts, and the function that reads all: ``read(path)``. `columns` is a `ColumnMap` or None."""
 
 from __future__ import annotations
 

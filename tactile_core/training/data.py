@@ -40,7 +40,7 @@ class Batch:
 class Contacts:
     """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i.
     frames : "biotac" (source), "digit" (target) -> moving frame; generator : of the bases' random start
-    biotac, digit : `SurfaceCodec` of these two; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
+    biotac, digit : `SurfaceCodec` of these; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
     rest : (e,) counts of the unit that changes are from
     device : where batches go; the contacts themselves stay in the host's memory"""
 
@@ -72,7 +72,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Read rows (B,) as (B, 20): counts, and 1 if rectified. rectified, unit : shares of lost signs, real units"""
+        """Simulate readings (B, 20) of rows (B,): counts, 1 if unsigned; rectified, unit : shares so, of real units"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]

@@ -96,7 +96,7 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """Stage of the training: the networks it changes, or parts of them, and its loss."""
+    """Stage of the training. nets : names of networks, or parts of them, that it changes; loss : what it reduces"""
 
     name: str
     nets: tuple[str, ...]

@@ -23,11 +23,11 @@ MEAN: Estimate = "mean"
 class Answer:
     """Options of the estimate for each frame.
 
-    kind : the most plausible contact, or the mean of all plausible ones, which may resemble none of them
+    kind : "likely", the most plausible contact, or "mean", of all plausible ones, which may resemble none of them
     frames_apart : estimate each frame from its own signals; otherwise the contact is tracked through all frames
     mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: the position of the BioTac on it
     samples : number of contacts drawn for each frame from its posterior
-    contacts : 2 looks for a second contact in each frame. Use it only where there may be two: on a real unit a single
+    contacts : 1, or 2 to look for a second in each frame. Use it only where there may be two: on a real unit a single
         wide contact is often taken for two"""
 
     kind: Estimate = LIKELY
@@ -72,7 +72,7 @@ class Answer:
 def parse_answer(
     kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int, contacts: int = 1
 ) -> Answer:  # fmt: skip
-    """Return the options of a command line, as of `Answer`; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
+    """Return the options of a command line, as in `Answer`; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
     TactileError for a shift or a number of samples out of range."""
     if not 0 <= samples <= MOST_SAMPLES:
         raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")

@@ -91,7 +91,7 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 class Translator:
-    """Verified networks that encode signals and decode contacts; card : their card; sha256 : its; answer : options"""
+    """Verified networks that encode signals, decode contacts; card : model card; sha256 : its hash; answer : options"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
         """Store networks and options; patterns : simulated contacts of the source, None for a BioTac's, which ship."""

@@ -29,7 +29,7 @@ class ColumnMap:
     """Names of a file's columns, in any case.
 
     electrodes : of E1 to E19, "" for one that the file lacks; or the one name of an array of 19 columns
-    time : "" where there is none, then `rate` in Hz counts; time_unit : of that column
+    time : "" where there is none, then `rate` in Hz counts; time_unit : of that column, s, ms, us or ns
     pdc, tac, tdc : "" where there are none
     channel, value : of a long table, which has a row for each value of a channel: its columns with the channel's name
         and the value; electrodes, pdc, tac and tdc are then names of channels"""

@@ -113,8 +113,8 @@ class Film:
         return [*found, UNSURE.format(self.thickness, 1 / self.thickness)] if self.unsure else found
 
     def report(self) -> dict[str, object]:
-        """Return, for JSON: thickness over a typical unit's, evidence in words, conductivity_since_rest, the least and
-        the most of the fluid's over that at rest."""
+        """Return, for JSON: thickness over a typical unit's, evidence in words, and conductivity_since_rest, least and
+        most of the fluid's over that at rest."""
         least, most = np.exp([self.conductivity.min(), self.conductivity.max()])
         return {
             "thickness": round(self.thickness, 4), "evidence": self.evidence,
