@@ -98,7 +98,7 @@ def fetch(tree: Path, suite: str) -> None:
 
 
 def wrapper(tree: Path) -> Path:
-    """Write a program that runs a command inside the tree, on this machine's paths; without one, the tree's Blender.
+    """Write a program that runs the command after --inside in the tree, else the tree's Blender; return its path.
 
     The checkout, /tmp, /dev and /proc are mounted in a namespace of that process alone: whoever deletes the tree while
     it runs, or after it was killed, deletes nothing else; and all that it started ends with it.
