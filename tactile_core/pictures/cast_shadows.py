@@ -154,7 +154,7 @@ def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
 
 @functools.cache
 def disc_tables() -> tuple[np.ndarray, np.ndarray]:
-    """Return ``disc_share`` at even steps of sight from -1 to 1, (257,) float32 each."""
+    """Return tables, (257,) float32, of ``disc_share``'s area and moment at even steps of sight from -1 to 1."""
     t = np.linspace(-1, 1, _TABLE_STEPS + 1)
     share = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
     moment = 2 / (3 * np.pi) * (1 - t**2) ** 1.5

@@ -221,7 +221,7 @@ def seen_heights(height, steepness, start, start_near, start_nearest, rows, colu
 
 @Loop
 def interpolate(values, row, column):  # noqa: ANN001, ANN201
-    """Compute ``bilinear`` in a loop."""
+    """Compute ``bilinear`` of values (h, w) at fractional row, column (a, b) in a compiled loop."""
     height, width = values.shape
     found = np.empty(row.shape, np.float32)
     for a in range(row.shape[0]):

@@ -84,8 +84,8 @@ def measured() -> dict[str, Any]:
 
 
 def cheapest(error: float, variant: str) -> str:
-    """Return the fastest preset whose measured error, grey levels rms from the full model, is at most ``error``, drawn
-    by a variant of Mitsuba's. Raises TactileError where none is."""
+    """Return the name of the fastest preset whose measured error, levels rms from the full model, is at most ``error``,
+    drawn by a variant of Mitsuba's. Raises TactileError where none is."""
     table = measured()["presets"]
     rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name

@@ -63,7 +63,7 @@ def simulate_recording(
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
 ) -> int:
-    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with the kept displacements; return the
+    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with what ``keep`` names; return the
     number of frames that press.
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
     scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.

@@ -273,5 +273,5 @@ def _add_outer(rows: np.ndarray, factor: np.ndarray, line: np.ndarray) -> None:
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
     """Return the nodes (r,) with z >= 0 to solve for touchable ones (m,): these themselves, or their mirror images.
-    image : (n,), each surface node's"""
+    image : (n,), each surface node's mirror image"""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))

@@ -46,7 +46,7 @@ class PatchFrame:
 @dataclasses.dataclass(frozen=True)
 class Learned:
     """A sensor's correction, with friction or without: kernel ridge regression from f features of a contact, by its
-    likeness to n supports (contacts learned from), to a factor and k fields on a grid of g = LINES x LINES places.
+    likeness to n supports (contacts learned from), to a factor and k fields on a grid of g = 33 x 33 places.
     shift, scale : (f,); a scaled feature is (feature - shift) / scale; supports : (n, f) scaled features
     support_rubs : (n,), friction of the supports, 0 without to 1
     widths : (3,), of the kernels of force on all features, on 7 of them (depth, force, radius, ...), and of fields
@@ -205,7 +205,7 @@ MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1
 
 
 def grid_places() -> np.ndarray:
-    """Return places (LINES, LINES, 2) of the fields' grid, along and across the finger from the patch, in its radii."""
+    """Return places (33, 33, 2) of the fields' grid, along and across the finger from the patch, in its radii."""
     line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
     return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 

@@ -76,7 +76,7 @@ class Body:
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
         """Return the indenter's largest penetration, m, at the surface's nodes and between them in a solved contact,
-        ``touch``, by ``penetration_between``. Raises PenetrationError where that is too much."""
+        ``touch``. Raises PenetrationError where it is over 0.1 mm and 40 % of the depth, or nodes are behind it."""
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)

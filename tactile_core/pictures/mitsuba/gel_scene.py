@@ -52,7 +52,7 @@ def _outer_index(gel_index: float) -> float:
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
-    """Return the LEDs by colour: black spheres that shine, or points where they are that small."""
+    """Return the LEDs, by colour, as Mitsuba's plugins: black spheres that shine, or points where that small."""
     return {led.colour: _lamp(led) for led in unit.leds}
 
 
