@@ -94,7 +94,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
 
 
 def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> SensorFile:
-    """Return the content of a file of units, each under the name of its section."""
+    """Return the content of a file of units, section -> unit; sensor : whose units they are"""
     topics = {name: unit for name, unit in units.items() if "/" in name}
     plain: dict[str, Any] = {name: unit for name, unit in units.items() if name not in topics}
     return SensorFile(FORMAT, **plain, sensor=sensor, topics=topics or None)

@@ -49,7 +49,7 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
 
 def read(path: str | os.PathLike, identity: dict) -> State:
     """Read the state in the file, or return an initial one without a file. Raises TactileError for a damaged file or
-    the training of another identity (of `State`)."""
+    a training of another identity: data, seed, options, versions."""
     if not os.path.exists(path):
         return State(identity)
     try:

@@ -158,7 +158,7 @@ def write_log(path: Path, history: list[list]) -> None:
 
 
 def draw_losses(path: Path, history: list[list]) -> None:
-    """Draw a PNG, a plot a stage: losses over epochs, logarithmic. history : (stage, epoch, train, validation)"""
+    """Draw a PNG, a plot a stage: losses over epochs, logarithmic. history : rows (stage, epoch, train, validation)"""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -154,7 +154,7 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
-    """Return the numpy networks of tensors, network -> name -> array, and their sizes, before a card exists."""
+    """Return the numpy networks of tensors, network -> name -> array, and their sizes; no card is needed."""
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in tensors}})
 
 
@@ -170,7 +170,7 @@ def versions(device: torch.device) -> dict[str, str]:
 
 
 def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, object]]:
-    """Write each network's file; returns the card's entries by network: file, sha256, sizes, shapes."""
+    """Write each network's file of tensors, network -> name -> array; return file, sha256, sizes, shapes by network."""
     return {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()}
 
 

@@ -35,7 +35,7 @@ MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small
 
 
 def tensor_shapes(net: str, sizes: dict[str, int], electrodes: int = ELECTRODES) -> dict[str, tuple[int, ...]]:
-    """Return the tensor names and shapes of one network from the sizes in its card; electrodes : how many are read."""
+    """Return name -> shape of network `net`'s tensors, by the sizes in its card; electrodes : how many are read."""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
         shapes = plain_shapes("encoder", (electrodes + 1, *hidden, 2 * latent))

@@ -97,7 +97,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of `residual`'s tensors, as `plain_shapes`: inputs, `blocks` blocks of a width, outputs."""
+    """Return name -> shape of `residual`'s tensors: inputs, `blocks` blocks of a width, outputs; name : before each"""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

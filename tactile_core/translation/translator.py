@@ -118,8 +118,7 @@ class Translator:
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, **beside)
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
-        """Draw contacts on the gel for each frame from its posterior, by the names of ``SAMPLES``; ``answer.samples``
-        of them.
+        """Draw S = ``answer.samples`` contacts on the gel for each frame from its posterior; return two arrays by name.
         frames : (T,) int, indices into the recording, which are the seeds; stiffness : of the skin, 1 typical
         sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
         states = evidence.drawn(frames, self.answer.samples)

@@ -14,7 +14,7 @@ NAME = f"HDF5 simulated recording ({FORMAT})"
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where keys, of ``readers.names``, name the format, else 0."""
+    """Return 1 where keys, the arrays' names and ``format=...``, have "format=tactile-recording-1", else 0."""
     return float(f"format={FORMAT}" in keys)
 
 

@@ -91,7 +91,7 @@ def _read(store: Store, name: str) -> np.ndarray:
 
 
 def labels_in(store: Store, frames: int) -> dict[str, np.ndarray]:
-    """Return texts (T,), T `frames`, of a file's arrays of texts, and of numbers and attributes with labels' names."""
+    """Return name -> (T,) texts, T `frames`: arrays of texts, and numbers and attributes with labels' names."""
     found = {
         name: np.full(frames, value, dtype=object)
         for name, value in store.attributes.items()

@@ -99,7 +99,7 @@ def _texts(table: Table, name: str) -> np.ndarray:
 
 
 def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Recording:
-    """Make the recording of a table by a map; container : of its file. Raises TactileError as ``assemble`` does."""
+    """Make the recording of a table by a map; container : csv, json, hdf5, npz or mat. Raises as ``assemble`` does."""
     refuse_several(table, columns)
     if columns.channel:
         table = widen(table, columns)

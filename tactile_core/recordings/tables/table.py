@@ -81,7 +81,7 @@ class Table:
         return found
 
     def labels(self, used: Collection[str]) -> dict[str, np.ndarray]:
-        """Return the texts (T,) of columns that are not used, and numbers whose column's name is that of a label."""
+        """Return name -> (T,) texts of columns not used, and of numbers whose column's name is that of a label."""
         found = dict(self.texts)
         for column, name in enumerate(self.header):
             values = self.exact.get(column, self.values[:, column])
@@ -93,7 +93,7 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return `columns` (T, n), float32 where exact, NaN for missing ones. TactileError where half are missing."""
+        """Return values (T, n) of names, float32 where exact, NaN for missing ones. TactileError for half missing."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:
