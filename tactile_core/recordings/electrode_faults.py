@@ -152,7 +152,7 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark rows (T,) of electrodes (T, e) equal to the row before; also true if others' noise proves these faults."""
+    """Mark rows (T,) of electrodes (T, e) equal to the row before; also true if noise elsewhere makes these faults."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 

@@ -80,7 +80,7 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     def gains_for(
         self, recording: str | os.PathLike, section: str, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
-        """Return a unit's gains, by its section; for messages: recording : path of one by it; where : this file.
+        """Return a unit's gains, by its section. recording, where : path of one by the unit, this file, for messages
         Raises TactileError where there is none."""
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"

@@ -183,7 +183,7 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Mean square error of the fluid's pressure, on the head's scale, from noisy signals, rectified ones left out.
+    """Mean square error of asinh(the fluid's pressure / PRESSURE_SCALE), from noisy signals, rectified left out.
     (Relative errors in its place biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
     signed = batch.signal[:, -1:] == 0
     error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)

@@ -137,7 +137,7 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
     """Compare the contact patch of gels found (C, M, 3) m with the true patch (C, M) bool: ``iou``, intersection over
-    union (NaN below LEAST_PATCH true nodes), ``position_mm``, of their middles. name : before each column's"""
+    union (NaN below LEAST_PATCH true nodes), ``position_mm`` between middles. name : before each column's"""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)

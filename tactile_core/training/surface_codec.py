@@ -143,7 +143,7 @@ class SurfaceCodec:
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """Return the places (B, 2) of the dents of contacts rows (B,); 0 for silent ones."""
+        """Return the places (B, 2), row and column in tens of cells, of the dents of rows (B,); 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:

@@ -73,7 +73,7 @@ def parts_sizes(electrodes: int) -> dict[str, int]:
 
 
 def network_input(change: Tensor) -> Tensor:
-    """Convert change (B, e) counts to the network's input (B, 2e): its arcsinh on a coarse and on a fine scale."""
+    """Convert change (B, e) counts to the network's input (B, 2e): arcsinh(change / 15), then arcsinh(change / 3)."""
     return torch.cat([torch.asinh(change / COUNT_SCALE), torch.asinh(FINE * change / COUNT_SCALE)], -1)
 
 

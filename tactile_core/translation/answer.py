@@ -58,7 +58,7 @@ class Answer:
 
     @property
     def mount_shift(self) -> np.ndarray:
-        """Shift (2,) m of contacts on the gel."""
+        """Shift (2,) = (x, z) m of contacts on the gel."""
         return 1e-3 * np.array(self.mount_shift_mm)
 
     def describe_shift(self) -> tuple[str, ...]:

@@ -51,7 +51,7 @@ class Stream:
 
     @property
     def sensor(self) -> str:
-        """Return the name of the sensor that has this number of electrodes; empty for none."""
+        """Return the name of the sensor that has as many electrodes as this finger; empty for none."""
         return sensor_with(self.hand[self.number].electrodes)
 
 
