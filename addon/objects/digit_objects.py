@@ -45,8 +45,6 @@ def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np
     if not any(each.object.original == gel for each in depsgraph.object_instances):
         found = f"hidden in view layer {depsgraph.view_layer.name}"
         raise TactileError(gel.name, found, "a gel that is shown", "Show it, and its collection, in renders too")
-    if gel.mode == "EDIT":
-        raise TactileError(gel.name, "in Edit Mode, where it is at rest", "Object Mode", "Press Tab over the 3D view")
     mesh_cache.check(gel)
     motion.check_rest(gel)
     rest = properties.surface_of(gel).rest

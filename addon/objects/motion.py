@@ -13,8 +13,12 @@ _APPLIED = 1e-4  # m, median shift of nodes that shows a mesh moved as a whole: 
 
 
 def check_rest(*things: bpy.types.Object) -> None:
-    """Raise TactileError for a sensor whose mesh itself was moved, as Apply Location does: all places would be off."""
+    """Raise TactileError for a sensor in Edit Mode, which then plays no keys and takes none, and for one whose mesh
+    itself was moved, as Apply Location does: all places would be off."""
     for thing in things:
+        if thing.mode == "EDIT":
+            found = "in Edit Mode, where it is at rest"
+            raise TactileError(thing.name, found, "Object Mode", "Press Tab over the 3D view")
         keys = thing.data.shape_keys
         own = np.empty(3 * len(thing.data.vertices), np.float32)
         (keys.reference_key.data if keys else thing.data.vertices).foreach_get("co", own)

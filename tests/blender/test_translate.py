@@ -128,6 +128,18 @@ def test_translating_again_replaces_the_gel(gel):
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
 
 
+@pytest.mark.parametrize("name", ["DIGIT gel", "BioTac skin"])
+def test_a_sensor_in_edit_mode_is_refused_and_keeps_its_keys(gel, name):
+    """Its keys could not be removed: new ones stood beside them, and another tare ended in a traceback."""
+    keys = len(gel.data.shape_keys.key_blocks)
+    bpy.context.view_layer.objects.active = bpy.context.scene.objects[name]
+    bpy.ops.object.mode_set(mode="EDIT")
+    with pytest.raises(RuntimeError, match=r"in Edit Mode.* Press Tab"):
+        bpy.ops.tactile.translate()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert bpy.ops.tactile.translate() == {"FINISHED"} and len(gel.data.shape_keys.key_blocks) == keys
+
+
 def test_a_recording_moved_after_import_is_reported(imported, tmp_path):
     moved = tmp_path / "here.h5"
     shutil.copy(RECORDING, moved)
