@@ -46,7 +46,7 @@ class Plan(NamedTuple):
 
     @property
     def memory(self) -> float:
-        """Memory, MB, of all parts together."""
+        """Peak memory, MB: the sum of what the parts add, matrices built once."""
         built = [part.memory for part in self.parts if part.memory == BUILD_MB]
         return sum(part.memory for part in self.parts) - sum(built[1:])
 

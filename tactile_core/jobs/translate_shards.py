@@ -116,7 +116,7 @@ def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
 
 
 def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int) -> bool:
-    """Return true if a whole file is shard `number` of recording `index`, which has `frames` frames."""
+    """Return true if a file, known to be whole, is shard `number` of recording `index`, of `frames` frames."""
     try:
         with open_checked(file) as found:
             return all(found.attrs[name] == value for name, value in _identity(job, index, number, frames).items())

@@ -38,8 +38,8 @@ _LAYER = 1e-3
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
     """Return the traction (n, 3) Pa on a resting surface under displacement (n, 3) m, touched in ``patch`` (n,) bool.
 
-    Nodes of the patch that cannot be touched, or would pull, carry none. Linear elasticity, the BioTac's fluid
-    included, its core left out."""
+    Nodes of the patch that cannot be touched, or would pull, carry none. Linear elasticity of a gel, or of a
+    BioTac's skin with its fluid, without the core."""
     compliance, areas = compliance_of(sensor), node_areas(sensor)
     outward = sensors.rest_normals(sensor)
     nodes = np.flatnonzero(patch[compliance.touchable])

@@ -87,9 +87,9 @@ def _table(sensor: Fluid, file: str) -> np.ndarray | None:
 
 
 def read_places(path: Path) -> Places:
-    """Read a CSV table of name, x_mm, y_mm, z_mm, rest_counts; electrodes without counts are the excitation's. Or read
-    bsadr/biotac's own table of a BioTac SP, whose ids below zero are the excitation's. Raises TactileError naming
-    file and row."""
+    """Read places, mm, in a CSV of name, x_mm, y_mm, z_mm, rest_counts; electrodes without counts are the
+    excitation's. Or bsadr/biotac's own table of a BioTac SP, whose ids below zero are the excitation's. Raises
+    TactileError naming file and row."""
     rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:
         return _read_sp(path, rows[1:])

@@ -242,7 +242,8 @@ class Translator:
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool the frames of change (T, 19) counts beyond 99 % of validation's in a `SignalDistance`.
+        """Mark (T,) bool frames of change (T, 19) counts of which any `SignalDistance` exceeds its share `IN_RANGE`
+        of the validation's contacts.
         rectified : (T,) bool or one for all, true where signs are lost"""
         return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 

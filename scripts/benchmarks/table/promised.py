@@ -53,7 +53,7 @@ class Promise:
         }
 
     def lines(self) -> Iterator[str]:
-        """Yield the lines of a Markdown table: all contacts, then each group."""
+        """Yield a Markdown table's rows: all contacts, then each group."""
         names = np.array(self.groups)
         for name in ["all", *dict.fromkeys(self.groups)]:
             here = np.ones(len(names), bool) if name == "all" else names == name

@@ -44,7 +44,7 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 @dataclass(frozen=True)
 class Asked:
     """Options of a data set; layouts : names of ``export.layouts``; place : job's folder -> executor of its tasks
-    say : callback for sentences; bar : (name, unit) -> context of a callback (done, in all); target : the gel
+    say : callback for sentences; bar : (name, what it counts) -> context of a callback (done, in all); target : the gel
     preset : of the pictures, None for fast ones; calibration, weights : file and folder, None for those that ship"""
 
     layouts: Sequence[str]

@@ -32,7 +32,7 @@ def change_of(
     direction: np.ndarray, *, deepens: bool,
 ) -> Change:  # fmt: skip
     """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey friction.
-    stiffness : (j, j) N/m, and the places (j,) of its rows, of ``ContactStiffness.among``
+    stiffness : ``ContactStiffness.among``'s: (j, j) N/m, and its rows (j,) among all 3 k + c unknowns
     direction : (3,), in which the indenter moves if it ``deepens``
     Raises UnsolvedError where no motion of the slipping nodes balances their forces."""
     inverse, rows = stiffness
@@ -97,7 +97,7 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
     """Build the system (2 s, 2 s) and right side (2 s, r) of slipping nodes: slip along friction, m, and its turn, N.
 
     Its rows demand that no force is left along t - mu n (``lean``, ``normal``), and that t turns as its slip does.
-    inverse : (j, j) N/m, of the compliance; rows : (j,), its places among ``size``; bearing : (s, 3, r), of ``borne``
+    inverse : (j, j) N/m, of the compliance; rows : (j,), among ``size`` unknowns; bearing : (s, 3, r), of ``borne``
     """
     s, columns, curved = len(slipping.at), bearing.shape[2], slipping.curved
     system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
