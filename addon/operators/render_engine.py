@@ -29,7 +29,7 @@ class TactileRenderEngine(bpy.types.RenderEngine):
     bl_idname = ID
     bl_label = "Tactile DIGIT (Mitsuba)"
     bl_use_preview = False
-    bl_use_eevee_viewport = True  # the 3D view's Rendered shading shows the meshes, not the camera inside the gel
+    bl_use_eevee_viewport = True  # for Material Preview; the 3D view has no Rendered shading by it
 
     def update_render_passes(self, scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
         """Declare the passes to the compositor; Blender calls it."""

@@ -40,6 +40,7 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
         if any(hasattr(spec, "file") for spec in found.indenters):
             require("trimesh", "rtree", "scipy")
         scene = context.scene
+        properties.check_absent(scene, *sensors.PAIR)
         view.hide_untouched(scene)
         axes.use_millimetres(scene)
         group = biotac_objects.new_collection(scene, found.name)

@@ -245,5 +245,13 @@ def check_own(*things: bpy.types.Object | None) -> None:
             )  # fmt: skip
 
 
+def check_absent(scene: bpy.types.Scene, *names: str) -> None:
+    """Raise TactileError where a scene has one of the sensors ``names``: of two, which one a press means is unknown."""
+    for thing in scene.objects:
+        if thing.tactile.role in OF_ROLE and sensor_name(thing) in names:
+            found, advice = f"already in the scene, as {thing.name}", "Use a scene for each pair"
+            raise TactileError(sensor_name(thing).upper(), found, "one of each sensor", advice)
+
+
 CLASSES = (TactileObject,)
 POINTERS = ((bpy.types.Object, "tactile", TactileObject),)

@@ -29,7 +29,7 @@ WORDS = (
     (re.escape(tempfile.gettempdir()) + r"[/\\]tactile-\w+[/\\]?", ""),
     (r"tactile info \S+ --columns \S+( writes one( to fill in)?)?", "Columns writes the file that it names"),
     (r"See `tactile doctor`", "Check LLVM in the add-on's preferences"),
-    (r"--(tare|polarity|columns|weights|preset)\b", lambda found: found[1].title()),
+    (r"--(tare|polarity|columns|weights|preset|frames)\b(?!-)", lambda found: found[1].title()),
     (r"--sensor\b", "Unit"),
     (r"--error\b", "Largest Error"),
     (r"--frames-apart\b", "Each Frame Alone"),

@@ -2,7 +2,6 @@
 
 import bpy
 
-from ...tactile_core.errors import TactileError
 from ...tactile_core.geometry.indenters.indenter import forms
 from ..objects import axes, biotac_objects, digit_body, digit_objects, indenter_objects
 from ..operators import view
@@ -32,8 +31,7 @@ class TACTILE_OT_add_sensor(TactileOperator):
         scene = context.scene
         name = self.sensor.lower()
         role = properties.role_of(name)
-        if any(thing.tactile.role == role and properties.sensor_name(thing) == name for thing in scene.objects):
-            raise TactileError(self.sensor, "already in the scene", "one of each sensor", "Use a scene for each pair")
+        properties.check_absent(scene, name)
         view.hide_untouched(scene)
         if self.millimetres:
             axes.use_millimetres(scene)

@@ -83,6 +83,13 @@ def test_shipped_scenes_come_back_exactly(scene, part, tmp_path, folder):
     assert same[0] == same[1]
 
 
+def test_a_scene_file_is_not_laid_over_sensors_that_are_there(imported):
+    """Simulate then pressed the first skin of the scene, a recording's, and its own stood still."""
+    imported()
+    with pytest.raises(RuntimeError, match=r"BIOTAC: already in the scene, as BioTac skin.* Use a scene for each"):
+        bpy.ops.tactile.import_scene(filepath=str(SCENES[0] / "scene.toml"))
+
+
 def test_a_motion_of_the_user_s_own_is_exported(sensors, part, tmp_path):
     bpy.ops.tactile.add_indenter(shape="sphere", radius=3.5)
     ball = bpy.context.object
