@@ -49,10 +49,10 @@ def set_coating(material: bpy.types.Material, coating: Coating) -> None:
     """Write a coating's numbers into its material, whose keys and drivers are removed; a matte coating gets gloss 0."""
     if material.node_tree.animation_data:
         material.node_tree.animation_data_clear()
-    sockets = sockets_of(material)
-    sockets[ALBEDO].default_value = (*coating.albedo, 1.0)
-    sockets[ROUGHNESS].default_value = coating.roughness
-    sockets[GLOSS].default_value = 0.0 if coating.bsdf == DIFFUSE else coating.gloss
+    gloss = 0.0 if coating.bsdf == DIFFUSE else coating.gloss
+    values = {ALBEDO: (*coating.albedo, 1.0), ROUGHNESS: coating.roughness, GLOSS: gloss}
+    for name, socket in sockets_of(material).items():
+        socket.default_value = values[name]
 
 
 def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
