@@ -41,7 +41,8 @@ class TACTILE_OT_set_style(TactileOperator):
     def _work(self, context: bpy.types.Context) -> None:
         sensors = _sensors(context)
         if self.style == "ELECTRODES" and not any(map(_counts, sensors)):
-            raise TactileError("Tactile", "no electrodes' readings", "an imported recording", "Import it (again)")
+            advice = "Import it (again); of a press simulated here, the recording that is kept beside the .blend"
+            raise TactileError("Tactile", "no electrodes' readings", "an imported recording", advice)
         before = len(context.scene.objects)
         for thing in sensors:
             _give(thing, self.style, self.largest, self.exaggeration)
