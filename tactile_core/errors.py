@@ -30,7 +30,8 @@ class TactileError(Exception):
         return type(self), (self.where, self.found, self.expected, self.advice)
 
     def _sentence(self) -> str:
-        found = self.found if len(self.found) <= MOST else f"{self.found[:_HEAD]} [...] {self.found[-_TAIL:]}"
+        found = " ".join(self.found.split())  # of arrays: in lines
+        found = found if len(found) <= MOST else f"{found[:_HEAD]} [...] {found[-_TAIL:]}"
         text = f"{self.where}: {found}"
         if self.expected:
             text += f"; expected {self.expected}"
@@ -52,6 +53,19 @@ def finite_number(
     if not (math.isfinite(number) and least <= number <= most):
         raise TactileError(where, f"{value!r:.80}", expected, advice)
     return number
+
+
+def numbers(values: Any, where: str) -> Any:
+    """Return values as an array of real numbers; raises TactileError, which names ``where``, for anything else."""
+    import numpy as np
+
+    try:
+        array = np.asarray(values)
+    except ValueError:  # rows of unequal length
+        array = np.empty(0, object)
+    if array.dtype.kind not in "biuf":
+        raise TactileError(where, f"{values!r:.80}", "an array of real numbers")
+    return array
 
 
 def path_text(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:

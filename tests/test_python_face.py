@@ -19,6 +19,8 @@ import trimesh
 
 import tactile_core as tactile
 from tactile_core.files.installed import advice
+from tactile_core.geometry.indenters import Pose
+from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.recording import Truth
 
 ROOT = Path(__file__).parent.parent
@@ -176,6 +178,11 @@ def test_what_is_no_name_of_weights_or_a_unit_is_refused(argument, expected, sli
         tactile.translate(tactile.read(slide_csv()), **{argument: ["a"]})
 
 
+def pulled():
+    """Return a displacement (2867, 3) m of one node that is pulled out of the gel."""
+    return np.where(np.arange(2867)[:, None] == 1400, [0, -0.2e-3, 0], 0)
+
+
 BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
 
 
@@ -189,6 +196,19 @@ BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
         (lambda: tactile.indenters.Edge("90", 1e-3), "edge, angle: '90'; expected 0.17 to 2.97 rad"),
         (lambda: tactile.indenters.Box(3e-3, 1e-4), "box, sizes: 0.003; expected three lengths in m"),
         (lambda: tactile.Gel(["digit"], BALL), "sensor: .*digit.*; expected biotac"),
+        (lambda: tactile.solve("digit", BALL, PLACE, depth=np.full(2, 1e-4)), r"solve, depth: array\(\[.*; expected m"),
+        (lambda: tactile.solve("digit", BALL, Pose(np.zeros(3), 2 * np.eye(3)), depth=0), "solve, place: axes .*unit"),
+        (lambda: Pose([0, 0, 0], np.eye(4)), r"pose: apex \[0, 0, 0\] m, axes .*; expected arrays \(3,\) and \(3, 3\)"),
+        (lambda: tactile.indenters.Several([BALL]), "several, parts: .*; expected one indenter or more, each with its"),
+        (lambda: tactile.indenters.MeshIndenter.from_file(3), "from_file, path: a int; expected a file's name"),
+        (lambda: tactile.load_calibration(sensor=["digit"]), "sensor: .*digit.*; expected biotac"),
+        (lambda: list(tactile.Gel("digit", BALL).follow(3)), "Gel, follow: 3, None; expected a series of poses"),
+        (lambda: tactile.Renderer(preset=[]), r"preset: \[\]; expected one of fast"),
+        (lambda: tactile.Renderer(preset="fast", seed="abc"), "Renderer, seed: 'abc'; expected a whole number"),
+        (lambda: tactile.Renderer(preset="fast").render([[1, 2], [3]]), "displacement: .*; expected an array of real"),
+        (lambda: tactile.Renderer(preset="fast").render(pulled()), "0.20 mm out of the gel, 0.00 mm into it.*sign"),
+        (lambda: tactile.Renderer(preset="fast").picture(3), r"radiance: shape \(\); expected \(320, 240, 3\)"),
+        (lambda: PrepareOptions(repair="no").check(), "option repair: 'no'; expected .*bool"),
     ],
 )  # fmt: skip
 def test_numbers_and_names_of_another_kind_are_refused(made, message):

@@ -129,7 +129,9 @@ class Gel:
         """Solve the contact at each of many poses and yield each; forces : N along +y or None, one per pose.
 
         For an invalid pose or force the contact before comes again, flagged ``refused``, and the reason is logged.
-        Raises TactileError where poses and forces differ in number."""
+        Raises TactileError where poses and forces differ in number, or are no series."""
+        if not (isinstance(poses, Iterable) and isinstance(forces, Iterable | None)):
+            raise TactileError("Gel, follow", f"{poses!r:.80}, {forces!r:.80}", "a series of poses, forces or None")
         if forces is None:
             yield from map(self._press_or_keep, poses)
             return

@@ -20,7 +20,7 @@ from .finite_strain.load_path import LoadPath
 from .force_search import MOST_FORCE, UnreachableError, unreachable
 from .node_areas import traction
 from .penetration import RESOLVED_RADIUS, sharpest
-from .placement import DEPTH_LIMIT, FRICTION, Placement, friction_of, on_gel, pose_at, thickness_under
+from .placement import DEPTH_LIMIT, FRICTION, Placement, first_touch, friction_of, on_gel, pose_at, thickness_under
 from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_pressure
 
 _LIGHTEST = 1e-6  # N, least force: smaller ones are lost in rounding and the lattice's roughness
@@ -41,7 +41,7 @@ def solve(
 
     sensor : name of a sensor, such as ``"digit"``
     indenter : of ``tactile.indenters``, or a closed ``trimesh.Trimesh``, in m
-    place : a ``tactile.Placement``, or the indenter's pose at first touch
+    place : a ``tactile.Placement``, or the indenter's pose, which is moved in or out to first touch
     depth, force : one of the two: m beyond first touch, or N, found to a thousandth
     tier : ``fast`` is linear with a learned correction (milliseconds), ``full`` finite strain on a mesh graded round
         the contact (seconds; with friction ten or more; a minute or more for indenters that need a finer mesh),
@@ -58,6 +58,9 @@ def solve(
     >>> contact.depth, contact.displacement.shape
     """
     with needing("fem"):
+        if isinstance(place, Pose):
+            place.check("solve, place")
+            place = first_touch(sensors.sensor_surface(sensor), as_indenter(indenter), place)
         return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
 
 
@@ -112,7 +115,7 @@ def _first_touch(sensor: Sensor, indenter: Indenter, place: Placement) -> Pose:
 
 def _check(step: Step, limit: float) -> None:
     name, value, unit = ("depth", step.depth, "m") if step.force is None else ("force", step.force, "N")
-    if value is None or None not in (step.depth, step.force):
+    if (step.depth is None) == (step.force is None):
         raise TactileError("solve", f"depth {step.depth!r} and force {step.force!r}", "one of the two")
     finite_number(value, f"solve, {name}", f"{unit}, zero or more, and finite", 0.0)
     if step.force is not None and 0 < step.force < _LIGHTEST:

@@ -35,6 +35,8 @@ MOVE_ITERATIONS = 12  # 2 or 3 do for presses, 6 for firm grips; where 12 do not
 BEYOND_WINDOW = 1e-3  # m that a picture may reach past the window (17 px/mm: 0.7 mm); the edge is held there
 NEGLIGIBLE = 1e-12  # weight of a node in a pixel, of 1 in all: a hundred-thousandth of float32's rounding
 FARTHEST = 10e-3  # m that a node moves, twice the thickest gel (assumed)
+# m, and times its largest move inward, that a gel may move outward: dragged at a friction of 5, .55 mm and 2.3 times
+OUTWARD, MORE_OUTWARD = 0.1e-3, 3.0
 SMALLEST_AREA = 0.2  # a cell of gel pressed to less than this share of its area is about to fold: steps stay finite
 
 
@@ -91,6 +93,10 @@ class HeightMapper:
         if (farthest := np.abs(displacement).max(initial=0)) > FARTHEST:
             found, advice = f"up to {farthest:.3g}", "Divide millimetres by 1000; take the resting surface off places"
             raise TactileError("displacement", found, f"at most {FARTHEST:g} m, more than a gel yields", advice)
+        outward, inward = -displacement[..., 1].min(initial=0), displacement[..., 1].max(initial=0)
+        if outward > max(OUTWARD, MORE_OUTWARD * inward):
+            found = f"up to {1e3 * outward:.2f} mm out of the gel, {1e3 * inward:.2f} mm into it"
+            raise TactileError("displacement", found, "a pressed gel, which moves along +y", "Change the sign of y")
         if displacement.ndim == 2:
             return self._one(displacement)
         maps = np.empty((len(displacement), *self.camera.shape), np.float32)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, numbers
 from ..files.compiled import Loop, available
 from ..sensors.calibration import Calibration
 from ..sensors.camera import Camera, Led
@@ -207,11 +207,8 @@ def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray |
 def checked_reflectance(given: np.ndarray, name: str) -> np.ndarray:
     """Return a map `given` (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 0..1. Raises
     TactileError, with ``name``, for another."""
-    try:
-        values = np.asarray(given)
-    except ValueError:  # rows of unequal length
-        values = np.asarray(given, object)
-    if values.ndim != 2 or min(values.shape) < 2 or values.dtype.kind not in "buif":
+    values = numbers(given, name)
+    if values.ndim != 2 or min(values.shape) < 2:
         advice = "Average the three colours of a picture" if values.ndim == 3 else ""
         raise TactileError(name, f"{values.dtype} of shape {values.shape}", "grey (h, w), 2 x 2 or more", advice)
     white = 255 if values.dtype == np.uint8 else 1

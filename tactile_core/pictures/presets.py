@@ -72,7 +72,7 @@ DEFAULT = STANDARD.name
 
 def preset_named(name: str) -> Preset:
     """Return Mitsuba's preset ``standard``, ``quality`` or ``reference``; raises TactileError for another name."""
-    if name not in PRESETS:
+    if name not in NAMES[1:]:
         raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
     return PRESETS[name]
 

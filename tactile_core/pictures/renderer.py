@@ -7,13 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import TactileError
+from ..errors import TactileError, numbers
 from ..files.compiled import Loop, available
 from ..files.installed import needing
 from ..sensors.calibration import LARGEST_LEVEL, Calibration
 from ..sensors.calibration_file import calibration_of
 from ..sensors.camera import COLOURS
-from .background import correction, raised_light, resting_picture
+from .background import check_way, correction, raised_light, resting_picture
 from .camera_curve import bent, ends
 from .coating_spread import CoatingSpread
 from .height_map import gel_mapper, of_unit, rest_height_map
@@ -64,6 +64,8 @@ class Renderer:
         surroundings: Surroundings = NOTHING,
     ) -> None:
         calibration = calibration_of(calibration, "Renderer, calibration")
+        if seed not in range(2**32):
+            raise TactileError("Renderer, seed", f"{seed!r:.80}", f"a whole number from 0 to {2**32 - 1}")
         self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
         self._domed = rest is None and calibration.dome_scale != 1
@@ -88,11 +90,9 @@ class Renderer:
             raise TactileError(f"preset {preset}", found, "a unit's own LEDs", "Choose standard, with LLVM (doctor)")
         self.rest_radiance = self._spread_radiance(resting)
         self.dots = None if calibration.markers is None else MarkerField(calibration)
-        shape = *self.camera.shape, 3
-        if background is None:
-            self.background = camera_array(resting_picture(calibration, self.rest_radiance), shape, "background")
-        else:
-            self.background = _given_background(background, shape)
+        self.background = resting_picture(calibration, self.rest_radiance).astype(np.float32)
+        if background is not None:
+            self.background = _given_background(background, self.background)
         self._ends = np.stack(ends(self.background)).reshape(4, self.camera.height, -1)
         self._response = np.ascontiguousarray(calibration.pixel_response.transpose(2, 3, 0, 1), np.float32)
         self._rest_picture = None if self.dots else self.picture(self.rest_radiance)
@@ -127,7 +127,8 @@ class Renderer:
         """Render the pictures (H, W, 3) uint8 of gel displacement (n_nodes, 3) m; (T, H, W, 3) of (T, n_nodes, 3).
         displacement : of its gel's nodes (DIGIT: 2,867), as ``translate`` and ``solve`` return it
         Raises TactileError for another shape or values that are not finite."""
-        if np.ndim(displacement) != 3:
+        displacement = numbers(displacement, "displacement")
+        if displacement.ndim != 3:
             return self(gel_mapper(self.camera)(displacement), self.marks(displacement))
         pictures = np.empty((len(displacement), *self.camera.shape, 3), np.uint8)
         for k, frame in enumerate(displacement):
@@ -171,6 +172,9 @@ class Renderer:
         radiance : (H, W, LED), of ``radiance``. The change passes the camera's toe and shoulder (``camera_curve``).
         noise : generator of the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
+        if np.shape(radiance) != self.rest_radiance.shape:
+            found = f"shape {np.shape(radiance)}"
+            raise TactileError("radiance", found, f"{self.rest_radiance.shape}", "Renderer.radiance returns it")
         if self.dots is not None and marks is None:
             found = "a picture of heights alone, which do not say where the dots have moved"
             advice = "Call Renderer.render, or leave [markers] out"
@@ -224,20 +228,22 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
     return grain.repeat(side, 0).repeat(side, 1)[:height, :width].astype(np.float32)
 
 
-def _given_background(picture: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
-    """Return a user's picture (H, W, 3), levels, as float32 of a shape; raises TactileError for other units."""
-    levels = camera_array(picture, shape, "background")
+def _given_background(picture: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return a user's picture (H, W, 3), levels, as float32; raises TactileError for other units, and where it is much
+    more like the unit's ``own`` (H, W, 3) with colours exchanged, or turned."""
+    levels = camera_array(picture, own.shape, "background")
     least, most = float(levels.min()), float(levels.max())
     shares = np.asarray(picture).dtype.kind == "f" and 0 < most <= 1
     if shares or least < -0.5 or most > LARGEST_LEVEL + 0.5:  # .5: what resampling adds
         advice = "Multiply shares of 1 by 255" if shares else ""
         raise TactileError("background", f"values from {least:g} to {most:g}", "levels 0 to 255", advice)
+    check_way(levels, own)
     return levels.clip(0, LARGEST_LEVEL)
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
     """Return values (...) as float32. Raises TactileError, with ``name``, for another ``shape``, or if not finite."""
-    values = np.asarray(values)
+    values = numbers(values, name)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
     if not np.isfinite(values).all():

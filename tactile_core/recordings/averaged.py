@@ -14,6 +14,7 @@ from .rest_level import Framewise
 # turn in .149 and more, the other half in .147; averaged over 50 rows in .03 at most, over 20 in .06; through a
 # Butterworth filter of 20 Hz, which does no harm, in .033.
 LEAST_TURNS = TURNS / 2
+FEWEST_TURNS = 0.003  # averaged over 100 rows and more; through a filter of 10 Hz .003 to .007 in real recordings
 AT = 100.0  # Hz at which turns are counted: rows interpolated to a higher rate are no averages
 FEWEST = 100  # rows whose turns tell anything (assumed): a few rising ones have none
 HALF = 0.25  # s to either side, within which averages of 50 rows mix readings
@@ -26,12 +27,18 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
     as averages are wrong there; 0 elsewhere. readings : (T, e) counts; change : (T, e) counts, against rest
     warnings : extended by a sentence if they lack it"""
     flags = np.zeros(len(readings), np.uint16)
-    if recording.simulated or not np.isfinite(recording.time).all() or not _lacks_noise(readings, recording.rate):
+    if recording.simulated or not np.isfinite(recording.time).all():
+        return flags
+    turns = _turns(readings, recording.rate)
+    if turns >= LEAST_TURNS:
         return flags
     warnings.append(
         "readings lack the noise of a finger: averaged, filtered, or simulated without noise. Where they move within "
         "half a second, averages of many rows give forces too low or too late, and are flagged: give raw readings"
     )
+    if turns < FEWEST_TURNS:
+        warnings.append("no noise at all is left, as by averages over a second: no frame is believed")
+        return flags | np.uint16(Flag.OUT_OF_RANGE)
     half = max(1, round(HALF * recording.rate))
     for start in range(0, len(readings), BLOCK):
         rows = np.arange(start, min(start + BLOCK, len(readings)))
@@ -42,13 +49,13 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
     return flags
 
 
-def _lacks_noise(readings: np.ndarray, rate: float) -> bool:
-    """Return true if readings (T, e) counts at this rate, Hz, rise and fall without a finger's noise."""
+def _turns(readings: np.ndarray, rate: float) -> float:
+    """Return the share of samples at which readings (T, e) counts at this rate, Hz, turn; 1 where too few tell it."""
     step = max(1, round(rate / AT))
     whole = np.rint(readings[: BLOCK * step : step])
     whole = whole[~repeats(whole)[0]]
     if len(whole) < FEWEST:
-        return False
+        return 1.0
     moves = np.abs(np.diff(whole, axis=0))
     fine = bool((moves > 0).any()) and np.percentile(moves[moves > 0], 5) < COARSE
-    return fine and noise_turns(whole) < LEAST_TURNS
+    return noise_turns(whole) if fine else 1.0

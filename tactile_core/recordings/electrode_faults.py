@@ -29,10 +29,13 @@ MOST_STALE = 0.45  # of the rows; with more, they were recorded faster than the 
 # .39 simulated with noise, below .02 without (assumed: between)
 TURNS = 0.08
 STALE = 3  # equal rows in a run: noise does not repeat in all electrodes (assumed)
-# Largest ratio of an impedance at rest to a typical unit's, or the reverse: .9 to 3.3 are seen in units (assumed)
+# Largest ratio of an impedance at rest to a typical unit's, or of an electrode's ratio to the median one, or the
+# reverse (assumed): .75 to 3.3 in real units, .45 to 3.4 in electrodes; one of 10 bits is at 9 and more, one in mV at 2
 STRANGE_REST = 8.0
-# The same of a single electrode: .6 to 8 in 65 real recordings; volts, shares and 8 bits lie beyond (assumed)
-STRANGE_ELECTRODE = 30.0
+# Readings in mV look like counts at 3.3 to 4.3 times a typical unit's impedance. Its logarithms then spread over the
+# electrodes by .36 to .68 of the typical unit's. Film and fluid change all alike: .95 to 1.6 in 4 real units, .66 in a
+# fifth, at 1.8 times the impedance (assumed limits)
+MILLIVOLTS, LEAST_SPREAD = 2.5, 0.55
 MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 
 
@@ -203,10 +206,17 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
     typical = typical_rest(sensor)
     if typical is None:
         return False
-    ratios = divider.film_impedance(rest) / divider.film_impedance(typical)
+    own, usual = divider.film_impedance(rest), divider.film_impedance(typical)
+    ratios, spread = own / usual, float(np.std(np.log(own)) / np.std(np.log(usual)))
     ratio = float(np.median(ratios))
+    if ratio > MILLIVOLTS and spread < LEAST_SPREAD:
+        warnings.append(
+            f"electrodes rest at impedances {ratio:.2g} times a typical unit's and {spread:.2g} times as far apart, as "
+            "no film makes them: readings in mV? (--counts-per-unit 1.241)"
+        )
+        return True
     if 1 / STRANGE_REST <= ratio <= STRANGE_REST:
-        strange = (np.abs(np.log(ratios)) > np.log(STRANGE_ELECTRODE)) & (rest > 0) & (rest < COUNT_MAX) | (rest < 0)
+        strange = (np.abs(np.log(ratios / ratio)) > np.log(STRANGE_REST)) & (rest > 0) & (rest < COUNT_MAX) | (rest < 0)
         if strange.any():
             warnings.append(
                 f"{named_electrodes(strange)} at {', '.join(f'{each:.4g}' for each in rest[strange])} counts at rest, "

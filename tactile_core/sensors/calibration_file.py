@@ -40,7 +40,7 @@ def load_calibration(
     if object_reflectance is not None:
         return dataclasses.replace(load_calibration(path, sensor), object_reflectance=object_reflectance)
     if path is None:
-        return _shipped(sensor or Camera.sensor)
+        return _shipped(describe(sensor or Camera.sensor).folder.name)
     file = Path(path_text(path, "load_calibration, path"))
     found = read_toml(file, lambda content: _calibration(content, file.parent), EXPECTED, ADVICE)
     if sensor not in (None, found.camera.sensor):

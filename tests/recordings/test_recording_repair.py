@@ -143,12 +143,12 @@ def test_rows_that_came_twice_and_a_finger_without_noise_are_no_fault(values):
     assert not (signals.flags & (Flag.REPAIRED | Flag.DEAD_CHANNEL)).any()
 
 
-@pytest.mark.parametrize(("factor", "strange"), [(0.5, True), (1.0, False), (1.15, True)])
+@pytest.mark.parametrize(("factor", "strange"), [(0.5, True), (3300 / 4095, True), (1.0, False), (1.15, True)])
 def test_electrodes_that_rest_where_no_unit_s_do_are_doubted(factor, strange):
     counts = np.rint(factor * (np.array(typical_rest("biotac")) + np.random.default_rng(0).normal(0, 1.2, (400, 19))))
     signals = recordings.prepare(assemble("a", "text", electrodes=counts, stamps=None))
     assert ((signals.flags & Flag.OUT_OF_RANGE > 0) == strange).all()
-    assert any("which no film gives" in text for text in signals.warnings) == strange
+    assert any("which no film gives" in text or "in mV?" in text for text in signals.warnings) == strange
 
 
 def test_a_pressure_that_is_0_throughout_was_not_recorded():
@@ -192,7 +192,7 @@ def averaged(columns, rows, mode="edge"):
 
 
 @pytest.mark.parametrize("decimals", [0, 6])
-@pytest.mark.parametrize("rows", [21, 51])
+@pytest.mark.parametrize("rows", [21, 51, 151])
 def test_a_moving_average_is_told_and_flagged_where_it_moves(rows, decimals, press, tmp_path):
     def prepared(electrodes):
         np.savez(tmp_path / "touch.npz", electrodes=electrodes, time=press.time)
@@ -203,7 +203,7 @@ def test_a_moving_average_is_told_and_flagged_where_it_moves(rows, decimals, pre
     assert "lack the noise" in " ".join(found.warnings)
     beyond = (found.flags & Flag.OUT_OF_RANGE) > 0
     edges = np.flatnonzero(np.diff(press.contact.astype(int)))
-    assert beyond[edges].all() and not beyond[:100].any() and not beyond[-50:].any()
+    assert beyond[edges].all() and (not beyond[:100].any() and not beyond[-50:].any() if rows < 100 else beyond.all())
 
 
 @pytest.mark.parametrize("rows", [5, 51])

@@ -39,7 +39,7 @@ def test_other_numbers_are_not_counted(columns, odd):
     assert counted(columns) is None and counted(columns[:100]) is None
 
 
-@pytest.mark.parametrize("factor", [0.1, 1 / 16, 3.3 / 4095, 1 / 4095])
+@pytest.mark.parametrize("factor", [0.1, 1 / 4, 1 / 16, 3.3 / 4095, 1 / 4095])
 def test_an_electrode_in_another_unit_of_measurement_is_named_and_flagged(factor, press, tmp_path):
     press.electrodes[:, 6] *= factor
     np.savez(tmp_path / "touch.npz", electrodes=press.electrodes, time=press.time)

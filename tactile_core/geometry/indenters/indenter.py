@@ -94,8 +94,23 @@ class Pose:
     push: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        if not math.isfinite(np.vdot(self.apex, self.apex) + np.vdot(self.axes, self.axes)):  # quicker than each
-            raise TactileError("pose", f"apex {self.apex} m, axes {self.axes.tolist()}", "finite numbers")
+        try:
+            right = self.apex.shape == (3,) and self.axes.shape == (3, 3)
+            right &= math.isfinite(np.vdot(self.apex, self.apex) + np.vdot(self.axes, self.axes))  # quicker than each
+        except (AttributeError, TypeError):  # no arrays
+            right = False
+        if not right:
+            found = f"apex {self.apex!r:.80} m, axes {self.axes!r:.80}"
+            raise TactileError("pose", found, "arrays (3,) and (3, 3) of finite numbers")
+
+    def check(self, where: str) -> None:
+        """Raise TactileError, which names ``where``, unless the axes are right-handed and they and ``push`` are unit
+        vectors."""
+        push, square = np.asarray(self.direction), np.abs(self.axes.T @ self.axes - np.eye(3)).max() < SQUARE
+        if not (square and np.linalg.det(self.axes) > 0):
+            raise TactileError(where, f"axes {self.axes.tolist()}", "right-handed unit axes")
+        if push.shape != (3,) or push.dtype.kind not in "if" or not abs(push @ push - 1) < SQUARE:
+            raise TactileError(where, f"push {self.push!r:.80}", "a unit vector (3,), or None")
 
     @property
     def direction(self) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import TactileError
+from ...errors import TactileError, path_text
 from ...files import array_cache
 from ...files.array_cache import cache_folder
 from ...files.installed import needing
@@ -168,6 +168,7 @@ def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> None:
+    path_text(path, "MeshIndenter.from_file, path")
     if not (np.isfinite(scale) and scale > 0):
         raise TactileError(path, f"unit_mm = {scale * 1e3:g}", "millimetres per unit of the file, above zero")
     if up not in mesh_file.UPS:

@@ -24,12 +24,14 @@ class Several(Indenter):
     parts: tuple[tuple[Indenter, Pose], ...]
 
     def __post_init__(self) -> None:
-        if not self.parts:
-            raise TactileError("several, parts", "none", "one indenter or more")
-        for _, pose in self.parts:
-            right_angles = np.abs(pose.axes.T @ pose.axes - np.eye(3)).max() < 1e-9 and np.linalg.det(pose.axes) > 0
-            if not right_angles:
-                raise TactileError("several, parts", f"axes {pose.axes.tolist()}", "right-handed unit axes")
+        try:
+            pairs = [(hasattr(body, "curvature"), pose) for body, pose in self.parts]
+        except (TypeError, ValueError):  # no pairs
+            pairs = []
+        if not pairs or not all(presses and isinstance(pose, Pose) for presses, pose in pairs):
+            raise TactileError("several, parts", f"{self.parts!r:.80}", "one indenter or more, each with its Pose")
+        for _, pose in pairs:
+            pose.check("several, parts")
         lowest = float(self.support(np.array([0.0, 0.0, -1.0]))[2])
         if abs(lowest) > _TOUCH:
             advice = "Raise or lower all parts together"

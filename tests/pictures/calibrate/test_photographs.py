@@ -122,6 +122,9 @@ def test_different_sizes_and_unreadable_files_are_named(folder: Path, tmp_path: 
     Image.fromarray(np.zeros((100, 80, 3), np.uint8)).save(tmp_path / "press_2.png")
     with pytest.raises(TactileError, match=r"press_2\.png: 80 x 100 pixels"):
         read_photographs(tmp_path)
+    Image.fromarray(np.zeros((320, 240), np.uint8)).save(tmp_path / "press_2.png")
+    with pytest.raises(TactileError, match=r"press_2\.png: .*no colours"):
+        read_photographs(tmp_path)
     (tmp_path / "press_2.png").write_bytes(b"no picture")
     with pytest.raises(TactileError, match=r"press_2\.png"):
         read_photographs(tmp_path)
