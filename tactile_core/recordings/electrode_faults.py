@@ -209,7 +209,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
     own, usual = divider.film_impedance(rest), divider.film_impedance(typical)
     ratios, spread = own / usual, float(np.std(np.log(own)) / np.std(np.log(usual)))
     ratio = float(np.median(ratios))
-    if ratio > MILLIVOLTS and spread < LEAST_SPREAD:
+    if MILLIVOLTS < ratio <= STRANGE_REST and spread < LEAST_SPREAD:
         warnings.append(
             f"electrodes rest at impedances {ratio:.2g} times a typical unit's and {spread:.2g} times as far apart, as "
             "no film makes them: readings in mV? (--counts-per-unit 1.241)"

@@ -80,9 +80,11 @@ class PrepareOptions:
         if self.film is not None:
             expected = f"{film.LEAST:g} to {film.MOST:g} of a typical unit's"
             finite_number(self.film, "option film", expected, film.LEAST, film.MOST)
-        for name, kind in {"rest": Rest | None, "drift": bool, "repair": bool}.items():
+        yes_or_no = bool, "True or False"
+        kinds = {"rest": (Rest | None, "a Rest, or None"), "drift": yes_or_no, "repair": yes_or_no}
+        for name, (kind, expected) in kinds.items():
             if not isinstance(given := getattr(self, name), kind):
-                raise TactileError(f"option {name}", f"{given!r:.80}", str(kind))
+                raise TactileError(f"option {name}", f"{given!r:.80}", expected)
         if self.polarity not in (AUTO, *POLARITIES):
             raise TactileError("option polarity", repr(self.polarity), ", ".join((AUTO, *POLARITIES)))
 
