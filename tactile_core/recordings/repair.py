@@ -22,7 +22,8 @@ MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothin
 
 def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
     """Interpolate linearly over the bad samples of each column; the nearest good one at the ends.
-    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0; values is never changed."""
+    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0. Never changes values, and
+    returns them themselves where none is bad."""
     if not bad.any():
         return values
     values = values.astype(float)
