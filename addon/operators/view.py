@@ -209,7 +209,7 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
 
 
 def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: np.ndarray) -> int:
-    """Mark stretches where confidence (T,), 0 to 1, of frames (T,) is below 0.5, replacing markers; return how many."""
+    """Mark stretches where confidence (T,), 0 to 1, of frames (T,) is below 0.5, replacing its own; return how many."""
     for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)
     edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))

@@ -1,4 +1,4 @@
-"""Paired contacts: the same force, angle and unrolled place on BioTac and DIGIT, as training data. Press i draws all it
+"""Paired contacts: the same force, lean and place on BioTac and DIGIT, as training data. Press i draws all it
 needs from (seed, i), so any number of workers makes the same file, and an interrupted run continues with the missing
 blocks of presses. `prepare_input`, `make` and `inspect_input` are called as ``engine.recipes`` says."""
 

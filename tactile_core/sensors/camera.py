@@ -153,7 +153,7 @@ class Led:
     colour : "red", "green" or "blue"; its light is a band of radiance of its own
     position : (right, down, toward the camera), m, image frame
     radius : m, its apparent size, which makes shadows soft
-    radiance : radiance of its surface, grey levels of its own channel in the picture's middle; 0 is off
+    radiance : of the sphere's surface, some 1e5 levels of its channel in the picture's middle; 0 is off
     """
 
     colour: str = dataclasses.field(metadata=IN_PYTHON)

@@ -1,4 +1,4 @@
-"""Read the table of a fluid sensor's electrodes, beside its descriptor."""
+"""Read a fluid sensor's tables: electrodes, and simulated contacts."""
 
 from __future__ import annotations
 

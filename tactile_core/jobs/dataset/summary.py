@@ -138,7 +138,7 @@ def installed() -> bool:
 
 
 def survival_rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
-    """Classify the label `task` by each kind of features, the best of ten random maps, and always the commonest label.
+    """Score how well each kind of features, ten random maps of the electrodes, and the commonest label tell `task`.
     apart : label whose values are groups, held out whole; "" holds out single recordings (of snapshots, tenths of each)
     progress : called with (classifiers made, in all)
     Needs scikit-learn. Returns no row where the label has one value, one group or too few examples."""

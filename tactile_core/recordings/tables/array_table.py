@@ -1,4 +1,4 @@
-"""Named arrays of HDF5, NPZ and MATLAB files as a table: row i of an array (T, n) is its columns ``name[0]`` on."""
+"""Named arrays of HDF5, NPZ and MATLAB files as a table: column j of an array (T, n) is called ``name[j]``."""
 
 from __future__ import annotations
 
