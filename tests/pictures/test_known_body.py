@@ -153,8 +153,8 @@ def test_a_texture_shows_through_where_the_body_touches_and_turns_with_it():
 @pytest.mark.parametrize(
     ("texture", "words"),
     [(np.ones((4, 4, 3)), "Average"), (np.full((4, 4), 7.0), "Divide"), (np.full((4, 4), np.nan), "nan"),
-     (np.full((4, 4), 40000, np.uint16), "white"), (np.ones((1, 4)), "2 x 2"), ([["a"]], "grey"),
-     ([[1, 0], [1]], "grey")],
+     (np.full((4, 4), 40000, np.uint16), "white"), (np.ones((1, 4)), "2 x 2"), ([["a"]], "real numbers"),
+     ([[1, 0], [1]], "real numbers")],
 )  # fmt: skip
 def test_what_is_no_texture_is_refused(texture, words):
     with pytest.raises(TactileError, match=words):
