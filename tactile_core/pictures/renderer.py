@@ -64,7 +64,7 @@ class Renderer:
         surroundings: Surroundings = NOTHING,
     ) -> None:
         calibration = calibration_of(calibration, "Renderer, calibration")
-        if seed not in range(2**32):
+        if not (isinstance(seed, int | np.integer) and 0 <= seed < 2**32):
             raise TactileError("Renderer, seed", f"{seed!r:.80}", f"a whole number from 0 to {2**32 - 1}")
         self.calibration, self.preset = calibration, preset
         self.camera = calibration.camera
