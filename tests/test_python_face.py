@@ -102,7 +102,7 @@ class Blocker:
 
 sys.meta_path.insert(0, Blocker())
 import numpy as np, tactile_core as tactile
-from tactile_core.jobs.mujoco_gel import observation_space
+from tactile_core.jobs.gel_observation import observation_space
 
 ball, place = tactile.indenters.Sphere(3e-3), tactile.Placement(-6e-3, 0.0)
 body = types.SimpleNamespace(vertices=4e-3 * np.eye(4)[:, :3], faces=[[0, 1, 2], [0, 3, 1], [1, 3, 2], [0, 2, 3]])

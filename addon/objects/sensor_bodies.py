@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...tactile_core import sensors
-from ...tactile_core.pictures.mitsuba.gel_mesh import ACRYLIC
+from ...tactile_core.pictures.mitsuba.window import ACRYLIC
 from ..settings import properties
 from . import digit_materials, surfaces
 

@@ -24,7 +24,8 @@ from tactile_core.errors import TactileError
 from tactile_core.files import atomic
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs.gel import Gel
-from tactile_core.jobs.mujoco_gel import MujocoGel, marker_nodes, observation_space, observe
+from tactile_core.jobs.gel_observation import marker_nodes, observation_space, observe
+from tactile_core.jobs.mujoco_gel import MujocoGel
 
 HERE = Path(__file__).resolve().parent
 RATE, SECONDS = 100, 2.4  # frames a second; of the whole grasp

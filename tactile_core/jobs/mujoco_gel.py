@@ -1,5 +1,4 @@
-"""A fingertip in MuJoCo: contacts of ``mujoco.MjData`` with a gel's geom become contacts of a ``Gel``; and what is
-observed of it for learning: picture, force and marker motion, and their Gymnasium space."""
+"""A fingertip in MuJoCo: contacts of ``mujoco.MjData`` with a gel's geom become contacts of a ``Gel``."""
 
 from __future__ import annotations
 
@@ -9,12 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import TactileError
-from ..files.installed import needing
 from ..geometry.indenters import Box, Cylinder, Indenter, LyingCylinder, MeshIndenter, Sphere
 from ..mechanics.placement import FRICTION
 from ..pictures.presets import FAST
 from ..sensors import TARGET
-from ..sensors.calibration_file import load_calibration
 from .gel import Gel
 from .gel_contact import GelContact
 
@@ -28,8 +25,6 @@ _EDGE, _MOST_EDGE = 0.4e-3, 0.25  # m, and of the least side: edges of boxes and
 # before it bears MuJoCo's shear (assumed).
 _SHEAR_GAIN, _SHEAR_STEP, _MOST_SHIFT = 0.5, 0.1e-3, 2e-3
 _BALL_FACES = 4  # subdivisions of the icosphere that ellipsoids are made of: 2,562 vertices
-ROWS, COLUMNS = 9, 7  # of markers, as on printed gels (assumed): 1.9 mm apart in the shipped unit's picture
-_MOST_FORCE, _MOST_MOTION = 100.0, 5e-3  # N, m: beyond what a gel bears and moves
 
 
 class MujocoGel:
@@ -192,38 +187,3 @@ def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
         names = [getattr(model, kind)(each).name for each in range(getattr(model, f"n{kind}"))]
         expected = f"one of {', '.join(names) or 'none'}"
         raise TactileError("MuJoCo model", f"no {kind} {name!r}", expected) from error
-
-
-def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
-    """Return the nodes (rows, columns) nearest to an even grid of markers over the camera's picture: rows from the tip
-    along +x, columns along +z."""
-    camera = load_calibration().camera
-    x = np.linspace(camera.gel_x.min(), camera.gel_x.max(), rows + 2)[1:-1]
-    z = np.linspace(camera.gel_z.min(), camera.gel_z.max(), columns + 2)[1:-1]
-    places = np.stack(np.meshgrid(x, z, indexing="ij"), -1).reshape(-1, 1, 2)
-    away = np.square(places - gel.surface.rest[None, :, [0, 2]]).sum(axis=2)
-    return away.argmin(axis=1).reshape(rows, columns)
-
-
-def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return the last contact's "force" (3,) N, "markers" (rows, columns, 2) m, motion along x and z, and, if asked,
-    "picture" (H, W, 3) uint8; markers : (rows, columns) int, nodes of ``marker_nodes``"""
-    moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
-    seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}
-    return seen | {"picture": gel.picture()} if picture else seen
-
-
-def observation_space(markers: np.ndarray, *, picture: bool = True) -> Any:
-    """Return the ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco].
-    markers : (rows, columns) int, of ``marker_nodes``; picture : whether it is observed"""
-    with needing("mujoco"):
-        from gymnasium.spaces import Box, Dict
-
-    camera = load_calibration().camera
-    spaces = {
-        "force": Box(-_MOST_FORCE, _MOST_FORCE, (3,), np.float32),
-        "markers": Box(-_MOST_MOTION, _MOST_MOTION, (*markers.shape, 2), np.float32),
-    }
-    if picture:
-        spaces["picture"] = Box(0, 255, (*camera.shape, 3), np.uint8)
-    return Dict(spaces)

@@ -20,8 +20,8 @@ from ..sensors import PAIR
 from ..sensors.descriptor import of_kind
 from ..sensors.fluid_sensor import Fluid
 from ..sensors.gel_sensor import GelSensor
-from ..simulation.pair_sampling import RANDOM_BODY
 from ..simulation.pairs_writer import Made, card, card_path, merge
+from ..simulation.random_bodies import NAME
 from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import run as runs
@@ -86,7 +86,7 @@ def plan(
     surfaces = [sensors.sensor_surface(sensor).sha256 for sensor in pair]
     job = jobs.make(inputs, Pairs(count, seed, surfaces, files, source, target, list(keep)), None)
     names = [spec.name for spec in scene.indenters]
-    return job, names + [RANDOM_BODY] * (scene.pairs.random_bodies > 0), text
+    return job, names + [NAME] * (scene.pairs.random_bodies > 0), text
 
 
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:

@@ -153,8 +153,9 @@ class SheetFigure:
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
         """Draw maps of displacement (k, M, 3) m of the gel after a label, the picture's border, centers (k, c, 2) m."""
         gel, z = self._gel, self._gel_z
-        mesh, largest = (gel.rest[:, [0, 2]], gel.faces), scale(displacement)
-        axes = self._surface_row(label, *mesh, displacement, largest, self._gel_x, z, centers)
+        axes = self._surface_row(
+            label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
+        )
         border = np.stack([self.camera.gel_x[[0, 0, -1, -1, 0]], self.camera.gel_z[[0, -1, -1, 0, 0]]], axis=1)
         ticks = Z_TICKS[(z[0] < Z_TICKS) & (z[1] > Z_TICKS)]
         for k in range(self.columns):

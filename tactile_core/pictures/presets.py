@@ -72,7 +72,7 @@ DEFAULT = STANDARD.name
 
 def preset_named(name: str) -> Preset:
     """Return Mitsuba's preset ``standard``, ``quality`` or ``reference``; raises TactileError for another name."""
-    if name not in NAMES[1:]:
+    if name not in tuple(PRESETS):  # a list cannot be looked up in a dictionary
         raise TactileError("--preset", repr(name), f"one of {', '.join(NAMES)}")
     return PRESETS[name]
 

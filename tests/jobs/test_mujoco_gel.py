@@ -10,12 +10,8 @@ mujoco = pytest.importorskip("mujoco", reason="the extra [mujoco] is not install
 pytest.importorskip("gymnasium", reason="the extra [mujoco] is not installed")
 
 from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.jobs.mujoco_gel import (  # noqa: E402
-    MujocoGel,
-    marker_nodes,
-    observation_space,
-    observe,
-)
+from tactile_core.jobs.gel_observation import marker_nodes, observation_space, observe  # noqa: E402
+from tactile_core.jobs.mujoco_gel import MujocoGel  # noqa: E402
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "scenes" / "mujoco_grasp" / "grasp.py"
 # A gel that lies on its back under a body of 60 g: y into the gel is world -z, x along the finger world x.

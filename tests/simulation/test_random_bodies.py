@@ -4,7 +4,8 @@ import msgspec
 import numpy as np
 
 from tactile_core.geometry.indenters import Several
-from tactile_core.simulation.pair_sampling import press_rows, random_body
+from tactile_core.simulation.pair_sampling import press_rows
+from tactile_core.simulation.random_bodies import random_body
 from tactile_core.simulation.scene import load_scene
 
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -144,8 +144,10 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
     levels = budget.only("levels", "Nothing else can be chosen in a translation")
     preset = presets.FAST if levels is None else variant.fitting(levels)
     job = convert.Options(frames, keep, prepare, options.overwrite, sensor)
-    pictures, gel = (options.calibration, preset, None), (options.gel, options.target)
-    asked = convert.ToolOptions(options.weights, *pictures, answer, *gel, source, options.object_reflectance)
+    pictures = options.calibration, preset, None
+    asked = convert.ToolOptions(
+        options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance
+    )
     return job, asked, paths, levels
 
 

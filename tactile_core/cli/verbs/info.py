@@ -81,5 +81,7 @@ def _write_columns(options: argparse.Namespace) -> None:
     with opened(options.recordings[0]) as (container, where, _, file):
         guessed, held = guess_map(where, container, file)
     column_map.write(options.columns, guessed, held)
-    guess, none = "guessed from names and values; check it", "no 19 electrodes found: name them there"
-    say(f"{options.columns}: written, {guess if guessed[0].electrodes else none}")
+    if guessed[0].electrodes:
+        say(f"{options.columns}: written, guessed from names and values; check it")
+    else:
+        say(f"{options.columns}: written, no 19 electrodes found: name them there")

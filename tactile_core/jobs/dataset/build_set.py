@@ -29,7 +29,7 @@ from ..engine import run as runs
 from ..engine.recipes import Translate
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
-from . import dataset_card, summary
+from . import dataset_card, summary, survival
 from .collected import TEST, TRAIN, Collected, File, beside, collect
 from .recipe import FORCE, Recipe
 from .set_units import calibrated, file_name, readable
@@ -225,11 +225,10 @@ def _write_words(
 ) -> None:  # fmt: skip
     """Write the card, the page and their numbers; what survives of the labels where scikit-learn is installed.
     named : the recipe, as the user named it"""
-    rows: list[summary.Row] | None = None
-    if summary.installed():
+    rows: list[survival.Row] | None = None
+    if survival.installed():
         with asked.bar("what survives", "step") as shown:
-            apart = recipe.split.kept
-            rows = [row for task in recipe.tasks for row in summary.survival_rows(task, summaries, apart, shown)]
+            rows = [row for task in recipe.tasks for row in survival.rows(task, summaries, recipe.split.kept, shown)]
     text = dataset_card.card_of(recipe, named, found, source, summaries, rows, asked.layouts)
     with atomic.writing(out):
         atomic.write_bytes(out / CARD, text.encode())

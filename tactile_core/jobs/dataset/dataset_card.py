@@ -16,10 +16,11 @@ from ...files.png_writer import pack_png
 from ...files.shipped import shipped
 from ...files.version import __version__
 from ..export.finished_job import Finished
-from . import summary
+from . import survival
 from .collected import Collected
 from .recipe import SHIPPED, Recipe
-from .summary import RAW, Row, Summary
+from .summary import RAW, Summary
+from .survival import Row
 
 MOST_WARNINGS, MOST_VALUES = 8, 12
 NUMBER = re.compile(r"[\d.,]+|\bE\d+")  # by which warnings of one kind differ
@@ -82,10 +83,10 @@ def _plain(text: str) -> str:
 def _verdict(task: str, by: dict[str, Row]) -> str:
     """Describe how much of the label `task` survives: no more than chance, less than in the electrodes, or all of it.
     by : kind of features -> its row"""
-    nulls = (RAW, summary.RANDOM, summary.ALWAYS)
+    nulls = (RAW, survival.RANDOM, survival.ALWAYS)
     best = max((row for name, row in by.items() if name not in nulls), key=lambda row: row.right)
-    source = max(by[RAW], by[summary.RANDOM], key=lambda row: row.right)
-    always = by[summary.ALWAYS].right
+    source = max(by[RAW], by[survival.RANDOM], key=lambda row: row.right)
+    always = by[survival.ALWAYS].right
     told = (
         f"told right in {best.right:.2f} from the {best.by}, in {source.right:.2f} from the electrodes,"
         f" in {always:.2f} by its commonest value alone"

@@ -1,8 +1,9 @@
 """Live view: the newest frame of a growing recording as a picture, as soon as it is there."""
 
+from .digit_camera import DigitCamera
 from .frame_server import FrameServer
 from .live_signals import LiveSignals
 from .live_view import Shown, View
-from .playback import DigitCamera, Growing, followed, played, watch
+from .playback import Growing, followed, played, watch
 
 __all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View", "followed", "played", "watch"]

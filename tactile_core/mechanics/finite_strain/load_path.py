@@ -58,8 +58,9 @@ class LoadPath:
     def _make(self) -> None:
         """Make the mesh and its contact problem, at rest."""
         self.body = graded_body(self.sensor, self.indenter, self.pose, self.made_for, self.tier, self.spacing)
-        contact = self.indenter, self.pose, self.made_for, self.friction
-        self.problem = self.body.contact(*contact, every_edge=self.patient)
+        self.problem = self.body.contact(
+            self.indenter, self.pose, self.made_for, self.friction, every_edge=self.patient
+        )
         self.step = FRICTION_STEP if self.friction or self.spacing < 1 or self.patient else ONE_STEP
         if self.tier == "full" and not self.friction and not self.patient:
             self.problem.most_failures = _FEW_FAILURES[self.spacing < 1]

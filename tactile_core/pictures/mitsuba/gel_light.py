@@ -12,10 +12,11 @@ from ...sensors.calibration import Calibration
 from ..coating_spread import evened
 from ..perspective import lookup, slopes
 from ..presets import Preset
-from .gel_mesh import MM, GelMesh, camera_rays, check_mesh, mend
+from .gel_mesh import MM, GelMesh, check_mesh, mend
 from .gel_scene import NOTHING, Surroundings, change_numbers, gel_shape, lamps, plugin_names, walls
 from .led_integrator import DIRECTIONS, bounced, direct, mirrored, narrow_lobe
 from .variant import LLVM, activate
+from .window import camera_rays
 
 # px, offset of rays from pixels' middles, where they would meet vertices exactly and slip between triangles.
 ASIDE = (0.013, 0.0071)

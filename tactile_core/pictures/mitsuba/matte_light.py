@@ -18,8 +18,9 @@ from ..light import Surface, falling, lambert, open_light
 from ..perspective import lookup, map_lookup, slopes
 from ..presets import Gather, Preset
 from .gel_light import ASIDE
-from .gel_mesh import MARGIN, GelMesh, through_window
+from .gel_mesh import MARGIN, GelMesh
 from .tracer import make_tracer
+from .window import through_window
 
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # of a sunflower's seeds: even over a disc for any number of them
 _GOLDEN_RATIO = (np.sqrt(5) - 1) / 2

@@ -16,9 +16,10 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs.dataset import collected, summary
+from tactile_core.jobs.dataset import collected, survival
 from tactile_core.jobs.dataset import recipe as recipes
-from tactile_core.jobs.dataset.summary import ALWAYS, ARRAYS, PICTURE, RAW, Summary, survival_rows
+from tactile_core.jobs.dataset.summary import ARRAYS, PICTURE, RAW, Summary
+from tactile_core.jobs.dataset.survival import ALWAYS, rows
 from tactile_core.jobs.export.finished_job import Recorded
 
 DATA = Path(os.environ.get("TACTILE_TEST_DATA", Path(__file__).parents[4] / "shared" / "data"))
@@ -36,8 +37,8 @@ FRAMES = 30  # of a recording: every second of 60
 def few_fits():
     """Two folds and two random maps: what tells the labels apart is told by any number of them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(summary, "FOLDS", 2)
-        patch.setattr(summary, "MAPS", 2)
+        patch.setattr(survival, "FOLDS", 2)
+        patch.setattr(survival, "MAPS", 2)
         yield
 
 
@@ -355,7 +356,7 @@ def examples(told: str, count: int = 40) -> list[Summary]:
 @pytest.mark.parametrize("told", [RAW, PICTURE])
 def test_survival_tells_labels_by_what_holds_them_and_by_nothing_else(told):
     pytest.importorskip("sklearn", reason="scikit-learn is not installed")
-    by = {row.by: row for row in survival_rows("side", examples(told), "session", lambda done, total: None)}
+    by = {row.by: row for row in rows("side", examples(told), "session", lambda done, total: None)}
     assert by[told].right > 0.9 and by[ALWAYS].right == 0.5
     others = [row for name, row in by.items() if name in (*ARRAYS, PICTURE) and name != told]
     assert all(row.right < 0.5 + 4 * row.error for row in others)

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from tactile_core.pictures.mitsuba.gel_mesh import apparent_height, cubic, through_window
+from tactile_core.pictures.mitsuba.window import apparent_height, cubic, through_window
 from tactile_core.sensors.calibration_file import load_calibration
 
 UNIT = load_calibration()
