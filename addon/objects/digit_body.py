@@ -160,6 +160,7 @@ def _place_led(thing: bpy.types.Object, gel: bpy.types.Object, led: Led, unit: C
     per_metre = gel.tactile.per_metre
     thing.matrix_parent_inverse.identity()
     thing.location = axes.to_gel([led.position], unit.camera, per_metre)[0]
+    thing.data.type = "POINT"
     lamp = thing.data
     lamp.color = _COLOURS[led.colour]
     lamp.shadow_soft_size, lamp.use_soft_falloff = led.radius * per_metre, False

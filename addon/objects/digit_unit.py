@@ -62,7 +62,7 @@ def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, A
     things = digit_body.leds_of(gel)
     for k, led in enumerate(unit.leds):
         thing = things.get(led.colour)
-        if thing is None or thing.hide_render:  # deleted, or switched off
+        if thing is None or thing.hide_render or thing.data.type != "POINT":  # deleted, switched off, or a sun
             found.append(dataclasses.replace(led, radiance=0.0))
             continue
         lamp = _lamp(thing, gel, depsgraph, camera)
@@ -111,10 +111,11 @@ def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormat
 
 def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") -> list[str]:
     """List in words what a gel's pictures by a preset ("": any) leave out of the scene, and what changes levels."""
-    lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role == "NONE" and not t.hide_render]
+    lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role in ("NONE", "LED") and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     if preset == "fast":
-        found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps if lamp.data.type == "POINT"]
+        found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps
+                  if lamp.data.type == "POINT" and lamp.tactile.role == "NONE"]  # fmt: skip
     if digit_body.has_body(gel) and all(led.hide_render for led in digit_body.leds_of(gel).values()):
         found.append(f"{gel.name}: its LEDs are hidden or deleted, so that only other lamps light it")
     played = motion.played(gel)

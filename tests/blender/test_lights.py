@@ -196,6 +196,15 @@ def test_a_deleted_led_is_off_and_a_renamed_one_is_not(shown):
     assert leds[0].radiance == 0 and leds[1].radiance > 0
 
 
+def test_an_led_made_a_sun_is_off_and_said_until_reset(shown, part, gel):
+    lamp("red").data.type = "SUN"
+    assert shown().unit.leds[0].radiance == 0 < shown().unit.leds[1].radiance
+    said = part("addon.objects.digit_unit").left_out(bpy.context.scene, gel, "fast")
+    assert "LED red: no point lamp, left out" in said and not any("LED green" in words for words in said)
+    bpy.ops.tactile.reset_to_calibration()
+    assert shown().unit == part("tactile_core.sensors.calibration_file").load_calibration()
+
+
 def test_other_colours_lamps_and_bodies_surround_the_unit(shown, gel):
     lamp("red").data.color = (1, 0.5, 0)
     more = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "POINT"))
