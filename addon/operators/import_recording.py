@@ -127,9 +127,10 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         if not placed:
             advice = "Name the folder of your own sensors in Preferences"
             self.report({"WARNING"}, f"No electrodes are shown: there is no {table_of(source)}. {advice}")
+        name = f"{os.path.basename(path)}: " if len(self.files) > 1 else ""
         for warning in found.signals.warnings:
-            self.report({"WARNING"}, in_blender(warning))
-        self.report({"INFO"}, f"{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
+            self.report({"WARNING"}, name + in_blender(warning))
+        self.report({"INFO"}, f"{name}{len(frames)} frames at {found.recording.rate:.4g} Hz. {summary}{kept}")
         return int(frames[-1])
 
     def _keep_scene(self, scene: bpy.types.Scene) -> str:

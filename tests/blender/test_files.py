@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import re
 from types import SimpleNamespace
 
 import bpy
@@ -126,6 +127,7 @@ def test_several_files_stand_side_by_side(counts, tmp_path, capfd):
     head += ",".join(f"ele{k}" for k in range(1, 20))
     for name, rows in (("a", 150), ("b", 100), ("c", 150)):
         table = np.column_stack([np.arange(rows) / 100, np.full((rows, 25), 2000), electrodes[:rows]])
+        table[:, -1] = 2000 if name == "c" else table[:, -1]
         np.savetxt(tmp_path / f"{name}.csv", table, delimiter=",", header=head, comments="", fmt="%g")
     (tmp_path / "bad.csv").write_text("no,recording\n1,2\n")
     files = [{"name": f"{name}.csv"} for name in ("b", "bad", "a", "c")]
@@ -134,3 +136,5 @@ def test_several_files_stand_side_by_side(counts, tmp_path, capfd):
     skins = [thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC"]
     assert [round(skin.location.y) for skin in skins] == [0, -85, -170]
     assert (bpy.context.scene.frame_start, bpy.context.scene.frame_end) == (0, 149)
+    said = capfd.readouterr().out
+    assert re.search(r"Warning: c\.csv: .*E19", said) and "Info: a.csv: 150 frames" in said
