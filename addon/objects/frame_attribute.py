@@ -28,21 +28,31 @@ def add(
     words = name.replace("_", " ")
     label = f"Tactile {words}"
     name_of_image = f"{thing.name} {words}"
+    modifier = modifier_of(thing, name)
+    if modifier is not None:
+        _remove_group(modifier.node_group)
     if values.dtype == bool:
         image = images.packed_mask(name_of_image, values)
     else:
-        image = images.new_image(name_of_image, columns, rows, floats=True)
+        image = bpy.data.images.new(name_of_image, columns, rows, alpha=False, float_buffer=True, is_data=True)
         images.fill(image, values.astype(np.float32))
         image.pack()
     image.colorspace_settings.name = "Non-Color"  # numbers to look up, no picture
-    modifier = modifier_of(thing, name)
     if modifier is None:
         modifier = thing.modifiers.new(label, "NODES")
         thing.modifiers.move(len(thing.modifiers) - 1, 0)  # before a style that shows it
-    old = modifier.node_group
     modifier.node_group = _group(label, name, image, first, step, column)
-    if old is not None and old.users == 0:
-        bpy.data.node_groups.remove(old)
+
+
+def _remove_group(group: bpy.types.NodeTree | None) -> None:
+    """Remove a modifier's group and its image, unless a copied object has them too."""
+    if group is None or group.users > 1:
+        return
+    held = [socket.default_value for node in group.nodes for socket in node.inputs if socket.type == "IMAGE"]
+    bpy.data.node_groups.remove(group)
+    for image in filter(None, held):
+        if image.users == 0:
+            bpy.data.images.remove(image)
 
 
 def modifier_of(thing: bpy.types.Object, name: str) -> bpy.types.Modifier | None:

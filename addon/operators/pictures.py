@@ -19,15 +19,17 @@ from . import view
 
 FAST = "fast"
 _STILL = 1e-7  # m, of displacements that are read back from float32 coordinates
-_drawn: tuple[str, np.ndarray, str] | None = None  # what the picture shows: the gel's name, its displacement, its unit
-_renderers: dict[str, Renderer] = {}  # one at most: the frames of an animation share it
+_RENDERERS = 4  # kept at most: the frames of an animation share them
+_drawn: dict[str, tuple[str, np.ndarray, str]] = {}  # what an image shows: the gel's name, its displacement, its unit
+_renderers: dict[str, Renderer] = {}
 
 
 def renderer_of(unit: Calibration) -> Renderer:
     """Return the fast renderer of a unit."""
     key = repr(unit)  # a calibration holds tables, which have no hash
     if key not in _renderers:
-        _renderers.clear()
+        if len(_renderers) == _RENDERERS:
+            _renderers.clear()
         _renderers[key] = Renderer(unit, FAST)
     return _renderers[key]
 
@@ -123,18 +125,19 @@ def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str = 
 def follow(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Draw the fast picture where the scene shows something else than it was drawn of. Raises as ``draw`` does."""
     shown, moved = shown_state(gel, depsgraph)
-    known = _drawn is not None and (_drawn[0], _drawn[2]) == (gel.name, repr(shown.unit))
-    if known and moved.shape == _drawn[1].shape and np.abs(moved - _drawn[1]).max() <= _STILL:
-        return
-    _show(gel, shown, moved, FAST)
+    image = images.image_of(gel, "picture")
+    name, before, unit = _drawn.get("" if image is None else image.name, ("", moved, ""))
+    same = (name, unit) == (gel.name, repr(shown.unit)) and moved.shape == before.shape
+    if not same or np.abs(moved - before).max() > _STILL:
+        _show(gel, shown, moved, FAST)
 
 
 def _show(gel: bpy.types.Object, shown: digit_unit.ShownUnit, moved: np.ndarray, preset: str) -> bpy.types.Image:
-    global _drawn
     picture, heights = _drawn_of(shown, moved, preset)
-    images.show_heights(gel, heights)
-    _drawn = gel.name, moved, repr(shown.unit)
-    return images.show_picture(gel, picture)
+    images.show(gel, "heights", heights)
+    image = images.show(gel, "picture", picture)
+    _drawn[image.name] = gel.name, moved, repr(shown.unit)
+    return image
 
 
 def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: bpy.types.Object) -> None:
@@ -145,13 +148,6 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
         operator.report({"WARNING"}, reports.in_blender(str(error)))
 
 
-def shown_gel(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the gel whose picture was drawn last, else ``properties.gel_of`` the scene; None without a gel."""
-    last = None if _drawn is None else scene.objects.get(_drawn[0])
-    return last if last is not None and last.tactile.role == "DIGIT" else properties.gel_of(scene)
-
-
 def forget() -> None:
-    """Forget the state that the picture was drawn of, so that ``follow`` draws again: another file was opened."""
-    global _drawn
-    _drawn = None
+    """Forget the states that pictures were drawn of, so that ``follow`` draws again: another file was opened."""
+    _drawn.clear()

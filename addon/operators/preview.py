@@ -30,23 +30,22 @@ def failure() -> str:
 
 
 def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Draw the picture again where the scene shows something else than it was drawn of."""
+    """Draw each gel's picture again where the scene shows something else than it was drawn of."""
     global _failed, _drawing
-    gel = pictures.shown_gel(scene)
-    if gel is None or _drawing or not (_live or images.picture_of(gel)):
-        _failed = _failed if _drawing else ""
+    if _drawing:
         return
-    _drawing = True
-    try:
-        if _live:
-            pictures.update(gel, depsgraph, render_settings.preset_of(scene))
-        else:
-            pictures.follow(gel, depsgraph)
-        _failed = ""
-    except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
-        _failed = reports.in_blender(str(error))
-    finally:
-        _drawing = False
+    _drawing, failed = True, []
+    for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
+        try:
+            if images.image_of(gel, "picture") is None:
+                continue
+            if _live:
+                pictures.update(gel, depsgraph, render_settings.preset_of(scene))
+            else:
+                pictures.follow(gel, depsgraph)
+        except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
+            failed.append(reports.in_blender(str(error)))
+    _drawing, _failed = False, "; ".join(failed)
 
 
 @persistent

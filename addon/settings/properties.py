@@ -122,6 +122,8 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
         " pictures of this engine. 0: the calibration's", min=0.0, max=1.0, default=0.0, options={"ANIMATABLE"},
         update=lambda about, _context: about.id_data.update_tag(),  # else Blender takes no notice
     )  # fmt: skip
+    picture: bpy.props.PointerProperty(name="Picture", description="Of this gel", type=bpy.types.Image)
+    heights: bpy.props.PointerProperty(name="Height Map", description="Of this gel, mm", type=bpy.types.Image)
     largest: bpy.props.FloatProperty(
         name="Largest", description="Largest displacement of the animation, metres", default=0.0, min=0.0
     )

@@ -76,7 +76,7 @@ def arrange(window: bpy.types.Window) -> None:
     picture = _split(window, kept, "VERTICAL", _LEFT, "IMAGE_EDITOR")
     _split(window, picture, "HORIZONTAL", _BELOW, "PROPERTIES")
     gel = properties.gel_of(window.scene)
-    picture.spaces.active.image = None if gel is None else images.picture_of(gel)
+    picture.spaces.active.image = None if gel is None else images.image_of(gel, "picture")
     with bpy.context.temp_override(window=window):
         view.open_tab(bpy.context)
         view.look_again(bpy.context)

@@ -59,3 +59,21 @@ def test_an_opened_file_draws_the_frame_it_opens_on(follow, tmp_path):
     resting = follow()
     assert np.abs(pressed - resting).max() > 0.05  # ten levels
     np.testing.assert_allclose(follow(first), pressed, atol=1 / 255)
+
+
+def test_each_gel_has_a_picture_of_its_own(follow, imported, part):
+    first = follow()
+    second = imported(frames="100:120", first_frame=-30)
+    bpy.ops.tactile.translate()
+    gels = [thing for thing in bpy.context.scene.objects if thing.tactile.role == "DIGIT"]
+    gels[0].name = "mine"
+    copy = gels[0].copy()
+    second.users_collection[0].objects.link(copy)
+    assert part("addon.objects.images").image_of(copy, "picture") is None
+    follow(70)
+    shown = [np.array(gel.tactile.picture.pixels[:]).reshape(-1, 4)[:, :3] for gel in gels]
+    depsgraph, draw = bpy.context.evaluated_depsgraph_get(), part("addon.operators.pictures").draw
+    for gel, pixels in zip(gels, shown, strict=True):
+        np.testing.assert_allclose(pixels, draw(gel, depsgraph, "fast")[0][::-1].reshape(-1, 3) / 255, atol=1e-6)
+    assert np.abs(shown[0] - shown[1]).max() > 0.05 < np.abs(shown[0] - first).max()
+    assert gels[0].tactile.heights != gels[1].tactile.heights
