@@ -46,11 +46,32 @@ def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
     return found
 
 
-def sensor_of(context: bpy.types.Context) -> bpy.types.Object:
-    """Return the sensor that places refer to: the gel, else the skin. Raises TactileError."""
-    found = properties.gel_of(context.scene) or properties.of_role(context.scene, "BIOTAC")
-    if found is None:
+def sensors_for(scene: bpy.types.Scene, near: bpy.types.Object | None) -> list[bpy.types.Object]:
+    """List the sensors that an indenter ``near`` them presses, one of each name, skins before gels: those of its
+    collections first, and an imported recording's only without others."""
+    homes = () if near is None else {*near.users_collection, *(near.parent or near).users_collection}
+    beside = {thing for group in homes for thing in group.objects}
+    there = [thing for role in ("BIOTAC", "DIGIT") for thing in scene.objects if thing.tactile.role == role]
+    own = [thing for thing in there if thing in beside or not _plays_recording(thing)] or there
+    found: dict[str, bpy.types.Object] = {}
+    for thing in sorted(own, key=lambda thing: (thing.tactile.role, thing not in beside)):
+        found.setdefault(properties.sensor_name(thing), thing)
+    return list(found.values())
+
+
+def _plays_recording(sensor: bpy.types.Object) -> bool:
+    return any(thing.tactile.known for thing in properties.home_of(sensor).objects)
+
+
+def sensor_of(context: bpy.types.Context, near: bpy.types.Object | None) -> bpy.types.Object:
+    """Return the sensor that places of an indenter ``near`` it refer to: the gel (of several the scene camera's), else
+    the skin. Raises TactileError."""
+    there = sensors_for(context.scene, near)
+    if not there:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
+    gels = [thing for thing in there if thing.tactile.role == "DIGIT"]
+    seen = properties.gel_of(context.scene)
+    found = seen if seen in gels else (gels or there)[0]
     motion.check_rest(found)
     return found
 
@@ -59,7 +80,8 @@ def authored(context: bpy.types.Context) -> Authored:
     """Return the scene as Blender has it now. Raises TactileError for what cannot be simulated."""
     from ...tactile_core.simulation.scene import Scene
 
-    thing, sensor, scene = indenter_of(context), sensor_of(context), context.scene
+    thing, scene = indenter_of(context), context.scene
+    sensor = sensor_of(context, thing)
     properties.check_format(thing)
     if not thing.visible_get():  # then it does not move
         advice = "Show it (Alt H)"

@@ -18,7 +18,7 @@ from ..settings import kept_files, properties, render_settings
 from ..settings.reports import require
 from . import pictures, scene_bridge, set_style
 from .job_operator import JobOperator
-from .scene_bridge import motion_of, sensor_of
+from .scene_bridge import motion_of, sensor_of, sensors_for
 
 STANDING = "{} simulated"
 MOVED = "moved "  # before a sensor's name, in a worker's result
@@ -44,16 +44,6 @@ class Result:
     picked: tuple[str, ...]
 
 
-def sensors_in(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """List the scene's sensors, the first of each name, skins before gels."""
-    found: dict[str, bpy.types.Object] = {}
-    for role in ("BIOTAC", "DIGIT"):
-        for thing in scene.objects:
-            if thing.tactile.role == role:
-                found.setdefault(properties.sensor_name(thing), thing)
-    return list(found.values())
-
-
 def read(folder: Path) -> Result:
     """Read the result that the simulation wrote into a job's folder."""
     with np.load(folder / "result.npz") as stored:
@@ -72,7 +62,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
     sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
     sentences = [*result.picked]
     force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
-    for sensor in sensors_in(scene):
+    for sensor in sensors_for(scene, thing):
         moved = result.moved.get(properties.sensor_name(sensor))
         if moved is None:  # it was added while the other process worked
             continue
@@ -88,7 +78,7 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) ->
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
     """Add a solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires.
     frames : (F,) of the scene; sample : (F,) int, the moment of the result that each shows"""
-    sensor = sensor_of(context)
+    sensor = sensor_of(context, thing)
     name = STANDING.format(thing.name)
     twin = context.scene.objects.get(name)
     if twin is None:
@@ -124,11 +114,11 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     curves.write_curves(twin, "rotation_quaternion", frames, np.array([q[:] for q in quaternions]))
 
 
-def _outputs(scene: bpy.types.Scene) -> list[str]:
-    """List the outputs for the sensors of a scene: one that is not there is not solved."""
+def _outputs(pressed: list[bpy.types.Object]) -> list[str]:
+    """List the outputs for the sensors that are pressed: one that is not there is not solved."""
     from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 
-    there = list(map(properties.sensor_name, sensors_in(scene)))
+    there = list(map(properties.sensor_name, pressed))
     return ["electrodes"] * (ELECTRODES_OF in there) + [f"displacement_{sensor}" for sensor in there]
 
 
@@ -143,7 +133,7 @@ class TACTILE_OT_simulate(JobOperator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return true where there are a sensor and what presses it."""
-        return properties.can(cls, lambda: (scene_bridge.indenter_of(context), scene_bridge.sensor_of(context)))
+        return properties.can(cls, lambda: sensor_of(context, scene_bridge.indenter_of(context)))
 
     stopped = "Simulation stopped; the scene is as it was"
 
@@ -152,20 +142,21 @@ class TACTILE_OT_simulate(JobOperator):
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene import write_scene
 
-        sensors = sensors_in(context.scene)
-        properties.check_own(*sensors)
-        motion.check_rest(*sensors)
+        thing = scene_bridge.indenter_of(context)
+        pressed = sensors_for(context.scene, thing)
+        properties.check_own(*pressed)
+        motion.check_rest(*pressed)
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")
-        self._thing = scene_bridge.indenter_of(context).name
+        self._thing = thing.name
         self._folder = JobFolder()
         write_scene(self._folder.path, found.scene, found.meshes)
         if found.apexes is not None:
             np.savez(self._folder.path / "heights.npz", apex=found.apexes)
         bound = render_settings.budget_of(context.scene).um
-        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(context.scene), um=bound,
-                        placed_on=properties.sensor_name(scene_bridge.sensor_of(context)),
+        self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(pressed), um=bound,
+                        placed_on=properties.sensor_name(sensor_of(context, thing)),
                         first_frame=context.scene.frame_start, rate=scene_bridge.rate_of(context.scene))  # fmt: skip
 
     def finish(self, context: bpy.types.Context) -> None:
@@ -175,24 +166,24 @@ class TACTILE_OT_simulate(JobOperator):
             raise TactileError(self._thing, "no longer in the scene", "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result)
-        self._keep(context)
-        gel = properties.gel_of(context.scene)
-        if gel is not None:
-            pictures.show_result(self, context, gel)
+        self._keep(context, thing)
+        sensor = sensor_of(context, thing)
+        if sensor.tactile.role == "DIGIT":
+            pictures.show_result(self, context, sensor)
         self.report({"INFO"}, summary)
         if not result.force.any():
             words = "touched no sensor: press with it lower, or select the indenter that presses"
             self.report({"WARNING"}, f"{self._thing} {words}")
 
-    def _keep(self, context: bpy.types.Context) -> None:
+    def _keep(self, context: bpy.types.Context, thing: bpy.types.Object) -> None:
         """Save the simulated recording beside the .blend, so that it can be translated like a real one.
 
         Of a file that was never saved it is kept by Blender until the file is, see ``kept_files``.
         """
         from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 
-        there = sensors_in(context.scene)
-        skin = next((thing for thing in there if properties.sensor_name(thing) == ELECTRODES_OF), None)
+        there = sensors_for(context.scene, thing)
+        skin = next((each for each in there if properties.sensor_name(each) == ELECTRODES_OF), None)
         if skin is None:
             return
         path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(self._thing)}.h5"

@@ -19,15 +19,16 @@ from ..settings.reports import TactileOperator, require
 from .scene_bridge import indenter_of, sensor_of
 
 
-def depth_of(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float | None:
+def depth_of(context: bpy.types.Context, thing: bpy.types.Object) -> float | None:
     """Compute how far an indenter stands below its point of first touch, m; negative above it.
 
-    None for a mesh of the user's, whose distances take too long for a panel, and where it meets no gel.
+    None for a mesh of the user's, whose distances take too long for a panel, and where it meets no sensor.
     """
     if not thing.tactile.spec:
         return None
     try:
-        place = _place(thing, sensor, depsgraph)
+        sensor = sensor_of(context, thing)
+        place = _place(thing, sensor, context.evaluated_depsgraph_get())
         name, (x, z) = properties.sensor_name(sensor), np.round(place[[0, 2]], 7)
         apex, direction = _touch(name, thing.tactile.spec, x, z, thing.tactile.tilt)
     except TactileError:
@@ -75,7 +76,8 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
 
     def _work(self, context: bpy.types.Context) -> None:
         require("msgspec")
-        thing, sensor = indenter_of(context), sensor_of(context)
+        thing = indenter_of(context)
+        sensor = sensor_of(context, thing)
         properties.check_own(thing)
         depsgraph = context.evaluated_depsgraph_get()
         place = _place(thing, sensor, depsgraph)

@@ -88,7 +88,7 @@ class TACTILE_OT_add_indenter(TactileOperator):
 
         from ...tactile_core.simulation.indenter_specs import IndenterSpec
 
-        sensor = sensor_of(context)
+        sensor = sensor_of(context, context.object)
         sizes = {}
         for size in FORMS[self.shape].sizes.values():
             if size.slider:
@@ -119,7 +119,8 @@ class TACTILE_OT_use_as_indenter(TactileOperator):
         return True
 
     def _work(self, context: bpy.types.Context) -> None:
-        thing, sensor = context.object, sensor_of(context)
+        thing = context.object
+        sensor = sensor_of(context, thing)
         indenter_objects.check_pose(thing, indenter_objects.world_axes(thing, sensor))
         about = properties.set_up(thing, "INDENTER", sensor.tactile.per_metre)
         about.spec = ""

@@ -199,9 +199,8 @@ def _indenter(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy
 
 def _depth(column: bpy.types.UILayout, context: bpy.types.Context, thing: bpy.types.Object) -> None:
     """Draw how deep an indenter stands in the resting gel on this frame, and the button that puts it there."""
-    sensor = properties.gel_of(context.scene) or properties.of_role(context.scene, "BIOTAC")
-    if sensor is not None and not missing("msgspec"):
-        depth = snap_to_gel.depth_of(thing, sensor, context.evaluated_depsgraph_get())
+    if not missing("msgspec"):
+        depth = snap_to_gel.depth_of(context, thing)
         if depth is not None:
             side = "above" if depth < 0 else "below"
             column.label(text=f"{1e3 * abs(depth):.2f} mm {side} the resting gel", icon="DRIVER_DISTANCE")

@@ -331,9 +331,35 @@ def test_a_cancelled_worker_is_gone(part, tmp_path):
     assert job._process.poll() is not None
 
 
+def _outputs(scene, part):
+    return part("addon.operators.simulate")._outputs(part("addon.operators.scene_bridge").sensors_for(scene, None))
+
+
+def test_an_authored_press_leaves_an_imported_recording_alone(imported, scene, nodes_of):
+    skin = imported(frames="70:90")
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    gel = bpy.context.object
+    gel.location = (0, 90, 0)
+    _press(scene)
+    ball = bpy.context.object
+    bpy.context.view_layer.objects.active = skin
+    bpy.ops.tactile.translate()
+    bpy.ops.tactile.set_up_render()
+    recorded = skin, next(thing for thing in skin.users_collection[0].objects if thing.tactile.role == "DIGIT")
+    assert scene.camera.parent == recorded[1] != gel
+    before = [nodes_of(thing) for thing in recorded]
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    assert ball.parent == gel == scene.objects["sphere simulated"].parent
+    bpy.context.view_layer.update()
+    assert all((nodes_of(thing) == nodes).all() for thing, nodes in zip(recorded, before, strict=True))
+    scene.frame_set(3)
+    assert gel["force"][2] == pytest.approx(-0.1, rel=0.05)
+
+
 def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
-    assert part("addon.operators.simulate")._outputs(scene) == ["displacement_digit"]
+    assert _outputs(scene, part) == ["displacement_digit"]
     _press(scene)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     scene.frame_set(3)
@@ -365,7 +391,7 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_
 
 def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
-    assert part("addon.operators.simulate")._outputs(scene) == ["electrodes", "displacement_biotac"]
+    assert _outputs(scene, part) == ["electrodes", "displacement_biotac"]
     _press(scene)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     scene.frame_set(3)
@@ -395,13 +421,12 @@ def _press(scene):
 @pytest.mark.parametrize("shape", ["sphere", "box"])
 def test_an_indenter_snaps_to_the_gel_and_its_depth_is_read(sensors, part, shape):
     bpy.ops.tactile.add_indenter(shape=shape)
-    thing, gel = bpy.context.object, sensors.objects["DIGIT gel"]
-    depth = part("addon.operators.snap_to_gel").depth_of
-    assert depth(thing, gel, bpy.context.evaluated_depsgraph_get()) < 0
+    thing, depth = bpy.context.object, part("addon.operators.snap_to_gel").depth_of
+    assert depth(bpy.context, thing) < 0
     for wanted in (0.0, 0.4):
         assert bpy.ops.tactile.snap_to_gel(depth=wanted) == {"FINISHED"}
         # A micrometre: float32 locations of some tens of millimetres.
-        assert 1e3 * depth(thing, gel, bpy.context.evaluated_depsgraph_get()) == pytest.approx(wanted, abs=1e-3)
+        assert 1e3 * depth(bpy.context, thing) == pytest.approx(wanted, abs=1e-3)
 
 
 def test_friction_and_tilt_reach_the_scene_file(sensors, part, tmp_path):

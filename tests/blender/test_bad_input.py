@@ -25,6 +25,23 @@ def test_renamed_parts_are_known_by_their_roles(translated, part):
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
 
 
+def test_a_renamed_gel_keeps_its_contact_patch(translated, imported, nodes_of):
+    def patch(gel):
+        held = gel.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.attributes["contact_patch"]
+        return [each.value for each in held.data]
+
+    bpy.context.scene.frame_set(85)
+    before, translated.name = patch(translated), "mine"
+    copy = translated.copy()
+    bpy.context.scene.collection.objects.link(copy)
+    imported(frames="0:20")
+    bpy.ops.tactile.translate()
+    bpy.ops.tactile.translate()  # replaces its own
+    bpy.context.scene.frame_set(85)
+    assert any(before) and patch(translated) == before == patch(copy)
+    assert sum("contact patch" in image.name for image in bpy.data.images) == 2
+
+
 def test_a_deleted_gel_comes_back_with_its_body(translated):
     skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
     for thing in (*translated.children_recursive, translated):
@@ -107,7 +124,7 @@ def test_a_gel_scaled_to_nothing_is_named(translated, part):
     with pytest.raises(part("tactile_core.errors").TactileError, match="DIGIT gel: a scale of 0"):
         part("addon.operators.pictures").draw(translated, bpy.context.evaluated_depsgraph_get(), "fast")
     depth_of = part("addon.operators.snap_to_gel").depth_of
-    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is None  # the panel goes on
+    assert depth_of(bpy.context, ball) is None  # the panel goes on
 
 
 def test_the_panel_goes_on_where_the_indenter_meets_no_gel(translated, part):
@@ -115,10 +132,10 @@ def test_the_panel_goes_on_where_the_indenter_meets_no_gel(translated, part):
     bpy.ops.tactile.add_indenter(shape="sphere")
     ball = bpy.context.object
     depth_of = part("addon.operators.snap_to_gel").depth_of
-    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is not None
+    assert depth_of(bpy.context, ball) is not None
     ball.location.x += 200
     bpy.context.view_layer.update()
-    assert depth_of(ball, translated, bpy.context.evaluated_depsgraph_get()) is None
+    assert depth_of(bpy.context, ball) is None
 
 
 def test_what_lay_beside_a_moved_file_is_named(imported, tmp_path, part):
