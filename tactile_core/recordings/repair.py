@@ -14,7 +14,7 @@ END_LIMIT = 100.0  # counts, for glitches at the ends, where only one side can b
 FLATNESS = 1 / 3  # of the jump: how far a glitch's samples and the levels around it may differ (assumed)
 LEVEL = 10.0  # counts that the level may have moved during any glitch, whatever its size (assumed)
 STEEPER = 3.0  # times the jump must exceed the calmer neighbouring step: a steep press is steep on both sides (assumed)
-ALONE = 3  # electrodes that jump together in a stuck run; a real contact moves most of the 19 (assumed)
+ALONE = 3  # electrodes that step by `LEVEL` together in a stuck run; a real contact moves most of the 19 (assumed)
 ROUNDS = 12  # glitches within glitches are peeled off one by one; a backstop
 TOGETHER = 0.02  # share by which electrodes that fade together may differ; in a contact they differ more (assumed)
 MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothing is repaired (assumed)
@@ -42,8 +42,8 @@ def find_glitches(values: np.ndarray) -> np.ndarray:
     ends with one in the opposite direction. The level after it is the one before it, and its own samples lie on one
     level, both within a third of the jump. The jumps are three times as steep as the calmer of the two steps just
     outside. It is not itself the return, between two glitches, to the level of the second around it. It lasts at most 5
-    samples, or at most 50 where no more than 3 electrodes jump with it (a bit stuck in one channel; seen in mat5_50 of
-    the slide set).
+    samples, or at most 50 where no more than 3 electrodes step by 10 counts (a bit stuck in one channel; seen in
+    mat5_50 of the slide set).
     A press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
     is not flat; a contact within one single sample (10 ms) looks like a glitch. At the start and end of a recording
     only one jump can be seen; there it must exceed 100 counts, within 3 samples. The search ends where the rows are
@@ -146,11 +146,13 @@ def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
     """Mark (T, C) bool runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level.
     values : (T, C) counts; jumping : (k,) int, columns to search"""
     found = np.zeros(values.shape, bool)
-    large = np.array([np.abs(np.diff(values[:, j].astype(float))) > LIMIT for j in jumping])
-    alone = large.sum(axis=0) <= ALONE
-    for j, jumps in zip(jumping, large, strict=True):
+    together = np.zeros(len(values) - 1, int)
+    for column in values.T if len(jumping) else ():
+        together += np.abs(np.diff(column.astype(float))) > LEVEL
+    for j in jumping:
         column, ended = values[:, j].astype(float), -1
-        for start, end, around in _opposite_jumps(column, np.flatnonzero(jumps & alone)):
+        jumps = (np.abs(np.diff(column)) > LIMIT) & (together <= ALONE)
+        for start, end, around in _opposite_jumps(column, np.flatnonzero(jumps)):
             samples = column[start : end + 2, None]
             if start != ended and _is_flat_jump(samples, around)[0] and _leaves_usual(column, start, end + 1):
                 found[start + 1 : end + 1, j] = True
