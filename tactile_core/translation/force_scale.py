@@ -25,6 +25,7 @@ LAGS = np.round(np.arange(-1, 1.001, 0.01), 2)  # s, of the force behind the ele
 # Least correlation of measured and translated force of one touch, at the best lag: against the shipped recording's 180
 # frames noise reaches .24, the time itself .33.
 TOGETHER = 0.4
+UNTOUCHED = 0.3  # share of the force in contact that a sensor may show without contact; more was not tared (assumed)
 PARTS = 8  # of the frames; the scatter of their scales gives the scale's error
 
 
@@ -110,6 +111,10 @@ def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: 
     if min(first.sum(), second.sum()) < FEWEST_FRAMES:
         found = f"{first.sum()} and {second.sum()} frames in contact in the two halves"
         raise TactileError(where, found, f"at least {FEWEST_FRAMES} each", "Use a longer recording")
+    idle, touching = force[np.isfinite(force) & (translated == 0)], float(np.median(force[known]))
+    if len(idle) >= FEWEST_FRAMES and np.median(idle) > UNTOUCHED * touching:
+        found = f"{np.median(idle):.2g} N where nothing touches, {touching:.2g} N in contact"
+        raise TactileError(where, found, "no force without contact", "Take its reading without contact off each column")
     scale = _scale(translated[first], force[first])
     if not LEAST <= scale <= MOST:
         found = f"{scale:.3g} times the translated force: not newtons, or not of this finger"

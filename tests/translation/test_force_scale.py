@@ -55,6 +55,14 @@ def test_what_no_unit_has_is_refused(translated, scale, said):
         fitted(translated, scale)
 
 
+def test_a_force_that_was_not_tared_is_refused():
+    """At once 1 N too much, it would be a stiffness of 1.9."""
+    translated = np.maximum(FORCE - 2, 0)
+    assert force_scale.fit(translated, lambda by: np.interp(TIME + by, TIME, 1.2 * translated), "f.csv").better
+    with pytest.raises(TactileError, match=r"f.csv: 1 N where nothing touches, .* N in contact; .*Take its reading"):
+        force_scale.fit(translated, lambda by: np.interp(TIME + by, TIME, translated + 1), "f.csv")
+
+
 def test_force_and_pressure_are_scaled_and_signals_stay(shipped):
     translator = load_translator(answer=Answer(samples=3))
     signals = prepare(shipped).at(slice(60, 120))
