@@ -20,14 +20,18 @@ class NearTriangles:
         cell = max(cell, float(_sides(triangles).max(axis=1).sum()) / _LONGEST)
         pieces, self._owner = _pieces(triangles, cell / np.sqrt(2))  # their diagonals are then about as long as a cell
         self.middles = pieces.mean(axis=1)
-        self._reach = np.linalg.norm(pieces - self.middles[:, None], axis=2).max()
         self._cell, self._origin = cell, pieces.min(axis=(0, 1))
         self._triangles = np.ascontiguousarray((triangles - self._origin) / cell)
         place = np.floor((self.middles - self._origin) / cell).astype(np.int64)
         self._shape = place.max(axis=0) + 1
         flat = np.ravel_multi_index(tuple(place.T), tuple(self._shape))
-        order = np.lexsort((self._owner, flat))
+        order = np.argsort(flat, kind="stable")
         flat, self._members = flat[order], self._owner[order]
+        around = np.linalg.norm(pieces - self.middles[:, None], axis=2).max(axis=1)
+        self._reach, normals = around.max(), np.cross(*np.moveaxis(np.diff(triangles, axis=1), 1, 0))
+        normals /= np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)[:, None]
+        places = np.column_stack([self.middles - self._origin, around]) / cell
+        self._discs = np.column_stack([places, normals[self._owner]])[order]
         self._starts = np.searchsorted(flat, np.arange(np.prod(self._shape) + 1))
         self._boxes = np.zeros((np.prod(self._shape), 2, 3))
         first = np.flatnonzero(np.diff(flat, prepend=-1))
@@ -40,16 +44,13 @@ class NearTriangles:
         if not available():
             return self._by_tree(points, bound)
         farthest = int(np.ceil(bound / self._cell)) + 1  # a piece reaches into the next cell
-        along = np.arange(-farthest, farthest + 1)
-        steps = np.stack(np.meshgrid(along, along, along, indexing="ij"), axis=-1).reshape(-1, 3)
-        steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
         places = (points - self._origin) / self._cell
         cells = np.floor(places).astype(np.int64)
-        order = np.lexsort(cells.T)  # neighbours share what is looked up
+        order = np.argsort(cells @ [2**42, 2**21, 1], kind="stable")  # neighbours share what is looked up
         squares = np.empty(len(points))
         squares[order] = _least_squares(
-            places[order], cells[order], self._triangles, self._starts, self._members, self._boxes, self._shape, steps,
-            (bound / self._cell) ** 2,
+            places[order], cells[order], self._triangles, self._starts, self._members, self._discs, self._boxes,
+            self._shape, farthest, (bound / self._cell) ** 2,
         )  # fmt: skip
         return self._cell * np.sqrt(squares)
 
@@ -101,41 +102,70 @@ def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarr
 
 
 @functools.partial(Loop, waits=False)  # many cells and triangles for each of few points
-def _least_squares(places, cells, triangles, starts, members, boxes, shape, steps, bound):  # noqa: ANN001, ANN202
+def _least_squares(places, cells, triangles, starts, members, discs, boxes, shape, farthest, bound):  # noqa: ANN001, ANN202
     """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on, squared too; unit:
     cells.
 
-    Cells are visited by ``steps`` (q, 3) from a place's own, where the box (2, 3) of what they hold is near enough. A
-    foot inside the triangle gives the distance to its plane, any other the distance to its nearest edge."""
+    The piece nearest to the place before comes first, then those, in cells at most ``farthest`` from a place's own,
+    whose cell's box (2, 3) and whose disc (middle, radius, normal) are nearer than what was found. Boxes are first
+    measured from the first place of a cell: others are nearer by no more than they are from that place. A foot inside
+    the triangle gives the distance to its plane, any other the distance to its nearest edge."""
     squares, normal, arm, edge = np.empty(len(places)), np.empty(3), np.empty(3), np.empty(3)
-    around, count = np.empty(len(steps), np.int64), 0
+    most = (2 * farthest + 1) * (2 * farthest + 1) * (2 * farthest + 1)
+    around, aways = np.empty(most, np.int64), np.empty(most)
+    seen, first, count, nearest = np.full(len(triangles), -1), 0, 0, 0
+    low, high = np.empty(3, np.int64), np.empty(3, np.int64)
     for p in range(len(places)):
-        same = p > 0
+        same, moved = p > 0, 0.0
         for a in range(3):
-            same = same and cells[p, a] == cells[p - 1, a]
+            same = same and cells[p, a] == cells[first, a]
         if not same:
-            count = 0
-            for q in range(len(steps)):
-                cell, within = 0, True
-                for a in range(3):
-                    at = cells[p, a] + steps[q, a]
-                    within = within and 0 <= at < shape[a]
-                    cell = cell * shape[a] + at
-                if within and starts[cell] < starts[cell + 1]:
-                    around[count] = cell
-                    count += 1
-        best = bound
-        for q in range(count):
-            cell = around[q]
-            away = 0.0
+            first, count = p, 0
             for a in range(3):
-                outside = max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0)
-                away += outside * outside
-            if away >= best:
-                continue
-            for m in range(starts[cell], starts[cell + 1]):
-                if m > starts[cell] and members[m] == members[m - 1]:
+                low[a], high[a] = max(cells[p, a] - farthest, 0), min(cells[p, a] + farthest + 1, shape[a])
+            for i in range(low[0], high[0]):
+                for j in range(low[1], high[1]):
+                    row = (i * shape[1] + j) * shape[2]
+                    if high[2] <= low[2] or starts[row + low[2]] == starts[row + high[2]]:
+                        continue
+                    for cell in range(row + low[2], row + high[2]):
+                        if starts[cell] == starts[cell + 1]:
+                            continue
+                        away = 0.0
+                        for a in range(3):
+                            beyond = max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0)
+                            away += beyond * beyond
+                        around[count], aways[count] = cell, np.sqrt(away)
+                        count += 1
+        for a in range(3):
+            moved += (places[p, a] - places[first, a]) * (places[p, a] - places[first, a])
+        moved, best, least = np.sqrt(moved), bound, np.sqrt(bound)
+        for q in range(-1, count):
+            start, end = nearest, nearest + 1
+            if q >= 0:
+                if aways[q] >= least + moved:
                     continue
+                cell, away = around[q], 0.0
+                for a in range(3):
+                    beyond = max(boxes[cell, 0, a] - places[p, a], places[p, a] - boxes[cell, 1, a], 0.0)
+                    away += beyond * beyond
+                if away >= best:
+                    continue
+                start, end = starts[cell], starts[cell + 1]
+            for m in range(start, end):
+                if seen[members[m]] == p:
+                    continue
+                away, reach, height = 0.0, least + discs[m, 3], 0.0
+                for a in range(3):
+                    beyond = places[p, a] - discs[m, a]
+                    away += beyond * beyond
+                    height += beyond * discs[m, 4 + a]
+                if away >= reach * reach:
+                    continue
+                beside = np.sqrt(max(away - height * height, 0.0)) - discs[m, 3]
+                if height * height + max(beside, 0.0) * beside >= best:
+                    continue
+                seen[members[m]] = p
                 corners = triangles[members[m]]
                 for a in range(3):
                     b, c = (a + 1) % 3, (a + 2) % 3
@@ -164,5 +194,7 @@ def _least_squares(places, cells, triangles, starts, members, boxes, shape, step
                         height += normal[a] * arm[a]
                         area += normal[a] * normal[a]
                     best = min(best, height * height / area)
+                if best < least * least:
+                    least, nearest = np.sqrt(best), m
         squares[p] = best if best < bound else np.inf
     return squares

@@ -27,7 +27,7 @@ def test_uncompiled_grids_are_the_same(compiled_loops):
     grids = []
     for on in (True, False):
         compiled_loops(on)
-        grids.append(mesh_grid.build(ring, "ring", 0.2e-3))
+        grids.append(mesh_grid.build(ring, "ring", 0.2e-3)[0])
     # m; kept in four bytes
     np.testing.assert_allclose(grids[0].coefficients, grids[1].coefficients, rtol=1e-6, atol=1e-12)
 
