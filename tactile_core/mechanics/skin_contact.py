@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import sensors
-from ..errors import TactileError
+from ..errors import TactileError, numbers
 from ..geometry.indenters import Indenter, Sphere
 from ..geometry.indenters.indenter import tangents
 from ..sensors.unrolling import roll_up, unrolled_nodes
@@ -179,9 +179,16 @@ def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -
 
 
 def _dent(displacement: np.ndarray) -> _Dent:
-    """Describe the dent of a skin under displacement (n, 3) m. Raises TactileError where nothing presses on the pad."""
-    outward = sensors.rest_normals(SENSOR)
+    """Describe the dent of a skin under displacement (n, 3) m. Raises TactileError where nothing presses on the pad,
+    and for another shape, sign, or values that are not finite."""
+    displacement, outward = numbers(displacement, "skin's displacement"), sensors.rest_normals(SENSOR)
+    if (other := displacement.shape != outward.shape) or not np.isfinite(displacement).all():
+        found = f"shape {displacement.shape}" if other else "values that are not finite"
+        raise TactileError("skin's displacement", found, f"{outward.shape} m, of one frame")
     inward = -np.einsum("ni,ni->n", displacement, outward)
+    if -inward.min() > inward.max():
+        found = f"up to {-1e3 * inward.min():.2f} mm out of the skin, {1e3 * inward.max():.2f} mm into it"
+        raise TactileError("skin's displacement", found, "a pressed skin", "Change its sign")
     traction = pressing_traction(SENSOR, displacement, inward > MAYBE * max(inward.max(), 0.0))
     pressure = np.maximum(-np.einsum("ni,ni->n", traction, outward), 0)
     places = unrolled_nodes(SENSOR)

@@ -25,6 +25,7 @@ from .solution import TIERS, OnDemand, Sensor, Solution, Step, Tier, centre_of_p
 
 _LIGHTEST = 1e-6  # N, least force: smaller ones are lost in rounding and the lattice's roughness
 _FARTHEST_SLIDE = 10e-3  # m, half of the gel
+FROM_INSIDE = 0.5  # cosine, 60 degrees, of a push to the outward normal where it first touches (assumed)
 
 
 def solve(
@@ -60,7 +61,12 @@ def solve(
     with needing("fem"):
         if isinstance(place, Pose):
             place.check("solve, place")
-            place = first_touch(sensors.sensor_surface(sensor), as_indenter(indenter), place)
+            surface, indenter = sensors.sensor_surface(sensor), as_indenter(indenter)
+            place = first_touch(surface, indenter, place)
+            node = int(np.argmin(place.distance(indenter, surface.rest)[0]))
+            if place.direction @ sensors.rest_normals(sensor)[node] > FROM_INSIDE:
+                found = f"a push along {place.direction.tolist()}, which comes from inside the sensor"
+                raise TactileError("solve, place", found, "a push into it", "Turn the pose, or change push's sign")
         return next(solve_path(sensor, indenter, place, [Step(depth, force)], tier, friction))
 
 

@@ -61,6 +61,22 @@ def test_a_skin_at_rest_is_refused_in_words():
         skin_contact(np.zeros_like(sensors.biotac_surface().rest))
 
 
+@pytest.mark.parametrize(
+    ("made", "said"),
+    [
+        (lambda skin: skin[1:], r"shape \(3649, 3\); expected \(3650, 3\)"),
+        (lambda skin: np.where(skin == skin.max(), np.nan, skin), "not finite"),
+        (lambda skin: -skin, "mm out of the skin, .*; expected a pressed skin. Change its sign"),
+        (lambda skin: np.ma.array(skin, mask=skin == skin.max()), "masked values"),
+    ],
+    ids=["shape", "nan", "sign", "masked"],
+)
+def test_what_is_no_pressed_skin_is_refused(made, said):
+    pressed = solve("biotac", Sphere(5e-3), Placement(-8e-3, 0.0), force=1.0)
+    with pytest.raises(TactileError, match=said):
+        skin_contact(made(pressed.displacement))
+
+
 def test_a_dent_deeper_than_any_body_goes_is_refused_in_words():
     pressed = solve("biotac", Sphere(5e-3), Placement(-8e-3, 0.0), force=1.0)
     with pytest.raises(TactileError, match="dent of 5"):
