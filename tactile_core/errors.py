@@ -59,9 +59,11 @@ def numbers(values: Any, where: str) -> Any:
     """Return values as an array of real numbers; raises TactileError, which names ``where``, for anything else."""
     import numpy as np
 
+    if np.ma.is_masked(values):
+        raise TactileError(where, "masked values", "a number at every place", "Fill them in, or leave the frame out")
     try:
         array = np.asarray(values)
-    except ValueError:  # rows of unequal length
+    except (ValueError, RuntimeError):  # rows of unequal length; a tensor that keeps gradients
         array = np.empty(0, object)
     if array.dtype.kind not in "biuf":
         raise TactileError(where, f"{values!r:.80}", "an array of real numbers")

@@ -183,6 +183,11 @@ def pulled():
     return np.where(np.arange(2867)[:, None] == 1400, [0, -0.2e-3, 0], 0)
 
 
+def from_behind():
+    """Return a pose whose push goes out of the gel."""
+    return Pose(np.array([-6e-3, 0, 0]), np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0, -1.0, 0]))
+
+
 BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
 
 
@@ -208,6 +213,10 @@ BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
         (lambda: tactile.Renderer(preset="fast").render([[1, 2], [3]]), "displacement: .*; expected an array of real"),
         (lambda: tactile.Renderer(preset="fast").render(pulled()), "0.20 mm out of the gel, 0.00 mm into it.*sign"),
         (lambda: tactile.Renderer(preset="fast").picture(3), r"radiance: shape \(\); expected \(320, 240, 3\)"),
+        (lambda: tactile.Renderer(preset="fast").picture(np.full((320, 240, 3), np.nan)), "radiance: .*not finite"),
+        (lambda: tactile.Renderer(preset="fast").picture(np.zeros((320, 240, 3)), 1), "noise: 1; expected a generator"),
+        (lambda: tactile.Renderer(preset="fast").render(np.ma.masked_less(pulled(), 0)), "displacement: masked values"),
+        (lambda: tactile.solve("digit", BALL, from_behind(), depth=1e-4), "solve, place: .* from inside the sensor"),
         (lambda: PrepareOptions(repair="no").check(), "option repair: 'no'; expected True or False"),
     ],
 )  # fmt: skip

@@ -172,9 +172,12 @@ class Renderer:
         radiance : (H, W, LED), of ``radiance``. The change passes the camera's toe and shoulder (``camera_curve``).
         noise : generator of the camera's noise, as measured on the unit; None for none
         marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
-        if np.shape(radiance) != self.rest_radiance.shape:
-            found = f"shape {np.shape(radiance)}"
+        radiance = numbers(radiance, "radiance")
+        if (other := radiance.shape != self.rest_radiance.shape) or not np.isfinite(radiance).all():
+            found = f"shape {radiance.shape}" if other else "values that are not finite"
             raise TactileError("radiance", found, f"{self.rest_radiance.shape}", "Renderer.radiance returns it")
+        if not isinstance(noise, np.random.Generator | None):
+            raise TactileError("noise", f"{noise!r:.80}", "a generator, or None", "Give numpy.random.default_rng(seed)")
         if self.dots is not None and marks is None:
             found = "a picture of heights alone, which do not say where the dots have moved"
             advice = "Call Renderer.render, or leave [markers] out"
