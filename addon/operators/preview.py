@@ -65,7 +65,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _opened(*_: object) -> None:
-    """Called when another file is open, whose picture may be of another frame than it opens on."""
+    """Called when another file is open, or after an undo: the picture may be of another frame, or gone."""
     pictures.forget()
     _frame_changed(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
 
@@ -120,6 +120,7 @@ def unregister() -> None:
 CLASSES = (TACTILE_OT_live_picture,)
 HANDLERS = (
     (bpy.app.handlers.save_pre, _keep_images), (bpy.app.handlers.load_pre, _end),
-    (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.frame_change_post, _frame_changed),
+    (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.undo_post, _opened),
+    (bpy.app.handlers.redo_post, _opened), (bpy.app.handlers.frame_change_post, _frame_changed),
     (bpy.app.handlers.depsgraph_update_post, _changed),
 )  # fmt: skip

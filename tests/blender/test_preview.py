@@ -61,6 +61,17 @@ def test_an_opened_file_draws_the_frame_it_opens_on(follow, tmp_path):
     np.testing.assert_allclose(follow(first), pressed, atol=1 / 255)
 
 
+def test_a_redone_translation_has_its_picture(follow):
+    """Blender brings the image back without its pixels."""
+    pressed = follow()
+    bpy.ops.ed.undo_push(message="translated")
+    bpy.data.objects.remove(bpy.context.scene.objects["DIGIT gel"])
+    bpy.data.images.remove(bpy.data.images["DIGIT picture"])
+    bpy.ops.ed.undo_push(message="deleted")
+    bpy.ops.ed.undo()
+    np.testing.assert_array_equal(follow(), pressed)
+
+
 def test_each_gel_has_a_picture_of_its_own(follow, imported, part):
     first = follow()
     second = imported(frames="100:120", first_frame=-30)
