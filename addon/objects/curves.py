@@ -75,7 +75,14 @@ def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
 
 
 def write_properties(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
-    """Set and keyframe custom properties: values (T,) or (T, k) by the names of ``PROPERTIES``, at frames (T,)."""
+    """Set and keyframe custom properties: values (T,) or (T, k) by the names of ``PROPERTIES``, at frames (T,).
+
+    Others of these names, of an animation before, are removed."""
+    stale = {f'["{name}"]': name for name in PROPERTIES if name in thing and name not in values}
+    for curve in [curve for curve in fcurves_of(thing) if curve.data_path in stale]:
+        fcurves_of(thing).remove(curve)
+    for name in stale.values():
+        del thing[name]
     for name, numbers in values.items():
         bits = name == "flags"  # which mean nothing between two frames
         numbers = np.nan_to_num(np.asarray(numbers, int if bits else np.float64))

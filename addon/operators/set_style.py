@@ -122,8 +122,8 @@ def _counts(thing: bpy.types.Object) -> float:
     """Largest change of a recording's electrodes, counts; 0 where there is none, or a file of a former version."""
     if frame_attribute.modifier_of(thing, frame_attribute.COUNTS) is None:
         return 0.0
-    known = range(len(thing["electrodes"]))
-    return max(float(np.abs(curves.values_of(thing, '["electrodes"]', k)).max(initial=0.0)) for k in known)
+    known = range(len(thing.get("electrodes", ())))
+    return max((float(np.abs(curves.values_of(thing, '["electrodes"]', k)).max(initial=0.0)) for k in known), default=0)
 
 
 class TACTILE_OT_force_arrow(TactileOperator):
