@@ -41,7 +41,7 @@ class TACTILE_OT_translate(JobOperator):
         """Translate; start a job only for a gel that no networks lead to, whose contacts are solved."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
-        properties.check_own(skin)
+        properties.check_own(skin, skin.data)  # an override's mesh is linked
         beside = properties.home_of(skin).objects
         motion.check_rest(*(thing for thing in beside if thing.tactile.role in properties.OF_ROLE))
         about = skin.tactile

@@ -237,13 +237,13 @@ def check_format(thing: bpy.types.Object) -> None:
         )  # fmt: skip
 
 
-def check_own(*things: bpy.types.Object | None) -> None:
-    """Raise TactileError for an object linked from another .blend, which Blender does not let change here."""
+def check_own(*things: bpy.types.Object | bpy.types.Mesh | None) -> None:
+    """Raise TactileError for an object or a mesh linked from another .blend, which Blender does not let change here."""
     for thing in things:
         if thing is not None and thing.library is not None:
             raise TactileError(
-                thing.name, f"linked from {thing.library.name}", "an object of this file, which can be changed",
-                "Object > Library Override > Make, or append it in place of linking",
+                thing.name, f"linked from {thing.library.name}", "one of this file, which can be changed",
+                "Append it in place of linking; for lights and coating, Object > Library Override > Make will do",
             )  # fmt: skip
 
 

@@ -171,6 +171,11 @@ def test_a_linked_sensor_is_left_alone_in_words(translated, tmp_path):
             getattr(bpy.ops.tactile, changes)()
     # which reads alone
     assert bpy.ops.tactile.save_as_calibration(filepath=str(tmp_path / "unit.toml")) == {"FINISHED"}
+    skin = next(thing for thing in taken.objects if thing.tactile.role == "BIOTAC").override_create()
+    bpy.context.scene.collection.objects.link(skin)
+    bpy.context.view_layer.objects.active = skin
+    with pytest.raises(RuntimeError, match=r"BioTac skin: linked from library\.blend.* Append it"):
+        bpy.ops.tactile.translate()  # whose keys are the mesh's, not an override's
 
 
 def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
