@@ -63,6 +63,13 @@ def _plays_recording(sensor: bpy.types.Object) -> bool:
     return any(thing.tactile.known for thing in properties.home_of(sensor).objects)
 
 
+def check_free(*pressed: bpy.types.Object) -> None:
+    """Raise TactileError for a sensor of an imported recording, whose electrodes, trust and flags would stay."""
+    for thing in filter(_plays_recording, pressed):
+        found, advice = "plays an imported recording", "Use a scene for each"
+        raise TactileError(thing.name, found, "a sensor of its own to press", advice)
+
+
 def sensor_of(context: bpy.types.Context, near: bpy.types.Object | None) -> bpy.types.Object:
     """Return the sensor that places of an indenter ``near`` it refer to: the gel (of several the scene camera's), else
     the skin. Raises TactileError."""

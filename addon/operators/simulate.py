@@ -52,14 +52,12 @@ def read(folder: Path) -> Result:
         return Result(stored["seconds"], stored["force"], stored["apex"], stored["axes"], moved, picked)
 
 
-def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result) -> str:
-    """Bake a result, with the indenter ``thing``, onto the scene's frames; returns a sentence for the user."""
-    scene = context.scene
-    frames = np.arange(scene.frame_start, scene.frame_end + 1, dtype=float)
-    rate = scene.render.fps / scene.render.fps_base
-    seconds = result.seconds - result.seconds[0]
+def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result, frames: np.ndarray, rate: float) -> str:
+    """Bake a result, with the indenter ``thing``, onto frames (F,) of the scene; returns a sentence for the user.
+    rate : frames per second"""
+    scene, seconds = context.scene, result.seconds - result.seconds[0]
     # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
-    sample = np.abs((frames - scene.frame_start)[:, None] / rate - seconds[None, :]).argmin(axis=1)
+    sample = np.abs((frames - frames[0])[:, None] / rate - seconds[None, :]).argmin(axis=1)
     sentences = [*result.picked]
     force = result.force[sample][:, [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     for sensor in sensors_for(scene, thing):
@@ -144,12 +142,14 @@ class TACTILE_OT_simulate(JobOperator):
 
         thing = scene_bridge.indenter_of(context)
         pressed = sensors_for(context.scene, thing)
-        properties.check_own(*pressed)
+        properties.check_own(*pressed, *(each.data for each in pressed))
+        scene_bridge.check_free(*pressed)
         motion.check_rest(*pressed)
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")
-        self._thing = thing.name
+        self._thing, self._rate = thing.name, scene_bridge.rate_of(context.scene)
+        self._frames = np.arange(context.scene.frame_start, context.scene.frame_end + 1, dtype=float)
         self._folder = JobFolder()
         write_scene(self._folder.path, found.scene, found.meshes)
         if found.apexes is not None:
@@ -157,7 +157,7 @@ class TACTILE_OT_simulate(JobOperator):
         bound = render_settings.budget_of(context.scene).um
         self._job = Job("simulate", self._folder.path, seed=self.seed, keep=_outputs(pressed), um=bound,
                         placed_on=properties.sensor_name(sensor_of(context, thing)),
-                        first_frame=context.scene.frame_start, rate=scene_bridge.rate_of(context.scene))  # fmt: skip
+                        first_frame=context.scene.frame_start, rate=self._rate)  # fmt: skip
 
     def finish(self, context: bpy.types.Context) -> None:
         """Bake the simulation into the scene; see ``JobOperator``."""
@@ -165,7 +165,7 @@ class TACTILE_OT_simulate(JobOperator):
         if thing is None:
             raise TactileError(self._thing, "no longer in the scene", "the indenter that was simulated")
         result = read(self._folder.path)
-        summary = bake(context, thing, result)
+        summary = bake(context, thing, result, self._frames, self._rate)
         self._keep(context, thing)
         sensor = sensor_of(context, thing)
         if sensor.tactile.role == "DIGIT":
@@ -190,8 +190,8 @@ class TACTILE_OT_simulate(JobOperator):
         with atomic.new_file(path) as partial:
             shutil.copyfile(self._folder.path / "recording.h5", partial)
         skin.tactile.recording, skin.tactile.tare, skin.tactile.known = kept_files.shown(path), "auto", ""
-        skin.tactile.frames, skin.tactile.first_frame = ":", context.scene.frame_start
-        skin.tactile.samples = SAMPLE_RATE / scene_bridge.rate_of(context.scene)
+        skin.tactile.frames, skin.tactile.first_frame = ":", int(self._frames[0])
+        skin.tactile.samples = SAMPLE_RATE / self._rate
 
 
 CLASSES = (TACTILE_OT_simulate,)

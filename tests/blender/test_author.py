@@ -357,6 +357,31 @@ def test_an_authored_press_leaves_an_imported_recording_alone(imported, scene, n
     assert gel["force"][2] == pytest.approx(-0.1, rel=0.05)
 
 
+def test_an_imported_recording_is_not_pressed_over(imported, scene):
+    """Its electrodes, trust and flags stayed, as if they were the simulation's."""
+    imported(frames="70:90")
+    _press(scene)
+    with pytest.raises(RuntimeError, match=r"BioTac skin: plays an imported recording.* Use a scene for each"):
+        bpy.ops.tactile.simulate()
+
+
+def test_a_simulation_keeps_the_frames_it_began_with(gel_alone, part, monkeypatch):
+    _press(gel_alone)
+    job = part("addon.process.jobs").Job
+    wait = job.wait
+
+    def change_meanwhile(self):
+        gel_alone.frame_start, gel_alone.frame_end, gel_alone.render.fps = 20, 250, 24
+        wait(self)
+
+    monkeypatch.setattr(job, "wait", change_meanwhile)
+    assert bpy.ops.tactile.simulate() == {"FINISHED"}
+    gel = gel_alone.objects["DIGIT gel"]
+    assert part("addon.objects.motion").played(gel) == (1, 3)
+    gel_alone.frame_set(2)
+    assert gel["force"][2] == pytest.approx(-0.05, rel=0.05)
+
+
 def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
     assert _outputs(scene, part) == ["displacement_digit"]
