@@ -60,6 +60,7 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     gels = [name.lower() for name, _, _ in properties.sensor_items(gels_only=True)]
+    presets = bpy.context.scene.tactile_render.bl_rna.properties["preset"].enum_items.keys()
     verbs = parser.add_subparsers(dest="verb", metavar="VERB", required=True)
     for name, brief, what in (
         ("convert", "recordings to .blend files with both sensors", "recording, in any layout that is read"),
@@ -71,7 +72,7 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("inputs", nargs="+", metavar="INPUT", help=what)
         verb.add_argument("--out", required=True, type=Path, metavar="DIR", help="folder of the results")
         verb.add_argument("--pictures", action="store_true", help="render every frame taken, too")
-        verb.add_argument("--preset", default="fast", help="of the pictures (default: fast)")
+        verb.add_argument("--preset", choices=presets, default="fast", help="of the pictures (default: fast)")
         verb.add_argument("--error", default="", help="largest error to add: 50um (tier), 0.6levels (preset), or both")
         verb.add_argument("--tare", default="auto", help="of recordings: auto, none or frames A:B")
         verb.add_argument("--polarity", choices=[name for name, _, _ in properties.POLARITIES], default="auto",

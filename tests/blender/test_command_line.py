@@ -65,6 +65,12 @@ def test_nothing_to_do_is_an_error(run, tmp_path):
     assert run("batch", tmp_path, "--out", tmp_path / "out") == 1
 
 
+def test_a_preset_that_is_none_ends_before_the_work(run, tmp_path, capfd):
+    with pytest.raises(SystemExit, match="2"):
+        run("convert", "touch.csv", "--out", tmp_path, "--preset", "best")
+    assert "'best'" in capfd.readouterr().err and not [*tmp_path.iterdir()]
+
+
 def test_simulate_a_scene(run, tmp_path):
     pytest.importorskip("scipy")
     folder = tmp_path / "tiny"
