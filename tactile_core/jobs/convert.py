@@ -28,7 +28,7 @@ from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
 from .gel_frames import read_displacement
-from .results import SOLVED, TRANSLATED, GelKind, frames_text, select
+from .results import SOLVED, TRANSLATED, check_gel, frames_text, select
 
 if TYPE_CHECKING:
     from ..recordings.electrode_gains import SensorFile
@@ -66,7 +66,8 @@ class ToolOptions:
     calibration : file of camera and lights, None for those that ship; preset, variant : as ``render.Options``
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     answer : options of the estimated contact, see ``Answer``
-    gel : "translated" by the networks, or "solved", the found contact on the target, as where no networks lead to it
+    gel : "translated" by the networks, or "solved", the found contact on the target, as where no networks lead to it;
+        "ball:28" solves it under a ball of 28 mm, known to have touched
     target : the gel; weights must translate to it unless it is solved"""
 
     weights: str | None = None
@@ -74,28 +75,29 @@ class ToolOptions:
     preset: str = FAST
     variant: str | None = None
     answer: Answer = Answer()  # noqa: RUF009 - frozen
-    gel: GelKind = TRANSLATED
+    gel: str = TRANSLATED
     target: str = TARGET
     source: str | None = SOURCE
     object_reflectance: float | None = None
 
-    def load_networks(self) -> tuple[Translator, bool]:
-        """Return the networks, and true if contacts that they find are to be solved on the target."""
-        must_lead_to = None if self.gel == SOLVED or self.weights is None else self.target
+    def load_networks(self) -> tuple[Translator, str]:
+        """Return the networks, and ``gel``, but "solved" where they do not lead to the target."""
+        check_gel(self.gel)
+        must_lead_to = None if self.gel != TRANSLATED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
-        solves = self.gel == SOLVED or translator.target != self.target
-        if solves and self.answer.contacts > 1:
+        gel = SOLVED if self.gel == TRANSLATED and translator.target != self.target else self.gel
+        if gel != TRANSLATED and self.answer.contacts > 1:
             raise TactileError("--contacts 2", "a gel that is solved", "one that is translated to", "Leave one out")
-        return translator, solves
+        return translator, gel
 
 
 def load_tools(options: ToolOptions) -> Tools:
     """Load the weights, and camera and lights of the gel. Raises TactileError for weights that are missing, changed or
     of another shape, and as `load_drawer` does."""
-    translator, solves = options.load_networks()
+    translator, gel = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
-    drawer = load_drawer(*unit, translator.target, options.object_reflectance, solves=solves)
-    return Tools(translator, drawer, options.calibration)
+    drawer = load_drawer(*unit, translator.target, options.object_reflectance, gel)
+    return Tools(translator, drawer, options.calibration, gel)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -212,7 +214,7 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
                     "prepare": dataclasses.asdict(options.prepare),
                     "preset": tools.drawer.preset, "object_reflectance": tools.drawer.object_reflectance,
                     "answer": dataclasses.asdict(tools.translator.answer),
-                    "gel": TRANSLATED if tools.drawer.solve is None else SOLVED},
+                    "gel": tools.gel},
         "frames_converted": len(frames),
         "prepared": rows.signals.report,
         "warnings": list(report.warnings()),

@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import TactileError
 from ..sensors import TARGET, sensor_surface, title
 from ..sensors.camera import Camera
+from .results import TRANSLATED, ball_radius
 
 if TYPE_CHECKING:
     from ..pictures.marker_field import MarkerField
@@ -84,12 +85,11 @@ def load_drawer(
     target: str = TARGET,
     found_on: str = TARGET,
     object_reflectance: float | None = None,
-    *,
-    solves: bool = False,
+    gel: str = TRANSLATED,
 ) -> Drawer:
     """Load camera and lights of a gel: the unit's that ships, or a file's.
 
-    preset, variant : as ``render.Options``; target, found_on : of `Drawer`; solves : true if contacts are solved
+    preset, variant : as ``render.Options``; target, found_on : of `Drawer`; gel : as of ``convert.ToolOptions``
     object_reflectance : of what touches the gel; None for the calibration's
     The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
     Raises TactileError for a bad calibration, and as ``renderer.Renderer`` does."""
@@ -107,9 +107,9 @@ def load_drawer(
         shade = renderer.Renderer(unit, preset, variant)
         dots = shade.dots
     solve: Solver | None = None
-    if solves:
+    if gel != TRANSLATED:
         from . import solved_gel
 
         solved_gel.prepare(target)
-        solve = functools.partial(solved_gel.solved, gel=target, found_on=found_on)
+        solve = functools.partial(solved_gel.solved, gel=target, found_on=found_on, ball=ball_radius(gel))
     return Drawer(mapper, shade, unit.camera, preset, solve, dots, target, found_on, unit.object_reflectance)

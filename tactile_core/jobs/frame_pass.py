@@ -15,6 +15,7 @@ from ..translation.gel_place import beyond_picture
 from ..translation.translate import CHUNK, Read, RecordingPass
 from .drawer import Drawer
 from .frames_file import FramesFile, kept
+from .results import TRANSLATED
 
 if TYPE_CHECKING:
     from ..recordings import Signals
@@ -25,11 +26,13 @@ Take = Callable[[np.ndarray, dict[str, np.ndarray]], None]
 
 @dataclasses.dataclass(frozen=True)
 class Tools:
-    """Networks and drawer of a conversion, the same for every recording; calibration : file, None for the shipped."""
+    """Networks and drawer of a conversion, the same for every recording; calibration : file, None for the shipped.
+    gel : as of ``convert.ToolOptions``, "solved" where no networks lead to it"""
 
     translator: Translator
     drawer: Drawer
     calibration: str | None = None
+    gel: str = TRANSLATED
 
     @property
     def pair(self) -> tuple[str, str]:

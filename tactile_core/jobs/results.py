@@ -14,7 +14,6 @@ import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -28,9 +27,9 @@ FRAMES, IMAGES, SHEET, NOTE, TIMINGS = "frames.h5", "images", "contact_sheet.png
 OURS = {FRAMES, IMAGES, SHEET, NOTE, TIMINGS, "exr", "rest.exr"}  # the last two of `tactile render --exr`
 IMAGE_NAME = "{:05d}.png"
 
-GelKind = Literal["translated", "solved"]  # the networks' gel, or the found contact solved on it (``solved_gel``)
-TRANSLATED: GelKind = "translated"
-SOLVED: GelKind = "solved"
+TRANSLATED, SOLVED = "translated", "solved"  # the networks' gel, or the found contact solved on it (``solved_gel``)
+BALL = "ball:"  # solved under a ball of this diameter, mm, that is known to have touched
+_DIAMETERS = 1.0, 2000.0  # mm, from a pin's head to a plate
 KEEPABLE = ("latent", "displacement", "height", "image", "traction", "marker_motion")
 DEFAULT_KEEP = ("latent", "displacement", "image")
 
@@ -38,6 +37,23 @@ DEFAULT_KEEP = ("latent", "displacement", "image")
 def parse_keep(text: str) -> tuple[str, ...]:
     """Parse ``"image,latent"`` to ("latent", "image"), words of --keep in KEEPABLE's order. TactileError for others."""
     return parse_words(text, KEEPABLE, least=0)
+
+
+def ball_radius(gel: str) -> float | None:
+    """Return the radius, m, of the ball that a --gel of ``"ball:28"`` states by its diameter in mm; None for others."""
+    return float(gel.removeprefix(BALL)) / 2e3 if gel.startswith(BALL) else None
+
+
+def check_gel(gel: str) -> None:
+    """Raise TactileError for a --gel that is none of "translated", "solved" and a ball's."""
+    try:
+        known = gel in (TRANSLATED, SOLVED) or _DIAMETERS[0] <= 2e3 * (ball_radius(gel) or 0.0) <= _DIAMETERS[1]
+    except ValueError:
+        known = False
+    if not known:
+        least, most = _DIAMETERS
+        expected = f"{TRANSLATED}, {SOLVED} or {BALL}MM, a diameter of {least:g} to {most:g} mm"
+        raise TactileError("--gel", repr(gel), expected, f"A plate is {BALL}{most:g}")
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:

@@ -1,11 +1,11 @@
 """Solve the contacts that the networks found, on the same or another gel, in place of the gel they translate.
 
 From the translation come the place of the dent, the size of the force, the direction in which the deepest node moves,
-and the curvature of the dented patch. Assumed is a ball that presses in along that direction and sticks to that node,
-with the friction of all contacts here (0.78): flats, rings and edges come out round, as no network tells the object's
-outline. Place and force keep the networks' errors; the surface under that load has only the fast tier's own. Place,
-force and lean are of the plane that all gels share, so a contact found on the DIGIT is solved on any gel with a
-descriptor, without training."""
+and the curvature of the dented patch, unless the user knows what touched. Assumed is a ball that presses in along that
+direction and sticks to that node, with the friction of all contacts here (0.78): flats, rings and edges come out round,
+as no network tells the object's outline. Place and force keep the networks' errors; the surface under that load has
+only the fast tier's own. Place, force and lean are of the plane that all gels share, so a contact found on the DIGIT is
+solved on any gel with a descriptor, without training."""
 
 from __future__ import annotations
 
@@ -42,11 +42,14 @@ def prepare(gel: str = TARGET) -> None:
     compliance_of(gel)
 
 
-def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET) -> dict[str, np.ndarray]:
+def solved(
+    arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET, ball: float | None = None
+) -> dict[str, np.ndarray]:
     """Replace the gel displacements of translated frames by solved contacts, each frame by itself.
 
     arrays : by the names of frames.h5, T first; frames without contact are unchanged
     gel : the sensor that is solved; found_on : the one on which the networks find contacts
+    ball : radius, m, of the ball that touched; None for one as curved as the dent
     Returns the arrays with ``traction_digit`` (T, M, 3) Pa added, zero in frames that were not solved. A frame without
     a solution keeps the networks' displacement and is flagged ``GEL_NOT_SOLVED``. Where `gel` differs from `found_on`,
     a frame without a solution is at rest, contacts beside the gel are flagged as beyond it, the networks' latents are
@@ -56,7 +59,7 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
     found = moved.copy() if own else np.zeros((len(moved), len(sensors.sensor_surface(gel).rest), 3), moved.dtype)
     traction = np.zeros(found.shape, np.float32)
     size = np.linalg.norm(arrays["force"], axis=1)
-    for frame, contact in _contacts(moved, center, size, found_on):
+    for frame, contact in _contacts(moved, center, size, found_on, ball):
         try:
             solution = contact.on_gel(gel)
             found[frame], traction[frame] = solution.displacement, solution.traction
@@ -66,15 +69,18 @@ def solved(arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TAR
     return changed if own else _on_another(changed, gel)
 
 
-def _contacts(moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str) -> Iterator[tuple[int, BodyContact]]:
-    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) = (x, z) m; size : (T,) N"""
+def _contacts(
+    moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str, ball: float | None
+) -> Iterator[tuple[int, BodyContact]]:
+    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) = (x, z) m; size : (T,) N
+    ball : radius, m, of the body; None for that of the dent"""
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
     deepest = np.einsum("tni,ni->tn", moved, normals).argmin(axis=1)
     for frame in map(int, np.flatnonzero(np.isfinite(center[:, 0]) & (size > 0))):
         x, z = map(float, center[frame])
         node = deepest[frame]
-        radius = patch_radius((rest + moved[frame])[patches[frame]], OUTWARD)
+        radius = ball or patch_radius((rest + moved[frame])[patches[frame]], OUTWARD)
         place = leaning(x, z, moved[frame, node].astype(float), normals[node])
         yield frame, BodyContact(Sphere(radius), place, float(size[frame]))
 

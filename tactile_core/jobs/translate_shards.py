@@ -30,6 +30,7 @@ from .engine.inputs import unit_hash
 from .engine.recipes import MAX_SHARD_FRAMES, InputFacts, Translate
 from .frame_pass import FramePass, Tools
 from .prepared_signals import Prepared
+from .results import TRANSLATED
 
 if TYPE_CHECKING:
     from .engine.job import Job
@@ -52,10 +53,10 @@ def completed(
     wanted.prepare.options().check()
     source = None if weights else readers.sensor_of_first(paths, wanted.prepare.columns)
     tools = ToolOptions(weights, answer=wanted.answer, gel=wanted.gel, target=wanted.target, source=source)
-    network, solves = tools.load_networks()
+    network, gel = tools.load_networks()
     if wanted.shard_frames > MAX_SHARD_FRAMES:
         raise TactileError("--shard-frames", str(wanted.shard_frames), f"1 to {MAX_SHARD_FRAMES}")
-    if solves:
+    if gel != TRANSLATED:
         from . import solved_gel
 
         solved_gel.check_installed()

@@ -79,7 +79,7 @@ CASES = {
 }  # fmt: skip
 # Metavars of what is written, and of words that are no files.
 NO_FILES = {"WORDS", "A:B:STEP", "auto|none|A:B", "X,Z", "BOUND", "I/N", "WxH", "TEXT", "NAMES", "NAME", "NAME=A:B:N",
-            "N", "S", "X", "HZ", "LAYOUTS", "MM", "FILE.xml", "SENSOR"}  # fmt: skip
+            "N", "S", "X", "HZ", "LAYOUTS", "MM", "FILE.xml", "SENSOR", "HOW"}  # fmt: skip
 WRITTEN = {"--out", "--json", "--sheet", "--scene-out", "--new"}
 
 

@@ -1,6 +1,7 @@
 """The found contact solved on the DIGIT, in place of the networks' gel, or on a gel that no networks lead to."""
 
 import importlib.util
+import json
 
 import h5py
 import numpy as np
@@ -12,6 +13,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Sphere
 from tactile_core.jobs import solved_gel
+from tactile_core.jobs.convert import ToolOptions
 from tactile_core.jobs.solved_gel import describe_miss, gel_traction
 from tactile_core.mechanics.node_areas import node_areas
 from tactile_core.mechanics.placement import Placement
@@ -46,6 +48,23 @@ def test_a_solved_gel_is_the_gel_that_was_pressed(pressed):
     assert found["flags"][0] == 0
 
 
+def test_a_known_ball_has_its_own_depth_under_the_force(pressed):
+    """The networks' dent is that of a ball of 10 mm under 1 N; a ball of 60 mm touched."""
+    true = solve("digit", Sphere(30e-3), Placement(-8e-3, 1e-3), force=1.0).displacement[None]
+    center = accuracy.dent_center(pressed.displacement[None], sensors.digit_surface().rest)
+    found = solved_gel.solved(arrays([pressed.displacement], [pressed.force], center), ball=30e-3)
+    assert accuracy.rms_in_contact(found["displacement_digit"], true)[0] < 0.05 * accuracy.height(true).max()
+    assert accuracy.height(pressed.displacement[None]).max() > 1.4 * accuracy.height(true).max()
+
+
+@pytest.mark.parametrize("gel", ["ball", "ball:", "ball:x", "ball:nan", "ball:0.5", "ball:-28", "ball:3000", "box"])
+def test_what_is_no_gel_is_refused(gel):
+    with pytest.raises(
+        TactileError, match=r"--gel: .*; expected translated, solved or ball:MM, a diameter of 1 to 2000"
+    ):
+        ToolOptions(gel=gel).load_networks()
+
+
 def test_frames_without_contact_or_solution_keep_their_gel(pressed):
     gel = pressed.displacement
     found = solved_gel.solved(arrays([gel, gel], [[0, 0, 0], [0, 50.0, 0]], [[np.nan, np.nan], [-8e-3, 0.0]]))
@@ -56,9 +75,10 @@ def test_frames_without_contact_or_solution_keep_their_gel(pressed):
 @needs_scipy
 def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
     path, found = str(request.config.rootpath / RECORDING), {}
-    for name, words in {"few": ["--frames", "60:240:60"], "fewer": ["--frames", "120:121"]}.items():
+    asked = {"few": ["--frames", "60:240:60"], "fewer": ["--frames", "120:121"]}
+    for name, words in (asked | {"large": [*asked["fewer"], "--gel", "ball:100"]}).items():
         out = ["--out", str(tmp_path / name), "--keep", "displacement,traction", "--gel", "solved"]
-        assert main(["convert", path, *words, *out]) == 0
+        assert main(["convert", path, *out, *words]) == 0
         with h5py.File(tmp_path / name / "press_roll_slide" / "frames.h5") as file:
             found[name] = {each: file[each][:] for each in ("displacement_digit", "frame", "flags")}
             total, force = (np.linalg.norm(file[each][:], axis=1) for each in ("traction_force", "force"))
@@ -69,6 +89,9 @@ def test_a_conversion_solves_the_frames_it_is_asked_for(request, tmp_path):
     # The networks' passes of one frame and of several are equal to a relative 1e-5 (``networks``).
     assert np.allclose(*gels, rtol=0, atol=1e-4 * accuracy.height(gels[1]).max())
     assert not (found["few"]["flags"] & Flag.GEL_NOT_SOLVED).any()
+    note = json.loads((tmp_path / "large" / "press_roll_slide" / "note.json").read_text(encoding="utf-8"))
+    assert note["options"]["gel"] == "ball:100"
+    assert accuracy.height(found["large"]["displacement_digit"]).max() < 0.7 * accuracy.height(gels[1]).max()
 
 
 MINI = "coarse_mini"

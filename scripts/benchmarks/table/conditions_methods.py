@@ -78,7 +78,7 @@ def _flat(quick: bool) -> Condition:
     pairs = body_rows.pairs_of(body_rows.flat_scene(), QUICK_CONTACTS if quick else body_rows.COUNT)
     signals = plain_signals(as_read(pairs.signal, SEED))
     gel = true_displacement(pairs, "digit", slice(None))
-    of = f"{len(gel)} contacts of a plate and wide cylinders"
+    of = f"{len(gel)} contacts of large balls, a plate and a cylinder"
     return Condition(partial(load_translator(), signals), gel, lengths(pairs.force), of)
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table.translation_methods import plain_signals
-from tactile_core.accuracy import Row, lengths, row
+from tactile_core.accuracy import Row, lengths, peak_depth_error, row
+from tactile_core.jobs import solved_gel
 from tactile_core.jobs.pairs import make_pairs
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
 from tactile_core.training.step_errors import Bodies, true_displacement
@@ -25,30 +26,33 @@ from .test_set import SEED, as_read
 SCENE = Path(__file__).resolve().parents[3] / "scenes" / "training" / "scene.toml"
 COUNT, OWN_SEED = 300, 52  # contacts of each set; the training pairs have seed 0
 METRICS = {"place_mm": "mm", "force_size_percent": "%", "peak_percent": "%", "iou": "1"}
-# A plate wider than the pad, and cylinders as wide as it and wider.
+# Diameters, mm. A plate touches a round finger where both are parallel, and the gel likewise: a ball of 2 m stands for
+# it, whose lean turns the force alone. (A leaned plate itself would touch the gel by its edge.)
+BALLS = {"ball_28mm": 28.0, "ball_100mm": 100.0, "plate": 2000.0}
 FLAT = """format = "tactile-scene-1"
 name = "flat"
-description = "What a fingertip meets as flat."
+description = "What a fingertip meets as flat, or nearly so."
 indenters = [
-    {kind = "box", name = "plate", sizes_mm = [60.0, 60.0, 10.0], edge_mm = 2.0},
-    {kind = "lying_cylinder", name = "cylinder_20mm", radius_mm = 10.0, edge_mm = 1.0, length_mm = 60.0},
-    {kind = "lying_cylinder", name = "cylinder_80mm", radius_mm = 40.0, edge_mm = 1.0, length_mm = 60.0},
+    BALLS
+    {kind = "lying_cylinder", name = "cylinder_40mm", radius_mm = 20.0, edge_mm = 1.0, length_mm = 60.0},
 ]
 
-"""
+""".replace(
+    "BALLS", "\n".join(f'{{kind = "sphere", name = "{name}", radius_mm = {mm / 2}}},' for name, mm in BALLS.items())
+)
 
 
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
     """Return rows of each set's ``count`` contacts: median errors of place, force (of firm contacts, too) and depth,
-    the median overlap, and the mean of the gel's error, divided by that of no displacement.
+    the median overlap, and the mean of the gel's error, divided by that of no displacement; and ``known_rows``.
     known : contacts among which the nearest example is sought; bodies : surfaces of gel and skin"""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
         "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),
     }  # fmt: skip
-    return [
-        one for name, scene in scenes.items() for one in _rows(name, network, pairs_of(scene, count), known, bodies)
-    ]
+    drawn = {name: pairs_of(scene, count) for name, scene in scenes.items()}
+    found = [one for name, pairs in drawn.items() for one in _rows(name, network, pairs, known, bodies)]
+    return found + known_rows(network, drawn["flat bodies"])
 
 
 def flat_scene() -> str:
@@ -84,3 +88,21 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
     true = true_displacement(pairs, "digit", every)
     left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
     return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
+
+
+def known_rows(network: Translator, pairs: Pairs) -> list[Row]:
+    """Return rows of depth and gel under the flat scene's balls, contacts of ``pairs``, solved as ``--gel ball:MM``
+    does; baseline: as translated."""
+    answer, made = vars(network(plain_signals(as_read(pairs.signal, SEED)))), []
+    for name, diameter in BALLS.items():
+        at = np.flatnonzero(pairs.indenter == pairs.indenter_names.index(name))
+        arrays = {word: answer[word][at] for word in ("displacement_digit", "flags", "contact_center", "force")}
+        if not len(at):
+            continue
+        gels = solved_gel.solved(arrays, ball=diameter / 2e3)["displacement_digit"], arrays["displacement_digit"]
+        true, of = true_displacement(pairs, "digit", at), f"{len(at)} contacts of a {name}, known to be one"
+        depth, before = (float(np.median(100 * np.abs(peak_depth_error(gel, true)))) for gel in gels)
+        left, whole = (float(left_of_nothing(gel, true).mean()) for gel in gels)
+        made += [row("bodies_known_peak_percent", depth, "%", baseline=before, of=of)]
+        made += [row("bodies_known_gel_left", left, "1", baseline=whole, of=of)]
+    return made

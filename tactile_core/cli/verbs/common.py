@@ -52,9 +52,10 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "--contacts": {"type": int, "choices": (1, 2), "default": 1, "help":
         "2: look for a second contact in each frame and add it to skin and gel, as second_center and second_force in"
         " frames.h5; a single wide contact of a real finger is mostly taken for two (default: 1)"},
-    "--gel": {"choices": ("translated", "solved"), "default": "translated", "help":
+    "--gel": {"default": "translated", "metavar": "HOW", "help":
         "displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
-        " dent's curvature at the estimated place and force, 25 ms a frame, needs scipy (default: translated)"},
+        " dent's curvature at the estimated place and force, 25 ms a frame, needs scipy; ball:28, the same under a"
+        " ball of 28 mm, where you know what touched (a plate: ball:2000) (default: translated)"},
     "--sensor": {"metavar": "FILE", "help": "rest, gains and offsets of the unit, from `tactile adapt`"},
     "--to": {"dest": "target", "default": TARGET, "metavar": "SENSOR", "help":
         "gel to translate to: any sensor with a gel (docs/extend.md); where the networks do not lead to it, its"

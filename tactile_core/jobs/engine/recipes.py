@@ -26,7 +26,7 @@ from ...recordings.electrode_gains import SensorFile
 from ...recordings.tables.column_map import ColumnMap
 from ...sensors import SOURCE, TARGET
 from ...translation.answer import Answer
-from ..results import TRANSLATED, GelKind
+from ..results import TRANSLATED
 
 SHARD_FRAMES = 1000  # frames per task: seconds of work, so that little is lost when a worker dies (assumed)
 MAX_SHARD_FRAMES = 100_000  # 8 GB of displacements (assumed to be more than anyone wants in a file)
@@ -56,7 +56,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     keep : as of ``convert.Options``; weights : sha256 of the weights' card; shard_frames : frames per shard
     calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
     preset : of pictures: fast, standard, quality, reference; variant : of Mitsuba: llvm_ad_rgb, scalar_rgb, "" for fast
-    answer : options of the estimated contact; gel : "translated" by the networks, or "solved" on the target
+    answer : options of the estimated contact; gel : as of ``convert.ToolOptions``
     source, target : the sensors; every : translate one frame in ``every``; sensor : calibration of the source's unit
     version : of this package, when the job was made, as in the other recipes"""
 
@@ -69,7 +69,7 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
     preset: str = "fast"
     variant: str = ""
     answer: Answer = Answer()
-    gel: GelKind = TRANSLATED
+    gel: str = TRANSLATED
     source: str = SOURCE
     target: str = TARGET
     every: Annotated[int, Meta(ge=1)] = 1
