@@ -35,17 +35,20 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     if _drawing:
         return
     _drawing, failed = True, []
-    for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
-        try:
-            if images.image_of(gel, "picture") is None:
-                continue
-            if _live:
-                pictures.update(gel, depsgraph, render_settings.preset_of(scene))
-            else:
-                pictures.follow(gel, depsgraph)
-        except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
-            failed.append(reports.in_blender(str(error)))
-    _drawing, _failed = False, "; ".join(failed)
+    try:
+        for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
+            try:
+                if images.image_of(gel, "picture") is None:
+                    continue
+                if _live:
+                    pictures.update(gel, depsgraph, render_settings.preset_of(scene))
+                else:
+                    pictures.follow(gel, depsgraph)
+            except (TactileError, OSError, ModuleNotFoundError) as error:  # a handler has no report: the panel shows it
+                failed.append(reports.in_blender(str(error)))
+    finally:
+        _drawing = False
+    _failed = "; ".join(failed)
 
 
 @persistent
