@@ -28,7 +28,7 @@ from .conversion_report import ConversionReport
 from .drawer import load_drawer
 from .frame_pass import FramePass, Tools
 from .gel_frames import read_displacement
-from .results import SOLVED, TRANSLATED, check_gel, frames_text, select
+from .results import SOLVED, TRANSLATED, ball_radius, frames_text, select
 
 if TYPE_CHECKING:
     from ..recordings.electrode_gains import SensorFile
@@ -82,7 +82,7 @@ class ToolOptions:
 
     def load_networks(self) -> tuple[Translator, str]:
         """Return the networks, and ``gel``, but "solved" where they do not lead to the target."""
-        check_gel(self.gel)
+        ball_radius(self.gel)  # a bad one is refused
         must_lead_to = None if self.gel != TRANSLATED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
         gel = SOLVED if self.gel == TRANSLATED and translator.target != self.target else self.gel

@@ -9,6 +9,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -40,20 +41,16 @@ def parse_keep(text: str) -> tuple[str, ...]:
 
 
 def ball_radius(gel: str) -> float | None:
-    """Return the radius, m, of the ball that a --gel of ``"ball:28"`` states by its diameter in mm; None for others."""
-    return float(gel.removeprefix(BALL)) / 2e3 if gel.startswith(BALL) else None
-
-
-def check_gel(gel: str) -> None:
-    """Raise TactileError for a --gel that is none of "translated", "solved" and a ball's."""
-    try:
-        known = gel in (TRANSLATED, SOLVED) or _DIAMETERS[0] <= 2e3 * (ball_radius(gel) or 0.0) <= _DIAMETERS[1]
-    except ValueError:
-        known = False
-    if not known:
-        least, most = _DIAMETERS
-        expected = f"{TRANSLATED}, {SOLVED} or {BALL}MM, a diameter of {least:g} to {most:g} mm"
-        raise TactileError("--gel", repr(gel), expected, f"A plate is {BALL}{most:g}")
+    """Return the radius, m, of the ball that a --gel of ``"ball:28"`` states by its diameter in mm; None for
+    "translated" and "solved". Raises TactileError for anything else."""
+    if gel in (TRANSLATED, SOLVED):
+        return None
+    least, most = _DIAMETERS
+    with contextlib.suppress(ValueError):
+        if gel.startswith(BALL) and least <= float(gel.removeprefix(BALL)) <= most:
+            return float(gel.removeprefix(BALL)) / 2e3
+    expected = f"{TRANSLATED}, {SOLVED} or {BALL}MM, a diameter of {least:g} to {most:g} mm"
+    raise TactileError("--gel", repr(gel), expected, f"A plate is {BALL}{most:g}")
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:

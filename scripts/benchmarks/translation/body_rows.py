@@ -1,4 +1,4 @@
-"""Measure the translation by what is pressed: the training's bodies, random ones and flat ones that no training had.
+"""Measure the translation by what is pressed: the training's bodies, random ones and large ones that no training had.
 
 Contacts are the training's but for the seed and the bodies, by the fast tier on both sensors. Baseline: the nearest
 example among the test contacts that ship, of the training's bodies; of the gel no displacement, which leaves 1.
@@ -30,8 +30,8 @@ METRICS = {"place_mm": "mm", "force_size_percent": "%", "peak_percent": "%", "io
 # it, whose lean turns the force alone. (A leaned plate itself would touch the gel by its edge.)
 BALLS = {"ball_28mm": 28.0, "ball_100mm": 100.0, "plate": 2000.0}
 FLAT = """format = "tactile-scene-1"
-name = "flat"
-description = "What a fingertip meets as flat, or nearly so."
+name = "large"
+description = "Bodies much larger than the finger, which it meets as flat, or nearly so."
 indenters = [
     BALLS
     {kind = "lying_cylinder", name = "cylinder_40mm", radius_mm = 20.0, edge_mm = 1.0, length_mm = 60.0},
@@ -48,11 +48,11 @@ def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) 
     known : contacts among which the nearest example is sought; bodies : surfaces of gel and skin"""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
-        "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "flat bodies": flat_scene(),
+        "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "large bodies": flat_scene(),
     }  # fmt: skip
     drawn = {name: pairs_of(scene, count) for name, scene in scenes.items()}
     found = [one for name, pairs in drawn.items() for one in _rows(name, network, pairs, known, bodies)]
-    return found + known_rows(network, drawn["flat bodies"])
+    return found + known_rows(network, drawn["large bodies"])
 
 
 def flat_scene() -> str:
