@@ -15,6 +15,7 @@ from ...tactile_core.sensors.camera import Camera
 from . import axes, digit_body, digit_materials, motion, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
+LINEAR = "OPEN_EXR", "HDR"  # how the names of file formats of linear light begin
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
 _STEP = 1e-7  # m, largest movement taken for rounding
 _STRAIGHT = 1e-3  # largest component of a turn of the camera's axes taken for none
@@ -128,8 +129,8 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
     output = output_of(scene)
     view, device = output.view_settings, output.display_settings.display_device
-    if scene.render.image_settings.file_format.startswith("OPEN_EXR"):
-        words = "EXR holds linear light: the view transform Standard shows it as the picture is"
+    if scene.render.image_settings.file_format.startswith(LINEAR):
+        words = "EXR and HDR hold linear light: the view transform Standard shows it as the picture is"
         return found + [words] * (view.view_transform == "Raw")
     changes = {
         f"View transform {view.view_transform}": view.view_transform not in _VIEWS,

@@ -41,7 +41,8 @@ def image_of(gel: bpy.types.Object, kind: str) -> bpy.types.Image | None:
     A copied gel holds the first one's (by name) until it is drawn; a gel of a former version holds none."""
     own = getattr(gel.tactile, kind)
     image = own or bpy.data.images.get(_NAMES[kind].format(_title(gel)))
-    others = (thing for scene in gel.users_scene for thing in scene.objects if thing != gel)
+    gels = (thing for thing in bpy.data.objects if thing.tactile.role == "DIGIT" and thing != gel)
+    others = (thing for thing in gels if thing.users_scene)
     before = (thing for thing in others if own is None or thing.name_full < gel.name_full)
     return None if any(getattr(thing.tactile, kind) == image for thing in before) else image
 

@@ -74,6 +74,18 @@ def _opened(*_: object) -> None:
 
 
 @persistent
+def _undone(*_: object) -> None:
+    """Called after an undo or redo, which empties the Image Editor whose picture is not there on its other side."""
+    _opened()
+    gel = properties.gel_of(bpy.context.scene)
+    image = None if gel is None else images.image_of(gel, "picture")
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    for area in areas if image is not None else ():
+        if area.type == "IMAGE_EDITOR" and area.spaces.active.image is None:
+            area.spaces.active.image = image
+
+
+@persistent
 def _end(*_: object) -> None:
     """End the toggle and its worker before another file is opened; called by Blender."""
     switch_off()
@@ -123,7 +135,7 @@ def unregister() -> None:
 CLASSES = (TACTILE_OT_live_picture,)
 HANDLERS = (
     (bpy.app.handlers.save_pre, _keep_images), (bpy.app.handlers.load_pre, _end),
-    (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.undo_post, _opened),
-    (bpy.app.handlers.redo_post, _opened), (bpy.app.handlers.frame_change_post, _frame_changed),
+    (bpy.app.handlers.load_post, _opened), (bpy.app.handlers.undo_post, _undone),
+    (bpy.app.handlers.redo_post, _undone), (bpy.app.handlers.frame_change_post, _frame_changed),
     (bpy.app.handlers.depsgraph_update_post, _changed),
 )  # fmt: skip

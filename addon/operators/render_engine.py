@@ -18,7 +18,6 @@ ID = "TACTILE_DIGIT"
 _LOOK = 10.0  # s between two looks for workers that do nothing
 # Panels of these kinds suit any engine; Blender shows them for engines that add themselves.
 _SHARED = {"properties_output", "properties_render", "properties_view_layer"}
-_EXR = "OPEN_EXR"  # how the names of EXR's file formats begin
 PASSES = {"Height": "V", "Normal": "XYZ", "Contact": "V", "Displacement": "XYZ"}  # name -> channels, beside Combined
 _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "simplify", "curves_render")
 
@@ -61,9 +60,9 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         for name, channels in PASSES.items():
             self.add_pass(name, len(channels), channels, layer=layer)
         fields = pictures.fields(gel, depsgraph, size)
-        # Raw writes the levels as they are; EXR holds linear light whatever the window shows.
-        exr = scene.render.image_settings.file_format.startswith(_EXR)
-        raw = digit_unit.output_of(scene).view_settings.view_transform == "Raw" and not exr
+        # Raw writes the levels as they are; EXR and HDR hold linear light whatever the window shows.
+        linear = scene.render.image_settings.file_format.startswith(digit_unit.LINEAR)
+        raw = digit_unit.output_of(scene).view_settings.view_transform == "Raw" and not linear
 
         def show(picture: np.ndarray) -> None:
             self._show({"Combined": to_linear(picture, raw)} | fields, scene.render, layer)

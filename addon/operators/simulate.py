@@ -9,7 +9,6 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...tactile_core.errors import TactileError
 from ...tactile_core.files import atomic
 from ...tactile_core.sensors import SAMPLE_RATE
 from ..objects import axes, curves, indenter_objects, mesh_cache, motion
@@ -148,7 +147,7 @@ class TACTILE_OT_simulate(JobOperator):
         found = scene_bridge.authored(context)
         if found.meshes:
             require("trimesh", "rtree")
-        self._thing, self._rate = thing.name, scene_bridge.rate_of(context.scene)
+        self._thing, self._rate = (thing.session_uid, thing.name), scene_bridge.rate_of(context.scene)
         self._frames = np.arange(context.scene.frame_start, context.scene.frame_end + 1, dtype=float)
         self._folder = JobFolder()
         write_scene(self._folder.path, found.scene, found.meshes)
@@ -161,9 +160,7 @@ class TACTILE_OT_simulate(JobOperator):
 
     def finish(self, context: bpy.types.Context) -> None:
         """Bake the simulation into the scene; see ``JobOperator``."""
-        thing = context.scene.objects.get(self._thing)
-        if thing is None:
-            raise TactileError(self._thing, "no longer in the scene", "the indenter that was simulated")
+        thing = properties.found_again(context.scene, *self._thing, "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result, self._frames, self._rate)
         self._keep(context, thing)
@@ -173,7 +170,7 @@ class TACTILE_OT_simulate(JobOperator):
         self.report({"INFO"}, summary)
         if not result.force.any():
             words = "touched no sensor: press with it lower, or select the indenter that presses"
-            self.report({"WARNING"}, f"{self._thing} {words}")
+            self.report({"WARNING"}, f"{thing.name} {words}")
 
     def _keep(self, context: bpy.types.Context, thing: bpy.types.Object) -> None:
         """Save the simulated recording beside the .blend, so that it can be translated like a real one.
@@ -186,7 +183,7 @@ class TACTILE_OT_simulate(JobOperator):
         skin = next((each for each in there if properties.sensor_name(each) == ELECTRODES_OF), None)
         if skin is None:
             return
-        path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(self._thing)}.h5"
+        path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(thing.name)}.h5"
         with atomic.new_file(path) as partial:
             shutil.copyfile(self._folder.path / "recording.h5", partial)
         skin.tactile.recording, skin.tactile.tare, skin.tactile.known = kept_files.shown(path), "auto", ""

@@ -53,7 +53,7 @@ class TACTILE_OT_translate(JobOperator):
             # Another gel's contacts are solved from what is in memory.
             how = (about.motion if self._target == own else "") or "SHAPE_KEYS"
             found = recording_data.load(bpy.path.abspath(about.recording), about, progress, how, about.per_metre)
-        self._skin = skin.name
+        self._skin = skin.session_uid, skin.name
         self._found = found
         unit = render_settings.calibration_of(context.scene, self._target)
         beside = gel_place.beyond_picture(found.translation.contact_center, unit.camera)
@@ -77,9 +77,7 @@ class TACTILE_OT_translate(JobOperator):
 
             for words in describe_gel(self._target, self._found.translator.target):
                 self.report({"WARNING"}, words)
-        skin = context.scene.objects.get(self._skin)
-        if skin is None:
-            raise TactileError(self._skin, "no longer in the scene", "the skin that was translated")
+        skin = properties.found_again(context.scene, *self._skin, "the skin that was translated")
         frames = skin.tactile.first_frame + self._found.chosen / skin.tactile.samples
         if skin.tactile.known and not plays(skin, self._found):  # imported, with another unit or tare than is chosen
             play(skin, self._found, frames)

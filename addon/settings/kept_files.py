@@ -16,6 +16,7 @@ from . import preferences
 CACHE, SIMULATIONS = "tactile_cache", "tactile_simulations"
 # By the save that is going on: what held which path, and the file if it was Blender's own.
 _named: list[tuple[bpy.types.bpy_struct, str, str, Path | None]] = []
+_PATHS = "recording", "columns", "unit", "weights"  # properties of a skin
 _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
@@ -45,7 +46,7 @@ def shown(file: Path) -> str:
 def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
     """Yield what holds a path, by which name, and which folder it belongs in."""
     for thing in bpy.data.objects:
-        for name in ("recording", "columns", "unit", "weights"):
+        for name in _PATHS:
             if getattr(thing.tactile, name):
                 yield thing.tactile, name, SIMULATIONS
         for modifier in thing.modifiers:
@@ -126,9 +127,21 @@ def _find_again(*_: object) -> None:
                 break
 
 
+@persistent
+def _name_from_there(context: bpy.types.BlendImportContext) -> None:
+    """Name the files of what was appended by their whole paths: from this .blend, another may have the same one."""
+    for item in context.import_items:
+        if item.id_type == "OBJECT" and item.id is not None and item.id.library is None and item.source_library:
+            for name in _PATHS:
+                path = bpy.path.abspath(getattr(item.id.tactile, name), library=item.source_library)
+                if path and os.path.exists(path):  # else pasted: where it was copied is not known
+                    setattr(item.id.tactile, name, os.path.normpath(path))
+
+
 HANDLERS = (
     (bpy.app.handlers.save_pre, _copy_beside), (bpy.app.handlers.save_post, _let_go),
     (bpy.app.handlers.save_post_fail, _let_go),
     (bpy.app.handlers.load_post, _find_again), (bpy.app.handlers.undo_post, _find_again),
     (bpy.app.handlers.redo_post, _find_again),
+    *([(bpy.app.handlers.blend_import_post, _name_from_there)] if bpy.app.version >= (4, 3, 0) else []),
 )  # fmt: skip

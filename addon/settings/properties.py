@@ -192,6 +192,15 @@ def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) ->
     return found if found is not None and scene.objects.get(found.name) is not None else None
 
 
+def found_again(scene: bpy.types.Scene, uid: int, was: str, what: str) -> bpy.types.Object:
+    """Return the object of a ``session_uid``, whatever it is called now. Raises TactileError, of what it `was` called
+    and `what` it was, where the scene has it no longer."""
+    found = next((thing for thing in scene.objects if thing.session_uid == uid), None)
+    if found is None:
+        raise TactileError(was, "no longer in the scene", what)
+    return found
+
+
 def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
     """Return the gel by ``near`` as in ``of_role``, else the scene camera's, else the scene's first, else None."""
     seen = None if scene.camera is None else scene.camera.parent

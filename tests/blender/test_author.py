@@ -372,12 +372,13 @@ def test_a_simulation_keeps_the_frames_it_began_with(gel_alone, part, monkeypatc
 
     def change_meanwhile(self):
         gel_alone.frame_start, gel_alone.frame_end, gel_alone.render.fps = 20, 250, 24
+        gel_alone.objects["sphere"].name = "mine"
         wait(self)
 
     monkeypatch.setattr(job, "wait", change_meanwhile)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     gel = gel_alone.objects["DIGIT gel"]
-    assert part("addon.objects.motion").played(gel) == (1, 3)
+    assert part("addon.objects.motion").played(gel) == (1, 3) and "mine simulated" in gel_alone.objects
     gel_alone.frame_set(2)
     assert gel["force"][2] == pytest.approx(-0.05, rel=0.05)
 

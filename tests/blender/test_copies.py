@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
+
+RECORDING = Path(__file__).resolve().parents[2] / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 
 
 @pytest.fixture
@@ -81,6 +85,23 @@ def test_a_gel_appended_alone_says_what_is_missing(gel, draw, tmp_path, capfd):
     assert "append its collection" in capfd.readouterr().out
     assert np.abs(draw(alone) - whole).max() <= 1
     assert sum(thing.tactile.role == "LED" for thing in bpy.context.scene.objects) == 3
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender tells of what is appended from 4.3 on")
+def test_an_appended_recording_is_that_of_its_own_blend(imported, tmp_path):
+    """Both .blends have a touch.h5 beside them."""
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "touch.h5").write_bytes(RECORDING.read_bytes())
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one" / "a.blend"))
+    skin = imported(filepath=str(tmp_path / "one" / "touch.h5"), frames="70:90")
+    assert skin.tactile.recording == "//touch.h5"
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two" / "b.blend"))
+    with bpy.data.libraries.load(str(tmp_path / "one" / "a.blend")) as (_, wanted):
+        wanted.objects = ["BioTac skin"]
+    assert wanted.objects[0].tactile.recording == str(tmp_path / "one" / "touch.h5")
 
 
 def test_an_instance_is_told_from_a_gel(gel, draw, tmp_path):

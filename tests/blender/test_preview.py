@@ -72,6 +72,28 @@ def test_a_redone_translation_has_its_picture(follow):
     np.testing.assert_array_equal(follow(), pressed)
 
 
+def test_an_image_editor_that_an_undo_empties_shows_the_picture(follow):
+    (area,) = [area for area in bpy.context.screen.areas if area.type == "VIEW_3D"]
+    area.type = "IMAGE_EDITOR"
+    bpy.ops.ed.undo_push(message="translated")
+    bpy.context.scene.objects["DIGIT gel"].location.x += 1
+    bpy.ops.ed.undo_push(message="moved")
+    area.spaces.active.image = None  # as Blender leaves it where the picture was of the other side alone
+    bpy.ops.ed.undo()
+    assert area.spaces.active.image == bpy.data.images["DIGIT picture"]
+
+
+def test_gels_of_two_scenes_have_a_picture_each(follow, imported):
+    first = bpy.context.scene.objects["DIGIT gel"].tactile.picture
+    for kind in ("NEW", "FULL_COPY"):
+        bpy.ops.scene.new(type=kind)
+        if kind == "NEW":
+            imported(frames="100:120")
+        bpy.ops.tactile.translate()
+    found = {thing.tactile.picture for thing in bpy.data.objects if thing.tactile.role == "DIGIT"}
+    assert len(found) == 3 and first in found
+
+
 def test_each_gel_has_a_picture_of_its_own(follow, imported, part):
     first = follow()
     second = imported(frames="100:120", first_frame=-30)

@@ -234,10 +234,11 @@ def test_hidden_leds_and_meshes_in_the_housing_are_told(ready, part, capfd):
         assert words in said.out + said.err
 
 
-def test_exr_by_raw_says_how_to_look_at_it(ready, part):
+@pytest.mark.parametrize("kind", ["OPEN_EXR", "HDR"])
+def test_linear_light_by_raw_says_how_to_look_at_it(ready, part, kind):
     left_out = part("addon.objects.digit_unit").left_out
     assert left_out(ready, ready.objects["DIGIT gel"]) == []
-    ready.render.image_settings.file_format = "OPEN_EXR"
+    ready.render.image_settings.file_format = kind
     (words,) = left_out(ready, ready.objects["DIGIT gel"])
     assert "view transform Standard" in words
 
@@ -257,12 +258,13 @@ def test_without_leds_it_is_dark(ready, rendered):
     assert rendered().max() == 0
 
 
-def test_exr_holds_the_same_in_float(ready, part, tmp_path):
+@pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "frame.exr"), ("HDR", "frame.hdr")])
+def test_linear_light_holds_the_same_in_float(ready, part, tmp_path, kind, name):
     ready.frame_set(80)
-    ready.render.image_settings.file_format = "OPEN_EXR"
-    ready.render.filepath = str(tmp_path / "frame.exr")
+    ready.render.image_settings.file_format = kind
+    ready.render.filepath = str(tmp_path / name)
     bpy.ops.render.render(write_still=True)
-    linear = _pixels(tmp_path / "frame.exr")
+    linear = _pixels(tmp_path / name)
     picture = part("addon.operators.render_engine").to_linear(_wanted(part))[..., :3]
     assert np.abs(linear - picture).max() < 0.01  # a grey level is at most 0.009 of linear light
 
