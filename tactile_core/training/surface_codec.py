@@ -60,22 +60,22 @@ Fields = Callable[[np.ndarray], Tensor]  # contact indices (B,) -> (B, size) in 
 class SurfaceCodec:
     """Displacements of one sensor, their moving frame and linear bases, in the host's memory.
 
-    data : (D, n, 3) int16 in the nodes' own frames, times ``unit`` m; contact D + i is contact i mirrored
+    data : (D, n, 3) int16 in the sensor's own frame, times ``unit`` m; contact D + i is contact i mirrored
     wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window's w nodes, of what is left by
         ``wide``
     place : (C, 2) of dents, C = 2 D if mirrored, or D; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
     baseline : m, loss of no displacement, mean over training contacts
     In the methods, rows (B,) are contact indices, D + i for the mirror image of i, SILENT for no contact. Arguments:
-    data (D, n, 3) in the sensor's own frame, rows (R,) of the training contacts, numbers `wide`, `near` of basis
-    fields, generator of the bases' random start, mirrored, true to add the mirror images"""
+    rows (R,) of the training contacts, numbers `wide`, `near` of basis fields, generator of the bases' random start,
+    mirrored, true to add the mirror images"""
 
     def __init__(
         self, data: np.ndarray, unit: float, rows: np.ndarray, frame: ContactFrame, wide: int, near: int,
         generator: torch.Generator, *, mirrored: bool = False,
     ) -> None:  # fmt: skip
         self.frame, self.unit = frame, unit
-        self.data = _turned(data, frame)
+        self.data = data
         self._image, every = None, np.arange(len(data))
         if mirrored:
             self._image, every = image_of_nodes(frame), np.arange(2 * len(data))
@@ -99,7 +99,7 @@ class SurfaceCodec:
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
         """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m and in the nodes' own frames."""
-        values, turned = self.data[rows % len(self.data)].astype(np.float32), rows >= len(self.data)
+        values, turned = np.rint(self.frame.to_local(self.data[rows % len(self.data)])), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
         return values
@@ -189,16 +189,6 @@ class SurfaceCodec:
             windows = torch.from_numpy(self.frame.windows(fields, cell[moved])).flatten(1)
             metres[moved, wide:] = 1e-3 * windows @ self.near.T
         return metres
-
-
-def _turned(data: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Rotate data (C, n, 3) int16, displacements, into the nodes' own frames; no copy where nothing rotates."""
-    if not frame.turn.any():
-        return data
-    local = np.empty_like(data)
-    for part in _parts(len(data)):
-        local[part] = np.rint(frame.to_local(data[part]))
-    return local
 
 
 def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:

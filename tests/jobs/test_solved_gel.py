@@ -52,7 +52,11 @@ def test_a_known_ball_has_its_own_depth_under_the_force(pressed):
     """The networks' dent is that of a ball of 10 mm under 1 N; a ball of 60 mm touched."""
     true = solve("digit", Sphere(30e-3), Placement(-8e-3, 1e-3), force=1.0).displacement[None]
     center = accuracy.dent_center(pressed.displacement[None], sensors.digit_surface().rest)
-    found = solved_gel.solved(arrays([pressed.displacement], [pressed.force], center), ball=30e-3)
+    errors = {"expected_error_digit": np.float32([1e-4]), "error_bound_digit": np.float32([4e-4])}
+    found = solved_gel.solved(arrays([pressed.displacement], [pressed.force], center) | errors, ball=30e-3)
+    dents = [accuracy.lengths(each).max() for each in (found["displacement_digit"], pressed.displacement)]
+    np.testing.assert_allclose(found["expected_error_digit"], 1e-4 * dents[0] / dents[1], rtol=1e-6)  # float32
+    assert found["error_bound_digit"] == errors["error_bound_digit"]
     assert accuracy.rms_in_contact(found["displacement_digit"], true)[0] < 0.05 * accuracy.height(true).max()
     assert accuracy.height(pressed.displacement[None]).max() > 1.4 * accuracy.height(true).max()
 
