@@ -162,6 +162,7 @@ def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN0
 
 
 def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coating) -> Coating:
+    """Return the calibration's coating with what the gel's material says; the same one if it says nothing else."""
     material = digit_body.coating_of(gel)
     if material is None:
         return coating

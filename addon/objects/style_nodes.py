@@ -71,7 +71,7 @@ def get_input(modifier: bpy.types.NodesModifier, name: str) -> object:
 
 
 def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
-    """Return the data path of a group's input, called name, from its modifier on."""
+    """Return the data path of the input ``name`` of a modifier's node group, to append to the modifier's own path."""
     key = input_of(modifier.node_group, name)
     return f".properties.inputs.{key}.value" if hasattr(modifier, "properties") else f'["{key}"]'
 

@@ -94,7 +94,8 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Measure "convert_KEEP" of latent, displacement, height and image, and "render_fast"; folder : scratch"""
+    """Measure time, memory and bytes of `convert --keep` for each kind of output ("convert_latent") and of the fast
+    picture ("render_fast"), with each number of frames of `FRAMES`; folder : scratch"""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}

@@ -95,7 +95,8 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return, for places (2, n) as (row, column) of a grid of ``shape`` (rows, columns), the 4 x 4 nodes (4, 4, n)
-    around each, as row * columns + column, and their Catmull-Rom weights (4, 4, n). closed : see ``on_grid``"""
+    around each, as row * columns + column, and their Catmull-Rom weights (4, 4, n). closed : true if
+    the columns go round, the first after the last; at other edges places are held within the grid"""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)

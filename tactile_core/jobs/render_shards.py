@@ -118,7 +118,8 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | None:
-    """Return the number of frames and of shards of a prepared input; None where it is not prepared."""
+    """Return the number of frames and of shards of the input ``index`` of a job in ``folder``; None if it is not
+    prepared."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     return InputFacts(count(folder, job), _frames(folder, job))

@@ -52,7 +52,8 @@ def solved(
     gel : the sensor that is solved; found_on : the one on which the networks find contacts
     ball : radius, m, of the ball that touched; None for one as curved as the dent
     Returns the arrays with ``traction_digit`` (T, M, 3) Pa added, zero in frames that were not solved. Under a known
-    ball the expected error shrinks with the dent; its bound stays. A frame without a solution keeps the networks' displacement and is flagged ``GEL_NOT_SOLVED``. Where `gel` differs from `found_on`,
+    ball the expected error shrinks with the dent; its bound stays. A frame without a solution keeps the networks'
+    displacement and is flagged ``GEL_NOT_SOLVED``. Where `gel` differs from `found_on`,
     a frame without a solution is at rest, contacts beside the gel are flagged as beyond it, the networks' latents are
     left out, and errors, which are not known, are NaN."""
     moved, flags, center = arrays["displacement_digit"], arrays["flags"].copy(), arrays["contact_center"]

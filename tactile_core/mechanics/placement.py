@@ -65,8 +65,8 @@ def between(first: Pose, second: Pose, share: float) -> Pose:
 
 
 def surface_drop(lattice: Lattice, indenter: Indenter, pose: Pose, slid: Pose) -> float:
-    """Find how much deeper, m, first touch is at the pose ``slid`` than at ``pose``, which is at first touch; negative
-    where the resting surface rises; 30 mm, more than any sensor is deep, if the indenter has slid off the sensor."""
+    """Return how far, m, the indenter at the pose ``slid`` must move along its direction to touch the resting surface
+    as it does at ``pose``: negative if the surface rises; 30 mm, more than any sensor is deep, if it has slid off."""
     if same_line(pose, slid):
         return 0.0
     try:

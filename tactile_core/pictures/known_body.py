@@ -22,10 +22,11 @@ _ALL = slice(None)
 def out_of_body(
     heights: np.ndarray, camera: Camera, indenter: Indenter, pose: Pose, touching: np.ndarray
 ) -> np.ndarray:
-    """Return heights (H, W) float32, m, of gel raised along +y out of the body that presses it.
+    """Return heights (H, W) float32, m, none of which is inside the body that presses: such gel is moved along +y, away
+    from the body, onto its surface.
 
     heights : (H, W) m, of ``HeightMapper`` for the same camera; pose : of the body, in the sensor's frame
-    touching : (k, 3) m, the displaced nodes that touch; pixels beyond them stay as they are"""
+    touching : (k, 3) m, the displaced nodes that touch; pixels outside their bounding box keep their heights"""
     rows, columns = (
         np.flatnonzero((seen > places.min(initial=np.inf) - _BEYOND) & (seen < places.max(initial=-np.inf) + _BEYOND))
         for seen, places in ((camera.gel_x, touching[:, 0]), (camera.gel_z, touching[:, 2]))

@@ -33,7 +33,9 @@ SCALED_PEAK = 150.0
 
 
 def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Prepare a recording whose finger responds in all frames, by options; frames : those whose signals are returned"""
+    """Turn a recording into signals: counts repaired, their rest found and taken off, flags set, as options say. Each
+    frame must hold readings: the caller has removed those of a finger that was not connected.
+    frames : those whose signals are returned; rest and flags are found from all"""
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
@@ -112,7 +114,8 @@ def _film(
 
 
 def doubt_law(signals: Signals) -> Signals:
-    """Flag frames in contact, and add a warning, where together they resemble no simulated contacts of the sensor."""
+    """Return signals that are flagged ``LAW_DOUBTED`` in all frames in contact, and carry a warning, if these frames,
+    taken as one set, resemble no simulated contacts of the sensor; else the signals as they are."""
     changes = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(changes, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
     return replace(signals, flags=flags, warnings=(*without(signals.warnings, LAW), *filter(None, [doubt])))

@@ -214,7 +214,7 @@ def pdc_counts(pressure: np.ndarray) -> np.ndarray:
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
-    """Return kept fields, force and, where a gel is solved, the centre of pressure."""
+    """Return what ``keep`` names of the frames, their force and, if a gel is among it, the centre of pressure."""
 
     def stacked(fields: Sequence[dict[Sensor, np.ndarray]]) -> dict[Sensor, np.ndarray]:
         return {sensor: np.stack([field[sensor] for field in fields]) for sensor in fields[0]}

@@ -96,7 +96,8 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """Stage of the training. nets : names of networks, or parts of them, that it changes; loss : what it reduces"""
+    """A stage of the training. nets : names of the networks that it changes, or of a part (``S2MPN.code``); loss : the
+    function whose result it reduces"""
 
     name: str
     nets: tuple[str, ...]

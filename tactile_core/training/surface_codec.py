@@ -110,8 +110,7 @@ class SurfaceCodec:
     def _whole(self, rows: np.ndarray) -> Tensor:
         return self._millimetres(rows).flatten(1)
 
-    def _rest_in_window(self, rows: np.ndarray) -> Tensor:
-        whole = self._whole(rows)
+    def _rest_in_window(self, rows: np.ndarray, whole: Tensor) -> Tensor:
         rest = whole - whole @ self.wide.T @ self.wide
         fields = rest.view(len(rows), -1, 3).numpy()
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
@@ -120,10 +119,13 @@ class SurfaceCodec:
         """Return the near basis's input of rows (B,), faded toward the window's edge, where decoded gel would have a
         step."""
         fade = torch.from_numpy(self.frame.fade())
-        return (self._rest_in_window(rows).view(len(rows), *fade.shape, 3) * fade[:, :, None]).flatten(1)
+        return (
+            self._rest_in_window(rows, self._whole(rows)).view(len(rows), *fade.shape, 3) * fade[:, :, None]
+        ).flatten(1)
 
     def _coefficients(self, rows: np.ndarray) -> Tensor:
-        return torch.cat([self._whole(rows) @ self.wide.T, self._rest_in_window(rows) @ self.near.T], -1)
+        whole = self._whole(rows)
+        return torch.cat([whole @ self.wide.T, self._rest_in_window(rows, whole) @ self.near.T], -1)
 
     def _sizes(self, rows: np.ndarray) -> Tensor:
         squares = 1e-6 * self._millimetres(rows).square().sum(-1)

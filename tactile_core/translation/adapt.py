@@ -256,7 +256,8 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains by 1 where the frames do not determine them; return gains (19,), mask of the fitted, and warnings.
+    """Replace gains that the frames do not show, or that are out of range, by 1; return gains (19,), which (19,) bool
+    are fitted, and warnings.
     gain : (19,) as matched; touched : (19,) bool, electrodes with enough contact; found : the whole match"""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []

@@ -31,8 +31,10 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 
 
 class Decoded(NamedTuple):
-    """Translated frames (T,), by index, of a recording, with their time (T,) s, signals and evidence.
-    state : (T, STATE) of the tracked contact; None where each frame is estimated alone"""
+    """Frames of a recording after the networks.
+    frames : (T,) int, their indices in the recording; time : (T,) s; signals : what the networks were given
+    evidence : what they say of each frame alone; translation : the result
+    state : (T, STATE), the contact's state as tracked through time; None if each frame is estimated alone"""
 
     frames: np.ndarray
     time: np.ndarray

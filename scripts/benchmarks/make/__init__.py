@@ -1,3 +1,3 @@
-"""Scripts that make tables and weights that ship: the fast tier's correction, the test contacts, the print of a
-ball.
+"""Scripts that make files of the package: the fast tier's correction, test contacts, the print of a ball for
+calibration.
 """

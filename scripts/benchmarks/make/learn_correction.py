@@ -95,8 +95,9 @@ class Choice(NamedTuple):
 
 
 def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> Learned:
-    """Fit a correction to known samples and their mirror images, by kernel ridge regression with the three settings of
-    ``choices``: for_force by all features, by_few of forces by the ``ESSENTIAL`` ones, for_fields."""
+    """Fit a correction to known samples and their mirror images, by kernel ridge regression.
+    for_force : settings for the force by all features; by_few : for the force by the `ESSENTIAL` ones alone (their mean
+    is taken); for_fields : for the fields of displacement"""
     x = np.concatenate([known.x, known.x * MIRRORED])
     fields = np.concatenate([known.fields, mirrored(known.fields)])
     log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)

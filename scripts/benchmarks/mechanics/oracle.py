@@ -55,7 +55,7 @@ def differences() -> dict[str, float]:
 
 
 class _Other:
-    """The equations of a state by scikit-fem, dense, on our numbering of nodes and pressures."""
+    """The same equations, of a mesh in a given state, assembled by scikit-fem: dense, its unknowns in our order."""
 
     def __init__(self, mesh: HexMesh, state: State) -> None:
         import skfem

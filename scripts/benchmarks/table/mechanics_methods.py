@@ -73,7 +73,7 @@ def _reference(sensor: str, quick: bool) -> Method:
 
 
 def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
-    """Times of random contacts with friction, alone and on paths, where numba is installed."""
+    """Time random contacts with friction, each alone and as steps of a path; no rows without numba. quick : fewer"""
     from benchmarks import measure_loop
 
     if not compiled.available():

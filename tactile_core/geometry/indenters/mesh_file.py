@@ -60,9 +60,9 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
 
 def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
-    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), not moved; those that coincide are united.
-
-    where : names the mesh in messages; scale : m per unit of the vertices. Raises TactileError as ``solid`` does."""
+    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; vertices that coincide
+    become one. where : names the mesh in messages; scale : m per unit of the vertices
+    Raises TactileError for a mesh that is too large, too small, or not closed."""
     import trimesh
 
     check_size(where, np.ptp(vertices, axis=0).max(), scale)

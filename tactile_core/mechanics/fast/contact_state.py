@@ -136,7 +136,8 @@ class Candidates:
 
     @property
     def faced(self) -> np.ndarray:
-        """Mark (k,) bool the nodes that need no more looks for a second face: they are doubled, or looks found none."""
+        """Return which nodes (k,) bool need not be searched any more for a second face of the indenter that they touch:
+        one was found, and the node stands twice in the list, or `_MOST_LOOKS` searches found none."""
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:

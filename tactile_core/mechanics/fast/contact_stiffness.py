@@ -20,7 +20,8 @@ _STRIP = 64  # rows that are mirrored at a time, so that they stay in the proces
 
 
 class ContactStiffness:
-    """Keeps the inverse of the compliance among the points that touched last, and zeros for some that have left."""
+    """Keeps the inverse of the compliance, the stiffness, among the points that touch, and changes it as points come
+    and go. A point that has left may keep its rows and columns, as zeros: to take them out would cost a copy."""
 
     def __init__(self) -> None:
         self._forget()

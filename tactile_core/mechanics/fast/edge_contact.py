@@ -86,7 +86,8 @@ class EdgeContactProblem(ContactProblem):
         return np.concatenate([nodes, self._points.interpolate(nodes)])
 
     def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
-        """Nodes and points less than ``reach`` m outside the indenter, and what nodes those points depend on."""
+        """Return the indices of surface nodes, and of the points between them (``_m`` + point), that lie inside the
+        indenter or less than ``reach`` m outside; the nodes that such a point lies between are among them."""
         near = np.zeros(self._m, bool)
         near[super()._nodes_within(pose, reach + _MARGIN)] = True
         points = np.flatnonzero(near[self._points.nodes].all(axis=1))

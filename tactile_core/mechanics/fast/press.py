@@ -66,9 +66,9 @@ class CorrectedPress:
 
     @in_one_thread
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
-        """Solve the contact at a depth, m, along the motion from ``pose`` (None: the press's own); the result may not
-        have converged (``linear.converged``).
-        touches : true if ``pose`` is known to be at first touch, which is looked for otherwise
+        """Solve the contact at a depth, m, past first touch, along the motion of ``pose`` (None: the press's own). The
+        result may not have converged (``linear.converged``).
+        touches : true if ``pose`` is known to be at first touch; if false, first touch is found from it
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does."""
         there = pose or self.pose
         fall = self._surface_drop(there, touches=touches)

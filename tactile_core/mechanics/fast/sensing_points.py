@@ -40,8 +40,9 @@ class SensingPoints(NamedTuple):
 
 
 def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
-    """Return the sensing points of a sensor's ``mesh``: the inner skin's nearest point to each electrode (its foot, in
-    a triangle of nodes), then the free inner nodes over the core, then those beside it; empty for a gel."""
+    """Return the sensing points of a sensor's ``mesh``: for each electrode the nearest point of the inner skin (within
+    a triangle of nodes), then the inner nodes that are not clamped: those that face the core, then the others; empty
+    for a gel."""
     if not len(mesh.inner):
         return SensingPoints(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))
     feet = electrode_feet(sensor)

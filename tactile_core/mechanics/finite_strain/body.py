@@ -105,7 +105,7 @@ def graded_body(
 ) -> Body:
     """Make a sensor's body, fine where the indenter, ``depth`` m beyond its ``pose`` at first touch, overlaps the
     resting surface.
-    spacing : of the fine part's nodes, over the tier's own; the reference tier's is half the full tier's"""
+    spacing : of the fine part's nodes, as a multiple of the tier's own (the reference tier's is half the full's)"""
     place = _footprint(sensor, indenter, pose, depth)
     footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
     fine = graded(sensor, footprint)

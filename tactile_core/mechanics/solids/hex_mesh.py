@@ -20,8 +20,8 @@ class HexMesh:
     nodes : (n, 3) float64, m
     cells : (n_cells, 27) int, node a + 3 b + 9 c of a cell at (xi, eta, zeta) = (a, b, c) - 1
     clamped : (n,) bool, nodes that do not move
-    surface : (n_surface,) int, nodes of the side that is touched, in the order of its grid (a ``skin_solid``'s poles
-        last): of an ungraded mesh the sensor's surface lattice
+    surface : (n_surface,) int, nodes of the side that is touched, row by row (a ``skin_solid``'s poles last); in a mesh
+        that is nowhere refined they are the nodes of the sensor's surface lattice
     inner : (n_inner,) int, likewise for the inner skin (empty for the gel)"""
 
     nodes: np.ndarray

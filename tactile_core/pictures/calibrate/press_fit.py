@@ -147,7 +147,8 @@ class _PressProblem:
         return x
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """J^T J (n, n), levels squared / m2, and J^T r (n,), levels squared / m, at the last cost's x."""
+        """Return J^T J (n, n), grey levels squared / m2, and J^T r (n,), grey levels squared / m: r are the residuals,
+        J their derivatives by the n numbers of x. `cost` must have been called last with this x, whose r are used."""
         last = self._last
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last

@@ -129,7 +129,7 @@ class Decoder:
         numbers = None if int(of[0]) == NAME else NUMBERS.get(of[1][0])
         if numbers is not None:
             return cursor.numbers(numbers, count)
-        if count > len(cursor.data):
+        if count > len(cursor.data):  # each takes a byte or more
             raise ValueError(f"{count} entries in {len(cursor.data)} bytes")
         return [self._value(cursor, of) for _ in range(count)]
 

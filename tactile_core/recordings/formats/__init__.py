@@ -87,8 +87,9 @@ def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build one finger's recording of a BioTac SP's table; other columns' names go to about. Raises as ``assemble``.
-    finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : in words; style : of names, "{}_e{}" for ff_e1
+    """Build one finger's recording of a BioTac SP's table; `about` lists the names of the other columns.
+    finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : the file's, in words, for `about`
+    style : how columns are named after finger and electrode, "{}_e{}" for ff_e1. Raises TactileError as ``assemble``
     snapshots : true where frames do not follow each other in time"""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}

@@ -1,7 +1,7 @@
 """CSV of 31 columns: time, position (3), force (3), pac0, pac1, pdc, tac, tdc, electrodes0..18.
 
 Components may be written ``position_x``, ``position.x``, ``position0``, ``positionx`` or ``position[0]`` (and so for
-force), with a ROS prefix such as ``field.tactiles0.`` (assumed: no file was at hand)."""
+force), with a ROS prefix such as ``field.tactiles0.`` (these spellings are assumed: no such file was at hand)."""
 
 from __future__ import annotations
 

@@ -81,7 +81,8 @@ class Cells:
     """Kinds of a table's columns: number, time, text. words : of columns of texts, by name; plain : all numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Decide the kinds of the columns called names by the first of rows, lists of cells."""
+        """Decide by the first `LOOKED_AT` rows, lists of cells, what each column holds: numbers, times or words.
+        names : of the columns"""
         self.words: dict[str, Words] = {}
         self._readers: list[Callable[[str], float]] = [_plain_number] * len(names)
         for place, name in enumerate(names):
