@@ -35,7 +35,12 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
     frames : (n,) or slice, whose signals are returned; all frames of the recording decide the result"""
     options = options or PrepareOptions()
     options.check()
+    recording.check()
     check_electrodes(recording.path, recording.electrodes.shape[1], "electrodes", recording.sensor)
+    flags = recording.flags.astype(np.uint16)  # as readers set them, of a recording that was changed by hand, too
+    flags[~np.isfinite(recording.electrodes).all(axis=1)] |= np.uint16(Flag.REPAIRED)
+    flags[1:][np.diff(recording.time) <= 0] |= np.uint16(Flag.TIME_JUMP)
+    recording = dataclasses.replace(recording, flags=flags)
     silent = silent_frames(recording.electrodes)
     if silent.any():
         return _prepare_answers(recording, options, silent).at(frames)

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..errors import TactileError
 from ..files.short_text import Summary
 from ..sensors import SAMPLE_RATE, SOURCE, TARGET
 
@@ -121,6 +122,20 @@ class Recording(Summary):
         rows = {name: value[frames] for name, value in held.items()}
         labels = {name: column[frames] for name, column in self.labels.items()}
         return replace(self, **rows, labels=labels, truth=None if self.truth is None else self.truth.at(frames))
+
+    def check(self) -> None:
+        """Raise TactileError for arrays that do not fit each other, as of a recording that was changed by hand."""
+        for name, axes in {"electrodes": 2, "time": 1, "rows": 1, "flags": 1, "pdc": 1}.items():
+            value = getattr(self, name)
+            if value is None and name == "pdc":
+                continue
+            found, expected = f"a {type(value).__name__}", f"a plain numpy array of numbers, {axes}-D, a row a frame"
+            if isinstance(value, np.ndarray):
+                found += f" {value.shape} of {value.dtype}, beside electrodes {np.shape(self.electrodes)}"
+            plain = isinstance(value, np.ndarray) and not isinstance(value, np.ma.MaskedArray | np.matrix)
+            kinds = "iu" if name == "flags" else "iuf"
+            if not plain or value.ndim != axes or len(value) != len(self.electrodes) or value.dtype.kind not in kinds:
+                raise TactileError(f"{self.path}, {name}", found, expected, "Recording.at takes frames out of all")
 
     @cached_property
     def rate(self) -> float:

@@ -1,5 +1,6 @@
 """Kind, tare, drift: found, reported, overridable."""
 
+import dataclasses
 import json
 import tracemalloc
 
@@ -247,3 +248,31 @@ def test_rest_is_followed_where_it_drifts_further_than_a_press():
     electrodes[38_000:39_000] -= 15.0  # a steady grip as large as the drift, which after so long may be rest
     quiet = find_quiet(electrodes, None, 100.0, "raw").mask
     assert quiet[:37_000].mean() > 0.9 and quiet[39_100:].mean() > 0.9 and not quiet[38_000:39_000].any()
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("time", lambda values: values[:300]),
+        ("time", lambda values: np.tile(values, 2)),
+        ("pdc", lambda values: values[:, None]),
+        ("electrodes", lambda values: values.astype(str)),
+        ("electrodes", lambda values: np.ma.masked_less(values, 3000)),
+        ("flags", lambda values: values.astype(float)),
+    ],
+)
+def test_arrays_that_hands_made_unlike_are_refused_by_name(field, change, press):
+    recording = make_recording(press)
+    by_hand = dataclasses.replace(recording, **{field: change(getattr(recording, field))})
+    with pytest.raises(TactileError, match=rf"{field}: a \w+ .* expected a plain numpy array"):
+        recordings.prepare(by_hand)
+
+
+def test_hands_that_put_time_back_or_cut_samples_out_are_flagged(press):
+    recording = make_recording(press)
+    time, electrodes = recording.time.copy(), recording.electrodes.copy()
+    time[300:] -= 1.0
+    electrodes[20, 3] = np.nan
+    found = recordings.prepare(dataclasses.replace(recording, time=time, electrodes=electrodes)).flags
+    assert found.nonzero()[0].tolist() == [20, 300]
+    assert found[[20, 300]].tolist() == [Flag.REPAIRED, Flag.TIME_JUMP] and not recording.flags.any()

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import accuracy
 from ...pictures.height_map import folds_counted
+from ...recordings.flags import Flag
 from ...recordings.recording import Recording
 from ...recordings.signals import PrepareOptions, Signals
 from ...translation.contact_track import ForwardTracker
@@ -61,17 +62,19 @@ class View:
         self._track = ForwardTracker()
         tools.drawer.warm_up()  # else the first row would wait a second for it
         self.frames, self.passed = 0, 0
+        self._counts: np.ndarray | None = None  # (e,), the last of each electrode that could be read
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
     def show(self, rows: Recording, came: float) -> Shown | None:
         """Translate and draw the last of rows that arrived at `came` (time.perf_counter); None before rest is known."""
         began = time.thread_time()
         self.frames += len(rows)
+        self._counts = _newest(rows.electrodes, self._counts)
         if not self.signals.learn(rows):
             return None
         self.passed += len(rows) - 1
         pdc = np.full(1, np.nan) if rows.pdc is None else rows.pdc[-1:]
-        signals = self.signals.signals(_newest(rows)[None], pdc)
+        signals = self.signals.signals(self._counts[None], pdc)
         translation = self._translation(signals)
         drawer = self._tools.drawer
         gel = drawer.gel(vars(translation))["displacement_digit"]
@@ -80,7 +83,8 @@ class View:
         picture = drawer.draw(heights[0], gel[0])
         latency, work = time.perf_counter() - came, time.thread_time() - began
         force, confidence = translation.force[0], float(translation.confidence[0])
-        flags = int(translation.flags[0])
+        unread = not np.isfinite(rows.electrodes[-1]).all()
+        flags = int(translation.flags[0]) | (Flag.REPAIRED if unread else 0)
         words = in_words(confidence, flags, translation.expected_error_digit[0], accuracy.lengths(gel[0]).max(), force)
         shown = Shown(self.frames - 1, picture, force, latency, work, confidence, flags, words)
         self.latencies.append((latency, work))
@@ -105,11 +109,10 @@ class View:
         )
 
 
-def _newest(recording: Recording) -> np.ndarray:
-    """Return the counts (19,) of the last whole row; NaN cells take earlier rows' values, or 0."""
-    found = np.full(recording.electrodes.shape[1], np.nan)
-    for row in recording.electrodes[::-1]:
-        found = np.where(np.isfinite(found), found, row)
-        if np.isfinite(found).all():
-            break
-    return np.nan_to_num(found)
+def _newest(electrodes: np.ndarray, before: np.ndarray | None) -> np.ndarray:
+    """Return the last counts (e,) of rows electrodes (T, e); NaN cells take earlier rows' values, those before, or 0.
+    before : (e,) counts held so far, None at the start"""
+    found = np.zeros(electrodes.shape[1]) if before is None else before
+    for row in electrodes:
+        found = np.where(np.isfinite(row), row, found)
+    return found

@@ -309,3 +309,14 @@ def test_a_pressure_that_denies_or_shows_a_contact_counts():
     assert held.learn(seen) and "unit's own" in held.found
     faint = held.signals(np.full((2, 19), 3194.0), np.array([1000.0, 1050.0]))
     assert faint.pdc.tolist() == [0.0, 50.0] and faint.change.any(axis=1).tolist() == [False, True]
+
+
+def test_a_cell_that_cannot_be_read_keeps_its_last_count_and_is_flagged():
+    """Finished recordings are played a row at a time; a missing count is no 0: a touch of 3200 counts."""
+    view = live.View(fake_tools.tools(), 100.0)
+    calm = 3200 + np.random.default_rng(3).normal(0, 0.5, (61, 19))
+    view.show(rows_of(calm[:60]), 0.0)
+    lost = rows_of(np.tile(calm[60], (8, 1)))
+    lost.electrodes[-1, 4] = np.nan
+    shown = view.show(lost.at(np.array([7])), 0.0)
+    assert shown.newtons < 0.1 and shown.flags == Flag.REPAIRED
