@@ -20,7 +20,7 @@ def add_gel(
     group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None, sensor: str = sensors.TARGET
 ) -> bpy.types.Object:
     """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin
-    if given, and toward -x of the collection's gels."""
+    if given, whose indenters move over it, and toward -x of the collection's gels."""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} gel"
     gel = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
@@ -32,6 +32,9 @@ def add_gel(
     if beside is not None:
         gel.location = beside.location
         gel.location.y += BESIDE * per_metre
+        for thing in beside.children:
+            if thing.tactile.role == "INDENTER":  # where both are, its places refer to the gel
+                thing.parent = gel
     gel.location.x -= others * _BEHIND * per_metre
     return gel
 

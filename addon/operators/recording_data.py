@@ -207,7 +207,8 @@ def _in_files(
     name : of the recording; key : all that the files depend on; both make the files' names, so that none is replaced
     """
     token, folder = hashlib.sha256(repr(key[:-1]).encode()).hexdigest()[:8], kept_files.folder(kept_files.CACHE)
-    files = [folder / f"{bpy.path.clean_name(f'{name} {sensor} {token}')}.pc2" for sensor in pair]
+    # A file's name holds 255 bytes, of which a letter takes up to four.
+    files = [folder / f"{bpy.path.clean_name(f'{name[:50]} {sensor} {token}')}.pc2" for sensor in pair]
     light = []
     with contextlib.ExitStack() as both:
         writers = [both.enter_context(mesh_cache.writing(file, sensor, key[-2], frames))

@@ -424,6 +424,16 @@ def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
     assert np.linalg.norm(scene.objects["BioTac skin"]["force"]) == pytest.approx(0.1, rel=0.05)
 
 
+def test_an_indenter_of_a_biotac_alone_presses_a_gel_that_comes_later(scene):
+    bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    bpy.ops.tactile.add_indenter(shape="sphere")
+    ball = bpy.context.object
+    bpy.ops.tactile.add_sensor(sensor="DIGIT")
+    bpy.context.view_layer.objects.active = ball
+    assert bpy.ops.tactile.snap_to_gel(depth=0.1) == {"FINISHED"}
+    assert ball.parent == scene.objects["DIGIT gel"]
+
+
 def test_a_bound_picks_the_tiers_or_is_refused(scene):
     bpy.ops.tactile.add_sensor(sensor="DIGIT")
     _press(scene)

@@ -47,6 +47,12 @@ def test_a_mesh_cache_plays_the_same(imported, nodes_of, part, scene, tmp_path):
     assert skin.modifiers["Tactile"].filepath.startswith("//tactile_cache")
 
 
+def test_a_mesh_cache_bears_a_name_as_long_as_files_have(imported, tmp_path):
+    path = tmp_path / f"{'指' * 84}.h5"
+    path.write_bytes(RECORDING.read_bytes())
+    imported(filepath=str(path), frames="70:90", motion="MESH_CACHE")
+
+
 def test_save_as_elsewhere_takes_caches_along_and_finds_the_recording(imported, scene, tmp_path):
     for name in ("a", "b", "c"):
         (tmp_path / name).mkdir()
