@@ -1,4 +1,4 @@
-"""Bridges between Blender and ``tactile_core``: what a user sees and clicks, and nothing that computes."""
+"""Connect Blender to ``tactile_core``: this package holds what a user sees and clicks, ``tactile_core`` computes."""
 
 from __future__ import annotations
 
@@ -69,10 +69,11 @@ def unregister() -> None:
 
 
 def _register(part: ModuleType) -> None:
-    """Register what a part declares, then call its own `register`, if it has one.
+    """Register what a module ``part`` lists, then call its own `register`. It may lack that, and each of these lists:
 
-    CLASSES : of Blender's kinds; MENUS : (menu, function that draws the entry); HANDLERS : (list of
-    ``bpy.app.handlers``, function); POINTERS : (kind of data-block, name of its property, group of properties)
+    CLASSES : classes for Blender to register; MENUS : pairs (menu, function that draws an entry in it)
+    HANDLERS : pairs (list in ``bpy.app.handlers``, function to add to it)
+    POINTERS : (type of data-block, name of its new property, property group)
     """
     for kind in _declared(part, "CLASSES"):
         bpy.utils.register_class(kind)

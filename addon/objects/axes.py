@@ -19,18 +19,20 @@ _SIGNS = np.array([1.0, 1.0, -1.0], np.float32)
 
 
 def to_blender(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """Convert sensor points or displacements (..., 3) m to float32 Blender units, ``per_metre`` in a metre."""
+    """Convert points or displacements (..., 3) m from the sensors' frame to Blender's axes and units, float32.
+    per_metre : Blender units in a metre"""
     return np.asarray(points, np.float32)[..., [0, 2, 1]] * (_SIGNS * np.float32(per_metre))
 
 
 def to_sensor(points: np.ndarray, per_metre: float) -> np.ndarray:
-    """Convert points or displacements (..., 3), ``per_metre`` units in a metre, to float64 m: undoes to_blender."""
+    """Convert points or displacements (..., 3) from Blender's axes and units to the sensors' frame, float64 m.
+    per_metre : Blender units in a metre"""
     x, y, z = np.moveaxis(np.asarray(points, np.float64) / per_metre, -1, 0)
     return np.stack([x, -z, y], -1)
 
 
 def from_world(sensor: bpy.types.Object) -> Matrix:
-    """Return the matrix from the world to a sensor object's own axes; raises TactileError for one without volume."""
+    """Return the matrix from world axes to a sensor object's own. Raises TactileError for an object scaled to 0."""
     try:
         return sensor.matrix_world.inverted()
     except ValueError:
@@ -50,15 +52,16 @@ def use_millimetres(scene: bpy.types.Scene) -> None:
 
 
 def to_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Convert places (..., 3) m, image frame (right, down, camera), to the gel's axes, ``per_metre`` units a metre."""
+    """Convert places (..., 3) m in the picture's frame (right, down, toward the camera) to the gel object's axes and
+    units. camera : the one that makes the picture; per_metre : Blender units in a metre"""
     right, down, toward = np.moveaxis(np.asarray(places, float), -1, 0)
     x, z = camera.centre_x + camera.down_x * down, camera.centre_z + camera.right_z * right
     return to_blender(np.stack([x, camera.height_zero_y + toward, z], -1), per_metre)
 
 
 def from_gel(places: np.ndarray, camera: Camera, per_metre: float) -> np.ndarray:
-    """Convert places (..., 3) in the gel object's axes and units, ``per_metre`` in a metre, to the image frame, float64
-    m: the inverse of ``to_gel``."""
+    """Convert places (..., 3) in the gel object's axes and units to the picture's frame, float64 m; undoes ``to_gel``.
+    camera : the one that makes the picture; per_metre : Blender units in a metre"""
     x, y, z = np.moveaxis(to_sensor(places, per_metre), -1, 0)
     right, down = camera.right_z * (z - camera.centre_z), camera.down_x * (x - camera.centre_x)
     return np.stack([right, down, y - camera.height_zero_y], -1)

@@ -1,4 +1,4 @@
-"""A sensor of skin and fluid in the scene, as a BioTac: its skin and core, in a collection of their own."""
+"""Add a sensor of skin and fluid, such as a BioTac, to the scene: its skin and core, in a collection of their own."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def new_collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensors.SOURCE) -> bpy.types.Object:
-    """Add the resting outer skin of a sensor and return it; per_metre : Blender units in a metre"""
+    """Add a sensor's outer skin at rest to a collection, return the new object. per_metre : Blender units in a metre"""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} skin"
     skin = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
@@ -36,7 +36,7 @@ def add_skin(group: bpy.types.Collection, per_metre: float, sensor: str = sensor
 
 
 def add_core(group: bpy.types.Collection, skin: bpy.types.Object) -> bpy.types.Object:
-    """Add the rigid core under the pad, and the bone and nail that hold it, to the skin; return the core."""
+    """Add children to the skin: the rigid core under its pad, and bone and nail, which hold it; return the core."""
     sensor = properties.sensor_name(skin)
     shape = sensors.skin_of(sensor)
     known = shape.descriptor.core

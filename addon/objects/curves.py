@@ -1,4 +1,4 @@
-"""F-curves written whole, for every way that Blender 4.2 to 5.2 keeps them."""
+"""Write and read whole F-curves, however Blender 4.2 to 5.2 stores them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PROPERTIES = {  # custom ones of a sensor, keyframed: for drivers of the user's 
 
 
 def fcurves_of(owner: bpy.types.ID) -> Any:
-    """Return the F-curves of a datablock's action, which is made where it is missing."""
+    """Return the F-curves of a datablock's action; a datablock without an action gets one."""
     animation = owner.animation_data or owner.animation_data_create()
     if animation.action is None:
         animation.action = bpy.data.actions.new(f"{owner.name} Tactile")
@@ -44,8 +44,10 @@ def fcurves_of(owner: bpy.types.ID) -> Any:
 def write_curve(
     owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, index: int = 0, lines: int = LINEAR
 ) -> None:
-    """Replace one F-curve, by data path and index, by one through values (T,) at frames (T,) of the scene.
-    lines : LINEAR joins them by straight lines, CONSTANT by steps"""
+    """Write the F-curve of one property through values (T,) at frames (T,) of the scene, in place of an earlier curve.
+
+    path, index : the property's data path, and which of its numbers
+    lines : LINEAR joins the values by straight lines, CONSTANT holds each until the next"""
     curves = fcurves_of(owner)
     old = curves.find(path, index=index)
     if old is not None:
@@ -59,13 +61,13 @@ def write_curve(
 
 
 def write_curves(owner: bpy.types.ID, path: str, frames: np.ndarray, values: np.ndarray, lines: int = LINEAR) -> None:
-    """Write one F-curve per column of ``values`` (T, k) at ``frames`` (T,); owner, path, lines: see ``write_curve``."""
+    """Write one F-curve per column of ``values`` (T, k) at ``frames`` (T,); owner, path, lines : of ``write_curve``"""
     for index in range(values.shape[1]):
         write_curve(owner, path, frames, values[:, index], index, lines)
 
 
 def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
-    """Return the keyed values (T,) of one F-curve, by data path and index, none where there is none."""
+    """Return the values (T,) of the keyframes of the F-curve with this data path and index; (0,) if there is none."""
     curve = fcurves_of(owner).find(path, index=index)
     if curve is None:
         return np.zeros(0)
@@ -75,9 +77,9 @@ def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
 
 
 def write_properties(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
-    """Set and keyframe custom properties: values (T,) or (T, k) by the names of ``PROPERTIES``, at frames (T,).
+    """Set and keyframe custom properties of an object, and remove those that an earlier animation left.
 
-    Others of these names, of an animation before, are removed."""
+    values : name in ``PROPERTIES`` -> (T,) or (T, k); frames : (T,) of the scene"""
     stale = {f'["{name}"]': name for name in PROPERTIES if name in thing and name not in values}
     for curve in [curve for curve in fcurves_of(thing) if curve.data_path in stale]:
         fcurves_of(thing).remove(curve)

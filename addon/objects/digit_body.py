@@ -1,4 +1,4 @@
-"""The body of a gel's sensor, as a DIGIT: three LEDs, camera, acrylic and housing, as children of the gel."""
+"""Add the body of an optical sensor, such as a DIGIT, to its gel: LEDs, camera, acrylic, housing, all its children."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0,
 
 
 def parts_of(gel: bpy.types.Object) -> list[bpy.types.Object]:
-    """Return the gel's parts that some scene shows; parts that came along with an appended gel are in no scene."""
+    """Return the gel's children that are in a scene; those that came along with an appended gel are in none."""
     return [thing for thing in gel.children_recursive if thing.users_scene]
 
 
@@ -82,10 +82,10 @@ def reset(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def _link_light(gel: bpy.types.Object) -> None:
-    """Let LEDs light the gel alone, through its body, by Blender's light linking; LEDs linked by hand stay.
+    """Let LEDs light the gel alone, and shine through the body, by Blender's light linking.
 
-    The calibration places some LEDs outside the housing, which must not hide them; and as gel and housing throw no
-    shadow, their light would else fall on what stands around.
+    The calibration places some LEDs outside the housing, which must not hide them. Without linking, their light would
+    fall on what stands around, as gel and housing throw no shadow. LEDs that the user has linked stay as they are.
     """
     leds = leds_of(gel).values()
     new = [led for led in leds if led.light_linking.receiver_collection is None]
@@ -106,7 +106,7 @@ def _link_light(gel: bpy.types.Object) -> None:
 
 
 def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:
-    """Add the light scattered in gel and acrylic (``held_light``), which follows the LEDs' power."""
+    """Let the gel's material add the light scattered in gel and acrylic (``held_light``) and scale it by LED power."""
     held_light.write(gel, unit)
     gel.visible_shadow = False  # its dome, higher than the calibrated gel's, would hide the LEDs from its edges
     material = coating_of(gel)
@@ -121,7 +121,7 @@ def _power(led: Led, gel: bpy.types.Object) -> float:
 
 
 def watts_per_brightness(per_metre: float) -> float:
-    """Blender's power, W, of a lamp of radiance x radius^2 = 1 level m^2, with which 255 levels render as white.
+    """Return the power, W, of Blender's lamp for a brightness (radiance x radius^2) of 1 level m^2, with white at 255.
     per_metre : Blender units in a metre
 
     A point lamp of power P lights a matte coating of albedo a at distance d to a P / (4 pi^2 d^2); the calibration's
@@ -131,7 +131,8 @@ def watts_per_brightness(per_metre: float) -> float:
 
 
 def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) -> None:
-    """Put the camera object ``lens`` where a calibration's ``camera`` seems to be, with its angle of view."""
+    """Put the camera object ``lens`` at the apparent place of a calibration's ``camera``, after refraction by gel and
+    acrylic, with its angle of view."""
     per_metre, high = gel.tactile.per_metre, camera.apparent_height
     lens.location = axes.to_gel([[0, 0, high]], camera, per_metre)[0]
     # It looks up into the gel, its own -Z along the scene's Z; the fingertip, -X, is up in the picture.

@@ -1,6 +1,6 @@
-"""Materials of a DIGIT's body for Cycles and EEVEE; the coating's numbers are those that the picture is made with.
+"""Make a DIGIT's materials for Cycles and EEVEE; the coating has the numbers by which the toolkit draws its picture.
 
-Acrylic and housing reflect toward a camera alone: what they reflect onto the gel is part of its ``held_light``.
+Acrylic and housing reflect into the camera alone: what they reflect onto the gel is part of its ``held_light``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _PLACES = {ALBEDO: (-300, 200), ROUGHNESS: (-300, 0), GLOSS: (-300, -150)}
 
 
 def new_coating(coating: Coating) -> bpy.types.Material:
-    """Make the paint on the gel: albedo, roughness and gloss are nodes, which can be keyed and driven."""
+    """Make the material of the gel's coating. Albedo, roughness and gloss are nodes, so that they can be keyed."""
     material, shader = _new("DIGIT coating", (0.75, 0.75, 0.78, 1.0))
     nodes, links = material.node_tree.nodes, material.node_tree.links
     for name, kind, socket in ((ALBEDO, "ShaderNodeRGB", "Base Color"), (ROUGHNESS, "ShaderNodeValue", "Roughness"),
@@ -32,8 +32,8 @@ def new_coating(coating: Coating) -> bpy.types.Material:
 
 
 def keep_leds_inside(material: bpy.types.Material) -> None:
-    """Tilt the normals of a gel's outer side up in its material, so that LEDs below its rim do not colour that side,
-    on which the body throws no shadow. Normals of the inner side stay."""
+    """Tilt the shading normals of a gel's outer side up in its material: LEDs below its rim must not light that side,
+    and the body, which would shade it, throws no shadow. Normals of the inner side stay."""
     nodes = Nodes(material.node_tree)
     lit = nodes.add("ShaderNodeAttribute", attribute_name=LIT).outputs["Fac"]
     own = nodes.add("ShaderNodeTexCoord").outputs["Normal"]
@@ -46,7 +46,7 @@ def keep_leds_inside(material: bpy.types.Material) -> None:
 
 
 def set_coating(material: bpy.types.Material, coating: Coating) -> None:
-    """Write a coating's numbers into its material, whose keys and drivers are removed; a matte coating gets gloss 0."""
+    """Write a coating's numbers into its material and remove its keys and drivers; a matte coating gets gloss 0."""
     if material.node_tree.animation_data:
         material.node_tree.animation_data_clear()
     gloss = 0.0 if coating.bsdf == DIFFUSE else coating.gloss
@@ -56,13 +56,13 @@ def set_coating(material: bpy.types.Material, coating: Coating) -> None:
 
 
 def sockets_of(material: bpy.types.Material) -> dict[str, bpy.types.NodeSocket]:
-    """Return the sockets of a coating's "Albedo", "Roughness" and "Gloss", by name, but for deleted nodes'."""
+    """Return name -> socket of a coating's "Albedo", "Roughness" and "Gloss"; nodes that were deleted are left out."""
     nodes = material.node_tree.nodes
     return {name: nodes[name].outputs[0] for name in _PLACES if name in nodes}
 
 
 def acrylic() -> bpy.types.Material:
-    """Make or find clear acrylic: it passes all light, as its losses are in the calibration, and adds reflections."""
+    """Make or find clear acrylic: all light passes, as the calibration has its losses, and reflections are added."""
     found = bpy.data.materials.get("DIGIT acrylic")
     if found is not None:
         return found
@@ -96,7 +96,7 @@ def of_body(name: str, colour: list[float], roughness: float, metallic: float = 
 
 
 def toward_camera(nodes: Nodes, value: bpy.types.NodeSocket | float) -> bpy.types.NodeSocket:
-    """Return a node's output: ``value`` for rays that come from a camera, 0 for all others."""
+    """Add nodes whose output is ``value`` for rays from the camera and 0 for all others; return that output."""
     return nodes.math("MULTIPLY", nodes.add("ShaderNodeLightPath").outputs["Is Camera Ray"], value)
 
 

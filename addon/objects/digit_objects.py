@@ -1,4 +1,4 @@
-"""A sensor's gel in the scene, and its displacement read back from whatever moves it."""
+"""Add a sensor's gel to the scene, and read its displacement back, whatever moves it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ BESIDE = 35.1e-3  # m between skin and gel: a legend's width, and a gap
 def add_gel(
     group: bpy.types.Collection, per_metre: float, beside: bpy.types.Object | None = None, sensor: str = sensors.TARGET
 ) -> bpy.types.Object:
-    """Add a sensor's resting gel to a collection, ``per_metre`` Blender units per metre, and return it: beside a skin
-    if given, whose indenters move over it, and toward -x of the collection's gels."""
+    """Add a sensor's gel at rest to a collection and return the new object. It stands beside the skin ``beside``, if
+    given, takes over that skin's indenters, and stands the further toward -x the more gels the collection has.
+    per_metre : Blender units in a metre"""
     surface = sensors.sensor_surface(sensor)
     name = f"{sensors.title(sensor)} gel"
     gel = surfaces.new_mesh_object(name, axes.to_blender(surface.rest, per_metre), surface.faces)
@@ -42,8 +43,8 @@ def add_gel(
 def displacement_of(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
     """Return the displacement (n, 3) m of the gel's nodes as the scene has them now, all keys and modifiers applied.
 
-    Raises TactileError for a gel that is hidden or edited, which Blender leaves at rest, whose mesh itself moved, where
-    modifiers have changed the number of vertices, and where they lack the file that moves the gel.
+    Raises TactileError if the gel is hidden or in Edit Mode, where Blender shows it at rest, if its mesh was moved
+    within the object, if modifiers changed the number of vertices, or if the mesh cache that moves it is missing.
     """
     if not any(each.object.original == gel for each in depsgraph.object_instances):
         found = f"hidden in view layer {depsgraph.view_layer.name}"

@@ -1,4 +1,4 @@
-"""The unit that a scene shows: the calibration with LEDs, coating and camera as their objects are now."""
+"""Read from a scene the unit that it shows: a calibration with LEDs, coating and camera as their objects are now."""
 
 from __future__ import annotations
 
@@ -51,14 +51,14 @@ def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Cali
 
 
 def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.ndarray, camera: Camera) -> np.ndarray:
-    """World points (n, 3) in the image frame, m."""
+    """Convert points (n, 3) in world axes and Blender units to the picture's frame (right, down, toward camera), m."""
     inverse = np.array(axes.from_world(gel.evaluated_get(depsgraph)))
     own = np.asarray(points, float) @ inverse[:3, :3].T + inverse[:3, 3]
     return axes.from_gel(own, camera, gel.tactile.per_metre)
 
 
 def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, ANN202
-    """The unit's LEDs and, as lamps, their light in other bands than their own."""
+    """Return the unit's LEDs as the scene has them, and lamps for their light of other colours than their own."""
     found, others = [], []
     things = digit_body.leds_of(gel)
     for k, led in enumerate(unit.leds):
@@ -99,19 +99,20 @@ def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.D
 
 
 def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> list[Lamp]:
-    """Point lamps of the scene that are no LED."""
+    """List the scene's point lamps that are no LEDs."""
     things = [t for t in depsgraph.scene.objects if t.type == "LIGHT" and t.tactile.role != "LED" and not t.hide_render]
     return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
 
 
 def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormatSettings:
-    """Return whose colour management rendered files have: the scene's, or the output's own."""
+    """Return what holds the colour management of rendered files: the scene, or the output if it has its own."""
     image = scene.render.image_settings
     return image if image.color_management == "OVERRIDE" else scene
 
 
 def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") -> list[str]:
-    """List in words what a gel's pictures by a preset ("": any) leave out of the scene, and what changes levels."""
+    """List in words what pictures of a gel leave out of the scene, and which settings change their levels in files.
+    preset : by which they are drawn; "" lists what all presets leave out"""
     lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role in ("NONE", "LED") and not t.hide_render]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     if preset == "fast":
@@ -145,7 +146,7 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202
-    """Meshes of the user's own that reach into the housing, on the camera's side of the gel."""
+    """Yield the user's own meshes that reach into the housing, on the camera's side of the gel."""
     reach = max(float(np.abs(np.array(led.position[:2])).max()) + led.radius for led in unit.leds)
     for thing in depsgraph.scene.objects:
         if thing.type != "MESH" or thing.tactile.role != "NONE" or thing.hide_render:
@@ -162,7 +163,7 @@ def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN0
 
 
 def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coating) -> Coating:
-    """Return the calibration's coating with what the gel's material says; the same one if it says nothing else."""
+    """Return the calibration's coating with the numbers that the gel's material has; itself if they are the same."""
     material = digit_body.coating_of(gel)
     if material is None:
         return coating
@@ -183,7 +184,7 @@ def _coating(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, coating: Coa
 
 
 def _camera(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> Camera:
-    """The calibration's camera, moved and zoomed as its object is; its pixels' aspect stays."""
+    """Return the calibration's camera, moved and zoomed as its object in the scene is; its pixels' aspect stays."""
     thing = digit_body.camera_of(gel)
     if thing is None:
         return camera

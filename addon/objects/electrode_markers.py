@@ -1,4 +1,4 @@
-"""Small balls under the skin, one per electrode, coloured by their signal."""
+"""Add small balls under the skin, one per electrode, coloured by the electrode's signal."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ _HIGH, _LOW = np.array([0.9, 0.05, 0.02]), np.array([0.02, 0.15, 0.9])  # film t
 
 
 def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> list[bpy.types.Object]:
-    """Add the markers E1, E2, ..., in place of former ones; red where the reading rose, blue where it fell.
+    """Add the markers E1, E2, ..., in place of former ones; red while a reading is above rest, blue while below.
 
-    change : (T, e) counts; the strongest colour stands for the largest change; frames : (T,) of the scene, its times"""
+    change : (T, e) counts against rest; the largest has the strongest colour; frames : (T,) of the scene"""
     for old in [thing for thing in skin.children if thing.tactile.role == "ELECTRODE"]:
         bpy.data.objects.remove(old)
     colours = colours_of(change)
@@ -38,7 +38,7 @@ def add_markers(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) 
 
 
 def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -> None:
-    """Give each node of the skin the change (T, e), counts, of the electrode nearest to it, as an attribute.
+    """Give each node of the skin, as an attribute, the change (T, e), counts against rest, of the nearest electrode.
     frames : (T,), evenly spaced, of the scene"""
     rest, places = properties.surface_of(skin).rest, sensors.electrodes(properties.sensor_name(skin))
     # An electrode shows where the skin is nearest to it.
@@ -53,7 +53,7 @@ def add_counts(skin: bpy.types.Object, change: np.ndarray, frames: np.ndarray) -
 
 
 def colours_of(change: np.ndarray) -> np.ndarray:
-    """Convert change (T, e), counts, to (T, e, 3) colours: grey at rest, red where it rises, blue where it falls."""
+    """Convert change (T, e), counts against rest, to RGB (T, e, 3), 0 to 1: grey for 0, red above it, blue below."""
     share = change / max(float(np.abs(change).max(initial=0.0)), 1.0)
     strength = np.sqrt(np.abs(share))[..., None]  # light touches show too
     return _REST + strength * (np.where(share[..., None] > 0, _HIGH, _LOW) - _REST)

@@ -1,4 +1,4 @@
-"""A mesh attribute that changes from frame to frame: geometry nodes look it up in an image.
+"""Give a mesh an attribute that changes from frame to frame: geometry nodes look it up in an image.
 
 The image has a column per value and a row per frame; it is packed into the .blend, so that the attribute plays
 without the add-on.
@@ -19,10 +19,10 @@ COUNTS = "electrode_counts"  # of a skin: change of the nearest electrode, count
 def add(
     thing: bpy.types.Object, name: str, values: np.ndarray, first: float, step: float, column: str | None = None
 ) -> None:
-    """Give an object's mesh the attribute ``name``.
+    """Give an object's mesh the attribute ``name``, which takes row after row of ``values`` (T, k), bool or float.
 
-    values : (T, k), bool or float; first, step : scene frame of the first row, scene frames per row
-    column : name of the int attribute that holds each node's column of ``values``; None: node i has column i
+    first, step : the scene's frame of the first row, and scene frames per row
+    column : name of the int attribute that says which column a node takes; None if node i takes column i
     """
     rows, columns = values.shape
     words = name.replace("_", " ")
@@ -45,7 +45,7 @@ def add(
 
 
 def _remove_group(group: bpy.types.NodeTree | None) -> None:
-    """Remove a modifier's group and its image, unless a copied object has them too."""
+    """Remove a modifier's node group and its image, unless a copied object uses the group too."""
     if group is None or group.users > 1:
         return
     held = [socket.default_value for node in group.nodes for socket in node.inputs if socket.type == "IMAGE"]
@@ -56,7 +56,7 @@ def _remove_group(group: bpy.types.NodeTree | None) -> None:
 
 
 def modifier_of(thing: bpy.types.Object, name: str) -> bpy.types.Modifier | None:
-    """Return the modifier that gives an object the attribute ``name``, if any."""
+    """Return the modifier that gives an object the attribute ``name``; None if there is none."""
     return thing.modifiers.get(f"Tactile {name.replace('_', ' ')}")
 
 

@@ -1,4 +1,4 @@
-"""Light held in gel and acrylic, for Cycles and EEVEE: a DIGIT's picture at rest less its lamps' direct light.
+"""Add "held light", which gel and acrylic scatter, for Cycles and EEVEE: a DIGIT's picture at rest less direct light.
 
 Three attributes of the gel's points hold it, one per LED, in levels of each channel at the calibration's power and an
 albedo of 1. The coating's material adds them to the lamps' light, scaled by the present power and albedo. As the
@@ -41,7 +41,8 @@ def write(gel: bpy.types.Object, unit: Calibration) -> None:
 
 
 def held_light(unit: Calibration) -> np.ndarray:
-    """Return grey levels (n, channel, LED), both red, green, blue, of the resting picture less its lamps' light."""
+    """Return grey levels (n, 3, 3) at the gel's nodes, by channel and LED, each red, green, blue: the picture at rest
+    less the lamps' direct light."""
     radiance = open_radiance(unit)
     levels = by_led(unit, radiance)
     diagonal = np.arange(3)
@@ -56,7 +57,7 @@ def held_light(unit: Calibration) -> np.ndarray:
 
 
 def _lamp_light(unit: Calibration) -> np.ndarray:
-    """Levels (n, 3) that each LED's lamp gives the gel's nodes as Blender has them, by Lambert's law."""
+    """Return the grey levels (n, 3) that the lamp of each LED gives the resting gel's nodes, by Lambert's law."""
     surface, camera = unit.camera.surface, unit.camera
 
     def in_image(points: np.ndarray) -> np.ndarray:
@@ -74,10 +75,10 @@ def _lamp_light(unit: Calibration) -> np.ndarray:
 
 
 def add_nodes(material: bpy.types.Material) -> None:
-    """Let a coating emit the held light, on its inner side and toward a camera alone.
+    """Let a coating's inner side emit the held light, for rays from the camera alone.
 
-    Its inner side then reflects no light onto itself: the held light includes that, a part of a level at rest, and
-    Blender's gel, whose dome (the public mesh's) is three times as high, would add more.
+    Blender must not let that side light itself: the held light includes this, less than a level at rest, and Blender's
+    gel, whose dome (the public mesh's) is three times as high, would add more.
     """
     nodes = Nodes(material.node_tree)
     for left in [node for node in nodes.tree.nodes if node.name.startswith(NODE)]:
@@ -105,7 +106,7 @@ def add_nodes(material: bpy.types.Material) -> None:
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
     """Let each LED's held light in a coating follow that LED's power, by drivers, which work without the add-on.
 
-    leds, full : by colour ("red", ...), the LED objects, and Blender's power, W, of their lamps in the calibration
+    leds : colour ("red", ...) -> its LED object; full : colour -> power, W, of its lamp by the calibration
     """
     for k, name in enumerate(COLOURS):
         socket = material.node_tree.nodes[attribute(name)].outputs[0]

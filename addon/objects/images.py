@@ -1,4 +1,4 @@
-"""Image datablocks and the arrays in them. Arrays have the picture's first row first, Blender's pixels the last."""
+"""Make Blender images of arrays. An array begins with the picture's top row, Blender's pixels with the bottom row."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NAMES = {"picture": "{} picture", "heights": "{} height map"}  # property of a 
 
 
 def fill(image: bpy.types.Image, values: np.ndarray) -> None:
-    """Set the pixels: values (H, W, 3) or (H, W), 0..1 or, in float images, anything."""
+    """Set an image's pixels to values (H, W, 3), or (H, W) for grey: 0 to 1, in float images any number."""
     pixels = np.ones((*values.shape[:2], 4), np.float32)
     pixels[..., :3] = values[::-1] if values.ndim == 3 else values[::-1, :, None]
     image.pixels.foreach_set(pixels.ravel())
@@ -23,9 +23,9 @@ def fill(image: bpy.types.Image, values: np.ndarray) -> None:
 
 
 def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
-    """Make an image of values (H, W) bool, packed as a PNG of one bit per pixel.
+    """Make an image of values (H, W) bool, packed into the .blend as a PNG of one bit per pixel.
 
-    Set as pixels, a long recording's values would take gigabytes for a moment.
+    Set as pixels instead, a long recording's values would take gigabytes for a moment.
     """
     rows = np.pad(np.packbits(values, axis=1), ((0, 0), (1, 0)))  # each begins with its filter: none
     packed = png_file(values.shape[::-1], 1, 0, zlib.compress(rows.tobytes()))
@@ -36,9 +36,9 @@ def packed_mask(name: str, values: np.ndarray) -> bpy.types.Image:
 
 
 def image_of(gel: bpy.types.Object, kind: str) -> bpy.types.Image | None:
-    """Return a gel's own "picture" or "heights", None if it was not drawn.
+    """Return a gel's own image of a kind, "picture" or "heights"; None if it has not been drawn yet.
 
-    A copied gel holds the first one's (by name) until it is drawn; a gel of a former version holds none."""
+    A copied gel refers to the original's image until it is drawn itself: the gel first by name owns a shared image."""
     own = getattr(gel.tactile, kind)
     image = own or bpy.data.images.get(_NAMES[kind].format(_title(gel)))
     gels = (thing for thing in bpy.data.objects if thing.tactile.role == "DIGIT" and thing != gel)
@@ -52,8 +52,8 @@ def _title(gel: bpy.types.Object) -> str:
 
 
 def show(gel: bpy.types.Object, kind: str, values: np.ndarray) -> bpy.types.Image:
-    """Show values in a gel's own image of a kind: "picture", (H, W, 3) uint8, in sRGB, which editors show as it is;
-    or "heights", (H, W) m, in millimetres."""
+    """Write values into a gel's own image of a kind and return it.
+    values : (H, W, 3) uint8, sRGB, for the kind "picture"; (H, W) m for "heights", whose image holds millimetres"""
     image, floats, size = image_of(gel, kind), kind == "heights", values.shape[1::-1]
     if image is not None and (tuple(image.size) != size or image.is_float != floats):
         bpy.data.images.remove(image)

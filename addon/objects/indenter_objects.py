@@ -1,5 +1,5 @@
-"""Indenters as objects: of a spec, or of the user's own mesh; and the spec and mesh file read back from them. A spec's
-mesh is made in its own frame and in metres.
+"""Make indenter objects of specs (kind and sizes, as in a scene file), and read specs back from objects. A user's own
+mesh can be an indenter too: it has no spec until it is read.
 
 `thing` is an indenter's object; `depsgraph` holds the scene on this frame, keys and modifiers applied.
 """
@@ -29,7 +29,7 @@ _DIRECTIONS = 4000  # hull points of a body: edges of 0.5 mm round then look rou
 
 
 def add_indenter(group: bpy.types.Collection, spec: Any, per_metre: float) -> bpy.types.Object:
-    """Add the object of a spec of ``indenter_specs``, whose origin is where the body touches, and return it.
+    """Add an object for a spec of ``indenter_specs`` and return it. Its origin is the point that touches first.
     per_metre : Blender units in a metre"""
     import msgspec
 
@@ -52,9 +52,9 @@ def fingerprint(thing: bpy.types.Object) -> str:
 
 
 def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
-    """Raise TactileError for an object that cannot press: mirrored, or a spec's body scaled, turned or edited.
+    """Raise TactileError for an object that cannot press: it is mirrored, or was made from a spec and later changed.
 
-    relative : (3, 3), of ``world_axes``
+    relative : (3, 3), the object's axes by ``world_axes``
     """
     if np.linalg.det(relative) <= 0:
         advice = "Apply the scale (Ctrl A) and flip normals"
@@ -68,10 +68,10 @@ def check_pose(thing: bpy.types.Object, relative: np.ndarray) -> None:
 
 
 def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> tuple[Any, bytes | None]:
-    """Return the spec of an indenter object, and the bytes of its mesh file, None for a shape without one.
+    """Return the spec of an indenter object, and the bytes of its mesh file or None for a shape without one.
 
-    relative : (3, 3), of ``world_axes``. Raises TactileError as `check_pose` does, and for a mesh
-    file that cannot be read.
+    relative : (3, 3), the object's axes by ``world_axes``
+    Raises TactileError for an object that cannot press (`check_pose`), and for a mesh file that cannot be read.
     """
     import msgspec
 
@@ -93,8 +93,8 @@ def spec_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return triangles (m, 3, 3), Blender units, modifiers applied, from its origin, in a sensor object's axes.
-    relative : (3, 3), of ``world_axes``"""
+    """Return the object's triangles (m, 3, 3), modifiers applied, in Blender units from its origin and in a sensor
+    object's axes. relative : (3, 3), the object's axes by ``world_axes``. Raises TactileError without faces."""
     nodes, corners = surfaces.triangles_of(thing.evaluated_get(depsgraph).data)
     if not len(corners):
         raise TactileError(thing.name, "no faces", "a closed mesh", "Select a mesh with a surface")
@@ -102,7 +102,8 @@ def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.t
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
-    """Return the object's surface as a binary STL in mm, z out of the sensor; relative : (3, 3), of ``world_axes``"""
+    """Return the object's surface as a binary STL in mm, z out of the sensor.
+    relative : (3, 3), the object's axes by ``world_axes``"""
     corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
     record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
     record["corners"] = corners
@@ -110,8 +111,8 @@ def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.D
 
 
 def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> np.ndarray:
-    """Return the vector (3,), Blender units, in the sensor object's axes, z outward, from the indenter's origin to its
-    first touch; zero for a spec's body. relative : (3, 3), of ``world_axes``"""
+    """Return the vector (3,), Blender units, in the sensor object's axes, z outward, from the indenter's origin to the
+    point that touches first; zero for a spec's body. relative : (3, 3), the indenter's axes by ``world_axes``"""
     if thing.tactile.spec:
         return np.zeros(3)
     nodes = triangles_of(thing, relative, depsgraph).reshape(-1, 3)
@@ -120,12 +121,12 @@ def foot_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.
 
 
 def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """Return the axes of the object, scaled, as columns (3, 3) in a sensor object's own axes, z out of the sensor."""
+    """Return the object's axes, as long as its scale, as columns (3, 3) in a sensor object's own axes, z outward."""
     return np.array(axes.from_world(sensor) @ thing.matrix_world)[:3, :3]
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
-    """Return the point where the indenter touches, (3,) m in the sensor's frame. foot : (3,), of ``foot_of``"""
+    """Return the indenter's point that touches first, (3,) m in the sensor's frame. foot : (3,), of ``foot_of``"""
     origin = np.array((axes.from_world(sensor) @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)
 
@@ -141,7 +142,7 @@ def shape_of(spec: Any) -> Surface:
 
 
 def _hull(support: Callable[[np.ndarray], np.ndarray]) -> Surface:
-    """Return the convex hull of a body's farthest points in evenly spread directions (Fibonacci's spiral).
+    """Return nodes (n, 3) m and triangles (m, 3) of the convex hull of a body's farthest points in many directions.
     support : returns the body's point (3,) m that lies farthest along a unit vector (3,)"""
     k = np.arange(_DIRECTIONS) + 0.5
     polar, turn = np.arccos(1 - 2 * k / _DIRECTIONS), np.pi * (1 + 5**0.5) * k

@@ -1,4 +1,4 @@
-"""A long recording's movement as a PC2 file that Blender's Mesh Cache modifier streams, written as it is translated."""
+"""Write a long recording's movement, as it is translated, to a PC2 file that Blender's Mesh Cache modifier streams."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ _BLOCK = 64  # frames at a time
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Motion:
-    """Movement of a surface: displacements (T, n, 3) m, or the ``file`` that holds them.
+    """Movement of a surface: displacement (T, n, 3) m, or the ``file`` that holds it; the other is None.
 
-    dent : (T,) m, largest displacement of a node; patch : (T, n) bool, nodes in contact, of a gel; None of a skin
+    dent : (T,) m, each frame's largest displacement; patch : (T, n) bool, a gel's nodes in contact; None for a skin
     """
 
     dent: np.ndarray
@@ -37,15 +37,15 @@ class Motion:
 
 
 def in_memory(displacement: np.ndarray, sensor: str) -> Motion:
-    """Return the movement of a sensor's surface by displacement (T, n, 3) m."""
+    """Return the ``Motion`` of a sensor's surface whose displacement (T, n, 3) m is kept in memory."""
     return Motion(_dent(displacement), _patch(displacement, sensor), displacement)
 
 
 class Writer:
-    """Takes a surface's displacements, some frames at a time, into a file that is open."""
+    """Writer of a surface's displacements, some frames at a time, into an open file."""
 
     def __init__(self, file: BinaryIO, sensor: str, per_metre: float, frames: int) -> None:
-        """Begin with the header; frames : in the file; per_metre : Blender units in a metre"""
+        """Write the header. frames : how many the file will hold; per_metre : Blender units in a metre"""
         self._sensor, self._per_metre, self._file = sensor, per_metre, file
         self._rest = axes.to_blender(sensors.sensor_surface(sensor).rest, per_metre)
         # PC2: "POINTCACHE2", version 1, points, first frame, frames per sample, samples; then float32 x, y, z
@@ -62,15 +62,15 @@ class Writer:
         self._patch += [] if patch is None else [patch]
 
     def motion(self, file: Path) -> Motion:
-        """Return the movement that was written; file : path to name in it, at which the file is once it is complete"""
+        """Return the movement that was written. file : the path at which the complete file will be"""
         patch = np.concatenate(self._patch) if self._patch else None
         return Motion(np.concatenate(self._dent), patch, file=file)
 
 
 @contextlib.contextmanager
 def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[Writer]:
-    """Yield the writer of a file of ``frames`` frames, ``per_metre`` Blender units per metre, that appears whole or not
-    at all. Raises TactileError where there is no room."""
+    """Yield the writer of a file, which appears complete or not at all. Raises TactileError if there is no room.
+    frames : how many the file will hold; per_metre : Blender units in a metre"""
     room = atomic.writing(file, "room in a writable folder", "Save the .blend elsewhere")
     with room, atomic.new_file(file) as partial, open(partial, "wb") as stream:
         yield Writer(stream, sensor, per_metre, frames)
@@ -78,7 +78,7 @@ def writing(file: Path, sensor: str, per_metre: float, frames: int) -> Iterator[
 
 
 def written(moved: Motion, sensor: str, per_metre: float, name: str) -> Motion:
-    """Return a movement in a file of the caches' folder, which is written unless it is in a file already.
+    """Write a movement that is in memory to a file in the caches' folder; return the movement in that file.
     per_metre : Blender units in a metre; name : begins the file's name"""
     if moved.file is not None:
         return moved

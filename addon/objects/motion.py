@@ -13,8 +13,8 @@ _APPLIED = 1e-4  # m, median shift of nodes that shows a mesh moved as a whole: 
 
 
 def check_rest(*things: bpy.types.Object) -> None:
-    """Raise TactileError for a sensor in Edit Mode, which then plays no keys and takes none, and for one whose mesh
-    itself was moved, as Apply Location does: all places would be off."""
+    """Raise TactileError for a sensor in Edit Mode, which neither plays nor takes keys then, and for one whose mesh was
+    moved within the object, as Apply Location does: all places would be off."""
     for thing in things:
         if thing.mode == "EDIT":
             found = "in Edit Mode, where it is at rest"
@@ -49,9 +49,9 @@ def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarra
 
 
 def played(thing: bpy.types.Object) -> tuple[float, float] | None:
-    """Return the first and last frame at which an object's surface moves; None where it may move at any.
+    """Return the first and last frame of the animation of an object's surface; None if it may move at any frame.
 
-    None is returned for F-curves that are extrapolated or repeated; keyframes of the object's place do not count."""
+    That is so without an animation, or if its F-curve is extrapolated or repeated. Keys of its place do not count."""
     keys = thing.data.shape_keys
     owner, path = (keys, "eval_time") if keys else (thing, '["dent_um"]')
     moves = owner.animation_data
@@ -65,7 +65,7 @@ def played(thing: bpy.types.Object) -> tuple[float, float] | None:
 
 
 def _write_keys(thing: bpy.types.Object, rest: np.ndarray, displacement: np.ndarray, frames: np.ndarray) -> None:
-    """Write one key per frame, shown one after the other by one F-curve of ``eval_time``.
+    """Write one shape key per frame, and the F-curve of ``eval_time`` that shows one after the other.
 
     rest : (n, 3), displacement : (T, n, 3), in the object's own units; frames : (T,) of the scene
     """

@@ -12,8 +12,8 @@ class Nodes:
         self.tree = tree
 
     def add(self, kind: str, *links: object, **settings: object) -> bpy.types.Node:
-        """Add a node of a kind, Blender's type name; links : sockets or values of its enabled inputs, in order, None
-        for those left alone; settings : its properties."""
+        """Add a node and return it. kind : Blender's name of its type; settings : its properties
+        links : a socket or a value for each of its enabled inputs, in order; None leaves an input alone"""
         node = self.tree.nodes.new(kind)
         for name, value in settings.items():
             setattr(node, name, value)
@@ -26,7 +26,7 @@ class Nodes:
         return node
 
     def output(self, kind: str, *links: object, **settings: object) -> bpy.types.NodeSocket:
-        """Add a node of a kind and return its first enabled output; links, settings : of `add`"""
+        """Add a node and return its first enabled output; kind, links, settings : of `add`"""
         return next(s for s in self.add(kind, *links, **settings).outputs if s.enabled)
 
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
@@ -48,18 +48,18 @@ class NodeGroup(Nodes):
             self.tree.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
 
     def attribute(self, name: str, kind: str = "FLOAT") -> bpy.types.NodeSocket:
-        """Add a node that reads a named attribute of the mesh, of a kind, Blender's data type; return its output."""
+        """Add a node that reads the mesh's attribute ``name``; return its output. kind : Blender's data type"""
         return self.output("GeometryNodeInputNamedAttribute", name, data_type=kind)
 
     def store(self, geometry: bpy.types.NodeSocket, name: str, value: object, kind: str) -> bpy.types.NodeSocket:
-        """Add a node that stores ``value``, a socket or a value of a kind (Blender's data type), as a named attribute
-        of a geometry's points; return that geometry."""
+        """Add a node that stores ``value``, a socket or a value, as the attribute ``name`` of a geometry's points;
+        return the changed geometry. kind : Blender's data type"""
         stored = geometry, None, name, value
         return self.output("GeometryNodeStoreNamedAttribute", *stored, data_type=kind, domain="POINT")
 
     def input(self, name: str, kind: str, text: str, value: object = None, least: float | None = None) -> None:
-        """Add an input of a kind ("Float", "Vector", ...) that users change in the modifier. text : what it is; value :
-        its default; least : its lower limit"""
+        """Add an input to the group, which users change in the modifier. kind : "Float", "Vector", ...; text : its
+        description; value : its default; least : its lower limit"""
         item = self.tree.interface.new_socket(name, in_out="INPUT", socket_type=f"NodeSocket{kind}")
         item.description = text
         if value is not None:

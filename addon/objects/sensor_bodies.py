@@ -1,4 +1,4 @@
-"""Bodies round the sensors' surfaces, children of them: the parts of ``sensor_bodies.toml``, each a stack of rings."""
+"""Add bodies round the sensors' surfaces, as their children: parts of ``sensor_bodies.toml``, each a stack of rings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MM = 1e3
 
 
 def add_parts(thing: bpy.types.Object) -> None:
-    """Add a sensor's parts, as of ``sensor_bodies.toml``, and under a gel its window, as children of its surface."""
+    """Add a sensor's parts by ``sensor_bodies.toml``, and a gel's acrylic window, as children of its surface."""
     sensor = properties.sensor_name(thing)
     known = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     is_gel = thing.tactile.role == "DIGIT"
@@ -85,7 +85,7 @@ def _rectangle(half: float, other: float | None = None, corner: float | None = N
 
 
 def _border(sensor: str) -> np.ndarray:
-    """The border of a gel's surface (n, 3) mm in its object's axes, counter-clockwise from above."""
+    """Return the border (n, 3) mm of a gel's surface at rest, in its object's axes, counter-clockwise from above."""
     surface = sensors.sensor_surface(sensor)
     grid = surface.grid(surface.rest)[..., [0, 2, 1]] * [_MM, _MM, -_MM]
     return np.concatenate([grid[::-1, -1], grid[0, -2::-1], grid[1:, 0], grid[-1, 1:-1]])

@@ -1,4 +1,4 @@
-"""The legend of a style: a card under the sensor that faces the scene's camera, its range and a scale bar."""
+"""Add a style's legend: a card below the sensor that faces the scene's camera, with a colour bar and a scale bar."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def remove_legend(thing: bpy.types.Object) -> None:
 
 
 def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str, str] | None) -> bpy.types.Object:
-    """Add a card with a colour bar and a scale bar of 5 mm to a sensor, in place of another; works without the add-on.
+    """Give a sensor a card with a colour bar and a scale bar of 5 mm, which works without the add-on, and return it.
 
-    style : whose ramp of colours the bar shows; title : what the colours say
-    ends : what stands at the bar's left and right end, None where there is no bar
+    style : whose colours the bar shows; title : what the colours say
+    ends : texts at the bar's left and right end, None for no bar
     """
     remove_legend(thing)
     row = -_EDGE - _LETTERS
@@ -79,7 +79,7 @@ def add_legend(thing: bpy.types.Object, style: str, title: str, ends: tuple[str,
 
 
 def _facing() -> bpy.types.NodeTree:
-    """Turn a mesh toward the active camera, and put it under the sensor's box as that camera sees it."""
+    """Make the node group that turns a mesh toward the active camera, and puts it below the sensor as that sees it."""
     nodes = NodeGroup(style_nodes.LEGEND)
     nodes.input(_MIDDLE, "Vector", "Middle of the sensor")
     nodes.input(_HALF, "Vector", "Half its size")
@@ -120,8 +120,8 @@ def _patch(left: float, right: float, low: float, high: float, colour: tuple[flo
 
 
 def _letters(text: str, x: float, y: float, align: str = "LEFT") -> _Part:
-    """Make text a mesh at x, y mm on the card; align : "LEFT" or "RIGHT", the side at x. Text objects have no colours
-    of their own, and are black in Solid views that show them."""
+    """Make a mesh of a text at x, y mm on the card: text objects cannot be coloured, and are black in Solid views.
+    align : the text's side that is at x, "LEFT" or "RIGHT\""""
     curve = bpy.data.curves.new("legend", "FONT")
     curve.body, curve.size, curve.align_x, curve.resolution_u = text, _LETTERS, align, 2
     thing = bpy.data.objects.new("legend", curve)

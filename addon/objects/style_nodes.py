@@ -1,8 +1,8 @@
-"""The geometry-node groups of the styles. They play without the add-on, and are what the asset library holds.
+"""Make the geometry-node groups of the styles. They work without the add-on, and the asset library holds them.
 
-Each colours the points of a mesh by the attribute ``Tactile colour``, which its material and Solid views show. They
-read Blender's own attribute ``rest_position`` and those of ``frame_attribute`` and ``electrode_markers``, and leave
-``displacement`` (a vector, in the object's units).
+Each writes colours to the attribute ``Tactile colour`` of a mesh's points, which its material and Solid views show, and
+the attribute ``displacement`` (a vector, in the object's units). They read Blender's attribute ``rest_position`` and
+those that ``frame_attribute`` and ``electrode_markers`` add.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ _EDGE = (1.3e-3, 1.7e-3)  # m from an electrode, between which its colour fades
 
 
 def group(style: str) -> bpy.types.NodeTree:
-    """Return the node group of a style, or of "FORCE_ARROW", by its key in ``NAMES``; made where the file lacks it."""
+    """Return the node group of a style, a key of ``NAMES``; make it if the file lacks it."""
     found = bpy.data.node_groups.get(NAMES[style])
     return found if found is not None else _BUILD[style](style)
 
 
 def input_of(tree: bpy.types.NodeTree, name: str) -> str:
-    """Return the key by which a modifier holds the value of an input, called name, of a group, tree."""
+    """Return the key by which a modifier holds the value of the input ``name`` of its node group ``tree``."""
     return next(item.identifier for item in tree.interface.items_tree if item.name == name and item.in_out == "INPUT")
 
 
 def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.types.bpy_struct, str]:
-    """Return the data and the property, for ``UILayout.prop``, that hold the value of a group's input in a modifier.
+    """Return the first two arguments of ``UILayout.prop`` for the input ``name`` of a modifier's node group.
 
     Blender 5.2 holds inputs as properties, not by their keys.
     """
@@ -56,7 +56,7 @@ def input_property(modifier: bpy.types.NodesModifier, name: str) -> tuple[bpy.ty
 
 
 def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> None:
-    """Set the value of a group's input, called name, in a modifier."""
+    """Set the value of the input ``name`` of a modifier's node group."""
     if hasattr(modifier, "properties"):
         setattr(*input_property(modifier, name), value)
     else:
@@ -64,7 +64,7 @@ def set_input(modifier: bpy.types.NodesModifier, name: str, value: object) -> No
 
 
 def get_input(modifier: bpy.types.NodesModifier, name: str) -> object:
-    """Return the value of a group's input, called name, in a modifier."""
+    """Return the value of the input ``name`` of a modifier's node group."""
     if hasattr(modifier, "properties"):
         return getattr(*input_property(modifier, name))
     return modifier[input_of(modifier.node_group, name)]
@@ -77,12 +77,12 @@ def input_path(modifier: bpy.types.NodesModifier, name: str) -> str:
 
 
 def material() -> bpy.types.Material:
-    """Return the material that shows the colours of the attribute ``Tactile colour``, lit; made where it is missing."""
+    """Return the material that shows the attribute ``Tactile colour`` under the scene's light; make it if missing."""
     return _material(MATERIAL, "Base Color")
 
 
 def legend_material() -> bpy.types.Material:
-    """Return the material that shows the colours of the attribute ``Tactile colour`` unlit, for legends."""
+    """Return the material that shows the attribute ``Tactile colour`` unlit, for legends; make it if missing."""
     made = _material(LEGEND, "Emission Color")
     shader = next(node for node in made.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     shader.inputs["Base Color"].default_value, shader.inputs["Emission Strength"].default_value = (0, 0, 0, 1), 1.0
@@ -91,7 +91,7 @@ def legend_material() -> bpy.types.Material:
 
 
 def _material(name: str, takes: str) -> bpy.types.Material:
-    """A material of the file, made where it is missing; takes : which input has the attribute's colour."""
+    """Return the file's material ``name``, made if missing; takes : the shader's input that gets ``Tactile colour``"""
     found = bpy.data.materials.get(name)
     if found is not None:
         return found
@@ -106,14 +106,14 @@ def _material(name: str, takes: str) -> bpy.types.Material:
 
 
 def _painted(nodes: NodeGroup, geometry: bpy.types.NodeSocket) -> bpy.types.NodeTree:
-    """Give the geometry its material and end the group."""
+    """Give the geometry the styles' material and make it the group's output; return the finished group."""
     painted = nodes.add("GeometryNodeSetMaterial", geometry)
     painted.inputs["Material"].default_value = material()
     return nodes.end(painted.outputs[0])
 
 
 def _surface(style: str) -> bpy.types.NodeTree:
-    """Colours of a sensor's own surface, and the dent drawn larger."""
+    """Make the node group of a style that colours a sensor's own surface, and can draw its dent larger."""
     nodes = NodeGroup(NAMES[style])
     quantity = "Change of the reading, counts," if style == "ELECTRODES" else "Displacement, in the object's units,"
     nodes.input(LARGEST, "Float", f"{quantity} at the colours' upper end", 1.0, 1e-6)
@@ -147,7 +147,7 @@ def _moved(nodes: NodeGroup, largest: bpy.types.NodeSocket, moved: bpy.types.Nod
 
 
 def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """Return 0 where the reading falls by the largest change, 1 where it rises by it; _moved is unused."""
+    """Add nodes that map a reading's change to 0..1: -largest to 0, none to 0.5, +largest to 1. _moved is unused."""
     share = nodes.math("DIVIDE", nodes.attribute(frame_attribute.COUNTS), largest)
     return nodes.math("MULTIPLY_ADD", share, 0.5, 0.5)
 
@@ -155,7 +155,7 @@ def _changed(nodes: NodeGroup, largest: bpy.types.NodeSocket, _moved: bpy.types.
 def _above_error(
     nodes: NodeGroup, colour: bpy.types.NodeSocket, moved: bpy.types.NodeSocket, error: bpy.types.NodeSocket
 ) -> bpy.types.NodeSocket:
-    """The colour where displacement reaches the error; greyer the smaller it is."""
+    """Add nodes that fade ``colour`` to grey where the displacement ``moved`` is below ``error``; return the output."""
     length = nodes.vector("LENGTH", moved)
     share = nodes.math("DIVIDE", length, nodes.math("MAXIMUM", error, 1e-9))
     return _over_grey(nodes, nodes.math("MINIMUM", share, 1.0), colour)
@@ -181,7 +181,8 @@ def _fill(ramp: bpy.types.ColorRamp, style: str) -> None:
 
 
 def _arrow(style: str) -> bpy.types.NodeTree:
-    """Scale, turn and move a mesh that stands along +Z, 1 unit high, so that its foot is in a sensor's dent."""
+    """Make the node group that makes an arrow of a mesh 1 unit high along +Z: it scales and turns it by the force, and
+    puts its lower end, the arrow's head, into the sensor's dent."""
     nodes = NodeGroup(NAMES[style])
     nodes.input(SENSOR, "Object", "A BioTac's skin or a DIGIT's gel")
     nodes.input(FORCE, "Vector", "Force on the sensor, N, in its axes")
@@ -203,7 +204,7 @@ def _arrow(style: str) -> bpy.types.NodeTree:
 
 
 def _mean_dent(nodes: NodeGroup, sensor: bpy.types.NodeSocket) -> bpy.types.NodeSocket:
-    """Mean of the nodes' places, weighted by the square of how far each has moved."""
+    """Add nodes for the mean of a sensor's node places, weighted by squared displacement; return the output."""
     here = nodes.output("GeometryNodeInputPosition")
     rest = nodes.attribute("rest_position", "FLOAT_VECTOR")
     moved = nodes.vector("SUBTRACT", here, rest)

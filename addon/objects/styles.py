@@ -1,4 +1,4 @@
-"""Styles of a sensor's surface: geometry nodes that colour it, in Solid views too; and an arrow for its force."""
+"""Give a sensor's surface a style: geometry nodes that colour it, in Solid views too; and an arrow for its force."""
 
 from __future__ import annotations
 
@@ -25,15 +25,17 @@ def can_show(thing: bpy.types.Object, style: str) -> bool:
 
 
 def get_ready(thing: bpy.types.Object) -> None:
-    """Let a sensor take any style, from the asset library too: its rest is kept, and Solid views have a colour."""
+    """Let a sensor take any style, from the asset library too: keep its rest as an attribute, let Solid views show
+    the styles' colours."""
     thing.add_rest_position_attribute = True
     make_colour_active(thing.data)
 
 
 def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
-    """Give a sensor a style, "DISPLACEMENT", "CONTACT_PATCH", "ELECTRODES" or "NONE", in place of another.
+    """Give a sensor a style, "DISPLACEMENT", "CONTACT_PATCH", "ELECTRODES" or "NONE", in place of its present one.
 
-    largest : value at the colours' upper end, object's units or counts; exaggeration : how many times the dent is drawn
+    largest : value at the colours' upper end: displacement in the object's units, for "ELECTRODES" counts
+    exaggeration : factor by which the dent is drawn larger
     """
     old = thing.modifiers.get(MODIFIER)
     if old is not None:
@@ -54,7 +56,7 @@ def set_style(thing: bpy.types.Object, style: str, largest: float, exaggeration:
 
 
 def style_of(thing: bpy.types.Object) -> str:
-    """Return a sensor's style by its key, as ``set_style`` takes it; "NONE" for nodes of the user's own, too."""
+    """Return a sensor's style, as ``set_style`` takes it; "NONE" also if the modifier has the user's own nodes."""
     modifier = thing.modifiers.get(MODIFIER)
     names = [name for name, _, _ in STYLES if name != "NONE"]
     shown = None if modifier is None else modifier.node_group
@@ -62,9 +64,9 @@ def style_of(thing: bpy.types.Object) -> str:
 
 
 def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
-    """Add an arrow, child of a sensor, that follows its custom property ``force``; works without the add-on.
+    """Add an arrow to a sensor, as its child, that shows its custom property ``force``; it works without the add-on.
 
-    length : of 1 N, in the object's units
+    length : of an arrow for 1 N, in the object's units
     """
     get_ready(sensor)
     arrow = surfaces.new_mesh_object(f"{sensor.name} force", *_upright(), smooth=False)
@@ -82,13 +84,13 @@ def add_arrow(sensor: bpy.types.Object, length: float) -> bpy.types.Object:
 
 
 def arrow_of(sensor: bpy.types.Object) -> bpy.types.Object | None:
-    """Return the arrow of a sensor, if any."""
+    """Return the arrow of a sensor, None if it has none."""
     known = (thing for thing in sensor.children if MODIFIER in thing.modifiers and thing.tactile.role == "LEGEND")
     return next(known, None)
 
 
 def make_colour_active(mesh: bpy.types.Mesh) -> None:
-    """Let Solid views colour by the attribute that the nodes write; without nodes they show the object's own colour."""
+    """Let Solid views colour a mesh by the styles' attribute; a mesh without it has the object's own colour there."""
     mesh.attributes.active_color_name = style_nodes.COLOUR
 
 
@@ -101,7 +103,7 @@ def _add_nodes(thing: bpy.types.Object, style: str, values: dict[str, object]) -
 
 
 def _upright() -> tuple[np.ndarray, np.ndarray]:
-    """An arrow 1 high that stands on its tip: nodes (n, 3), triangles (m, 3)."""
+    """Return nodes (n, 3) and triangles (m, 3) of an arrow 1 high that stands on its tip at the origin."""
     around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     rings = [(0.0, 0.0), (0.12, 0.3), (0.05, 0.3), (0.05, 1.0), (0.0, 1.0)]  # radius and height
     nodes = np.concatenate([np.stack([r * np.cos(around), r * np.sin(around), 0 * around + h], -1) for r, h in rings])

@@ -1,4 +1,4 @@
-"""Objects with a mesh of ``tactile_core``'s nodes and faces, and their materials."""
+"""Make objects from ``tactile_core``'s nodes and faces, and their materials."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SHARP = math.radians(30)  # between faces that meet in an edge
 def new_mesh_object(name: str, nodes: np.ndarray, faces: np.ndarray, smooth: bool = True) -> bpy.types.Object:
     """Make an object, in no collection yet, of nodes (n, 3) in Blender units and triangles (m, 3).
 
-    smooth : all over; else edges stay sharp where faces meet at more than 30 degrees
+    smooth : true to shade all of it smoothly, false to keep edges sharp whose faces meet at more than 30 degrees
     """
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(nodes))
@@ -40,14 +40,14 @@ def triangles_of(mesh: bpy.types.Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def paint(thing: bpy.types.Object, colour: tuple[float, float, float, float]) -> None:
-    """Add a material that shows the object's own colour, which can be animated and is seen in every shading.
+    """Set an object's own colour and add a material that shows it in renders too; the colour can be animated.
     colour : red, green, blue and opacity, 0 to 1; not seen on a mesh that has another material already"""
     thing.color = colour
     thing.data.materials.append(_material())
 
 
 def new_material(name: str) -> tuple[bpy.types.Material, bpy.types.Node]:
-    """Make a material of nodes; also returns its Principled BSDF."""
+    """Make a material with nodes; return it and its Principled BSDF node."""
     material = bpy.data.materials.new(name)
     if material.node_tree is None:
         material.use_nodes = True
