@@ -27,8 +27,10 @@ _NPY_START = 12  # bytes: magic, version, length
 
 @dataclass(frozen=True)
 class Store:
-    """Named arrays of an open file. shapes : name -> declared shape and type; taken : names that a reader used; load,
-    load_rows : read one, or rows (None: no parts); attributes : of the root; attributes_of : of an array, by name"""
+    """Named arrays of an open file, read on demand.
+    shapes : array's name -> shape and type that the file declares; taken : names of the arrays that were read so far
+    load, load_rows : functions that read an array by name, or some of its rows (None: the file cannot be read in parts)
+    attributes : the file's own, at its root; attributes_of : function from an array's name to its attributes"""
 
     path: str
     shapes: dict[str, tuple[tuple[int, ...], np.dtype]]
@@ -39,13 +41,13 @@ class Store:
     taken: set[str] = field(default_factory=set)
 
     def is_text(self, name: str) -> bool:
-        """Return true for an array of texts of at most `LONGEST` characters, or of any length in an HDF5 file."""
+        """Return true if an array holds texts of a fixed length up to `LONGEST` characters, or of variable length."""
         kind = self.shapes[name][1]
         short = kind.kind in "SU" and kind.itemsize <= 4 * LONGEST
         return short or (kind.metadata is not None and kind.metadata.get("vlen") in (str, bytes))
 
     def texts(self, name: str) -> list[str]:
-        """Read an array of texts; texts of variable length one at a time, each up to `LONGEST` characters."""
+        """Return an array's texts, flat, each cut to `LONGEST` characters; those of variable length are read singly."""
         self.taken.add(name)
         shape, kind = self.shapes[name]
         if prod(shape) > MAX_FRAMES:
@@ -58,7 +60,7 @@ class Store:
         return [_plain(each)[:LONGEST] for part in parts for each in np.ravel(part).tolist()]
 
     def rows(self, rows: slice, count: int) -> Store:
-        """Return the store with only these rows of all arrays of length `count`; only HDF5 is read in parts."""
+        """Return the store with arrays of length `count` cut to these rows, which HDF5 files alone can read singly."""
         long = {name for name, (shape, _) in self.shapes.items() if shape[:1] == (count,)}
         cut = {name: ((rows.stop - rows.start, *self.shapes[name][0][1:]), self.shapes[name][1]) for name in long}
 
@@ -68,8 +70,8 @@ class Store:
         return replace(self, shapes=self.shapes | cut, load=load)
 
     def array(self, name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> np.ndarray:
-        """Read an array as ``dtype``; shape : expected, None for any length. Raises TactileError where the array is
-        missing, damaged, not of numbers, of another shape, or too large."""
+        """Return an array of numbers as ``dtype``; shape : the expected one, None for an axis of any length.
+        Raises TactileError if the array is missing, damaged, not of numbers, of another shape, or too large."""
         where = f"{self.path}, {name}"
         if name not in self.shapes:
             raise TactileError(where, "this array is missing", advice="Export the recording again with all arrays")
@@ -91,7 +93,7 @@ class Store:
         return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Read an array of a shape as `array` does; return None where the file does not hold it."""
+        """Return an array of numbers of a shape, None if the file has none of that name; raises as `array` does."""
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:
@@ -121,7 +123,7 @@ def open_hdf5(path: str) -> Iterator[Store]:
                 return {key: _plain(value) for key, value in file[name].attrs.items()}
 
         def load(name: str, rows: slice | None = None) -> np.ndarray:
-            """Read an array, or some rows of it, that takes no more than its stored bytes can unpack to."""
+            """Return an array or some of its rows. Raises TactileError if it declares more than is stored."""
             declared(file[name], f"{path}, {name}")
             return read_rows(file[name], rows)
 
@@ -141,7 +143,8 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Open NPZ, or NPY as array ``electrodes``, never unpickling; sizes are those of the arrays' own headers."""
+    """Open an NPZ file, or an NPY file as the array ``electrodes``; nothing is unpickled.
+    Raises TactileError for damage, for packing other than deflate, and for an array that is there twice."""
     if file.read(len(NPY)) == NPY:
         file.seek(0)
         with damage_reported(path, "NPY"):
@@ -176,14 +179,15 @@ def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
 
 
 def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
-    """Refuse compression other than deflate, which unpacks all at once at any declared size, or takes gigabytes."""
+    """Raise TactileError for a member packed by another method than deflate: it may unpack to gigabytes at once."""
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         found = f"packed by method {member.compress_type}"
         raise TactileError(f"{path}, {member.filename}", found, "stored or deflated, as numpy does", "Save it again")
 
 
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    """Read shape and type from the header; refuse one that declares itself long, which numpy would load unchecked."""
+    """Return the shape and type that an array's header declares. Raises ValueError for a header over `MAX_HEADER`
+    bytes, which numpy would load unchecked."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
     if not start.startswith(NPY) or length > MAX_HEADER:

@@ -37,8 +37,9 @@ SHOWN = 8  # problems spelled out one by one; more are counted
 
 @dataclass(frozen=True)
 class Problem:
-    """Unreadable place in a file. frame : its index; row : its line; field : the column; found : what is there
-    essential : true for an electrode or the time"""
+    """An unreadable cell or row of a file.
+    frame : index of its frame; row : its row or line in the file; field : name of its column, "row" for a whole row
+    found : what is there, in words; essential : true if an electrode or the time is concerned"""
 
     frame: int
     row: int
@@ -52,7 +53,7 @@ class BadRows(TactileError):
 
 
 def sensor_with(count: int) -> str:
-    """Return the name of the sensor that has `count` electrodes; empty for none."""
+    """Return the name of the sensor that has `count` electrodes; "" if there is none."""
     fluid = ((each, found) for each in known_sensors() if isinstance(found := describe(each), Fluid))
     return next((name for name, found in fluid if found.electrodes.count == count), "")
 
@@ -69,7 +70,7 @@ def check_electrodes(path: str, count: int, source: str, sensor: str = SOURCE) -
 
 
 def _advice(sensor: str) -> str:
-    """Advise how to translate recordings of a sensor that the networks are not for: shipped weights, or new ones."""
+    """Return advice on translating recordings of a sensor that the networks are not for."""
     return (
         "Translate it by itself: the first recording, or --weights, says whose networks are taken. A sensor for which "
         f"none ship gets them in half an hour: `tactile pairs scenes/training --count 12000 --from {sensor} --out "
@@ -97,15 +98,17 @@ def assemble(
     labels: dict[str, np.ndarray] | None = None,
     **channels: np.ndarray | None,
 ) -> Recording:
-    """Check the columns and make a Recording of them.
+    """Check the columns of a file and return the Recording made of them.
 
-    layout : in words; electrodes : (T, 19) float with NaN at bad cells; problems : bad places that the reader found
-    stamps : (T,) float as in the file, or None: 100 Hz is assumed
-    rows : (T,) int, the file's line or row of each frame, `row_word` for messages; None: frames count from 0
-    names : of the electrodes' columns in the file; an empty one is a missing column, a dead channel
-    snapshots : true where frames do not follow each other in time, whose time is NaN; labels : name -> (T,) texts
-    truth, simulated, about, warnings, sensor, channels (pdc, tac, tdc, pac, position, force) : as of `Recording`
-    Raises TactileError: no frames, too many frames, wrong number of electrodes, more than a fifth of the rows bad."""
+    layout : the file's layout in words; electrodes : (T, 19) float, NaN at bad cells
+    stamps : (T,) float, time stamps as in the file; None if it has none: 100 Hz is assumed
+    rows : (T,) int, line or row of each frame in the file, which messages call `row_word`; None: 0, 1, 2 ...
+    problems : unreadable cells that the reader found
+    names : names of the electrodes' columns; "" for a column that is missing, which makes a dead channel
+    snapshots : true if frames do not follow each other in time; their time is then NaN
+    labels : name -> (T,) texts; channels : pdc, tac, tdc, pac, position, force, as in `Recording`, like the others
+    Raises TactileError for no or too many frames, a wrong number of electrodes, over a fifth of the rows bad,
+    electrodes that rest low where a unit's rest high, and rows of several fingers in turn."""
     frames = len(electrodes)
     _check_size(path, electrodes, sensor)
     rows = np.arange(frames) if rows is None else rows
@@ -147,7 +150,8 @@ def assemble(
 
 
 def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
-    """Raise TactileError where electrodes rest at levels (e,) that are low where a unit's are high; NaN: not judged"""
+    """Raise TactileError if levels (e,) counts at rest, NaN if not judged, are low where a typical unit's are high: the
+    file then holds the top of the range minus readings."""
     typical, known = typical_rest(sensor), np.isfinite(levels)
     if typical is None:
         return
@@ -164,8 +168,8 @@ def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
 
 
 def _refuse_turns(path: str, readings: np.ndarray) -> None:
-    """Raise TactileError where fingers take turns: a row of readings (T, e) is like one some rows before, and unlike
-    the one before. Changes are not judged: all fingers rest at 0, and any hum would stand out."""
+    """Raise TactileError if rows of several fingers alternate: a row of readings (T, e) is like that some rows before,
+    and unlike the last. Changes against rest are not judged: all fingers rest at 0, and any hum would stand out."""
     if len(readings) < TURNS * MOST_FINGERS:
         return
     low, level = np.quantile(readings, [0.1, 0.5])
@@ -174,7 +178,7 @@ def _refuse_turns(path: str, readings: np.ndarray) -> None:
     apart = readings - readings.mean(axis=1, keepdims=True)
 
     def change(rows: int) -> float:
-        """Return the median change of an electrode in so many rows."""
+        """Return the median absolute change of all electrodes from a row to that `rows` later."""
         return float(np.median(np.abs(apart[rows:] - apart[:-rows])))
 
     for count in range(2, MOST_FINGERS + 1):
@@ -184,7 +188,8 @@ def _refuse_turns(path: str, readings: np.ndarray) -> None:
 
 
 def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> np.ndarray:
-    """Flag the frames (T,) uint16 that are repaired, and those after which time jumps; bad : (T, 19) bool."""
+    """Return flags (T,) uint16 of frames with a bad cell or a problem, and of those before which time jumps.
+    bad : (T, 19) bool, unreadable cells; jumps : (n,) int, indices of frames before which time jumps"""
     flags = np.where(bad.any(axis=1), Flag.REPAIRED, 0).astype(np.uint16)
     for problem in problems:
         flags[problem.frame] |= np.uint16(Flag.REPAIRED)
@@ -193,14 +198,14 @@ def _flags(bad: np.ndarray, problems: Sequence[Problem], jumps: np.ndarray) -> n
 
 
 def _finite(values: np.ndarray) -> np.ndarray:
-    """Return values of any shape with NaN for infinity; without a copy where nothing is infinite."""
+    """Return values of any shape with infinity replaced by NaN; the array itself if all are finite."""
     finite = np.isfinite(values)
     return values if finite.all() else np.where(finite, values, np.nan)
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
-    """Write sentences that name row and field of the first few problems, and the number of the others.
-    row_word : "line" or "frame", what a row is called"""
+    """Return sentences that name row and field of the first `SHOWN` problems, and the number of the others.
+    row_word : "line" or "frame", what a row is called in them"""
     sentences = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")
@@ -227,8 +232,9 @@ def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
 def _unreadable(
     electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
 ) -> list[Problem]:
-    """Find electrode cells that are no possible reading and that no reader has reported (`known`).
-    electrodes, bad : (T, 19), readings and which are impossible; rows : (T,) int, row of each frame in the file"""
+    """Return a problem for each impossible reading that is not among the `known` ones, which the reader has reported.
+    electrodes : (T, 19) readings; bad : (T, 19) bool, impossible ones; names : their columns' names
+    rows : (T,) int, row of each frame in the file"""
     known_places = {(p.frame, "" if p.field == "row" else p.field) for p in known}
     found = []
     for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:
@@ -238,7 +244,7 @@ def _unreadable(
 
 
 def _check_share(path: str, bad: np.ndarray, problems: Sequence[Problem], row_word: str) -> None:
-    """Raise BadRows where too many frames are bad; bad : (T,) bool, frames with an unreadable electrode."""
+    """Raise BadRows if over a fifth of the frames, or all, are bad: by bad (T,) bool, or by an essential problem."""
     bad = bad.copy()
     bad[[p.frame for p in problems if p.essential]] = True
     frames, count = len(bad), int(bad.sum())

@@ -23,9 +23,9 @@ COARSE = 2.0  # counts between readings from which noise is lost in their steps,
 
 
 def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,): of a recording whose readings lack noise, OUT_OF_RANGE where they move within half a second,
-    as averages are wrong there; 0 elsewhere. readings : (T, e) counts; change : (T, e) counts, against rest
-    warnings : extended by a sentence if they lack it"""
+    """Return flags (T,) uint16: OUT_OF_RANGE where readings that lack a finger's noise move within half a second, since
+    averages are wrong there; in all frames if no noise at all is left; 0 elsewhere.
+    readings : (T, e) counts; change : (T, e) counts against rest; warnings : list, extended if the noise is missing"""
     flags = np.zeros(len(readings), np.uint16)
     if recording.simulated or not np.isfinite(recording.time).all():
         return flags
@@ -50,7 +50,8 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
 
 
 def _turns(readings: np.ndarray, rate: float) -> float:
-    """Return the share of samples at which readings (T, e) counts at this rate, Hz, turn; 1 where too few tell it."""
+    """Return the share of samples at which readings turn from rising to falling or back; 1 if too few rows show it.
+    readings : (T, e) counts; rate : Hz"""
     step = max(1, round(rate / AT))
     whole = np.rint(readings[: BLOCK * step : step])
     whole = whole[~repeats(whole)[0]]

@@ -26,16 +26,17 @@ CONTEXT = 200  # frames that a part shares with the one before: glitches are loo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Part of a recording; repeated : number of frames at its start that the part before holds too."""
+    """Part of a recording. repeated : number of frames at its start that the part before holds, too"""
 
     recording: Recording
     repeated: int
 
 
 def read_parts(path: str | os.PathLike[str], columns: ColumnMap | None = None, sensor: str = SOURCE) -> Iterator[Part]:
-    """Yield the parts of a recording in order, times counted from the first frame of all. NPZ files are read whole.
-    columns : map for a file of no known layout, else None; sensor : the one expected, such as "biotac"
-    Raises TactileError like `readers.read`."""
+    """Yield the parts of a recording in order; their times count from the whole recording's first frame. CSV and HDF5
+    files and bags are read in parts, other files whole.
+    columns : map for a file of no known layout, else None; sensor : name of the expected sensor, such as "biotac"
+    Raises TactileError for a file that is missing, not a recording, of another sensor, or mostly unreadable."""
     path = os.fspath(path)
     shift, time = 0.0, None
     for part in _parts(path, columns, sensor):
@@ -82,7 +83,7 @@ def _of_store(store: Store) -> Iterator[Part]:
 
 
 def _frames(store: Store, name: str) -> int:
-    """Return the length of the electrodes' array; 0 if it is missing or a scalar, which the layout reports."""
+    """Return the length of the array `name`; 0 if it is missing or a scalar, which the layout's reader refuses."""
     shape = store.shapes.get(name, ((), None))[0]
     return shape[0] if shape else 0
 

@@ -1,4 +1,4 @@
-"""Doubts about prepared signals as data, a reason and its facts; their sentences are made here alone."""
+"""Warnings of doubtful signals as data, a reason and its facts; the sentences for users are made here alone."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _LIKE = "signals unlike simulated contacts: "
 
 
 class Reason(enum.Enum):
-    """Reason of a doubt; the value is its sentence, with the facts in braces."""
+    """Reason of a doubt; its value is the sentence for users, a format string with names of facts in braces."""
 
     POLARITY_ASSUMED = (
         "polarity assumed: {found}. Counts are taken to fall where the film thins, as raw ones do; say --polarity rises"
@@ -51,20 +51,20 @@ LAW = frozenset({Reason.LAW_LEFT_OVER, Reason.LAW_PRESSURE, Reason.LAW_EXCHANGED
 
 
 class Doubt(str):
-    """Warning that carries its reason and facts; the text is the sentence for users."""
+    """Warning whose text is the sentence for users; it carries its reason, and the facts in it, name -> value."""
 
     reason: Reason
     facts: dict[str, Any]
 
     def __new__(cls, reason: Reason, **facts: Any) -> Doubt:
-        """Write the reason's sentence, with facts, name -> value, in its braces."""
+        """Make the warning from the reason's sentence and the facts (name -> value) that fill its braces."""
         made = super().__new__(cls, reason.value.format(**facts))
         made.reason, made.facts = reason, facts
         return made
 
 
 def reason_of(warning: str) -> Reason | None:
-    """Return the reason of a warning that is a doubt; None of others."""
+    """Return the reason of a warning that is a `Doubt`; None for any other warning."""
     return warning.reason if isinstance(warning, Doubt) else None
 
 

@@ -1,6 +1,6 @@
 """Find and interpolate faulty electrodes and rows: glitches, repeated rows, dead channels, unlikely rest counts.
 
-A `recording` is as it was read: its rows name the places in `warnings`, a list that is extended."""
+A `recording` is as it was read: its rows name the places of faults in `warnings`, a list that the functions extend."""
 
 from __future__ import annotations
 
@@ -42,10 +42,11 @@ MOST_ABSENT = 0.5  # of the electrodes; the others then say too little (assumed)
 def without_absent(
     path: str, electrodes: np.ndarray, names: Sequence[str], sensor: str
 ) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Fill electrodes that a file lacks with the rest of a sensor's typical unit, as if they never changed.
+    """Fill electrodes that a file lacks with a constant: a typical unit's rest, or 0 if the readings are not raw.
 
-    electrodes : (T, e) float, in any unit of measurement, with NaN; names : of their columns, empty for none
-    Returns electrodes, a mask (e,) of filled ones, 0 or 1 sentence on them. TactileError where half are missing."""
+    electrodes : (T, e) float, in any unit of measurement, with NaN; names : their columns' names, "" for a missing one
+    Returns the electrodes, a mask (e,) bool of filled ones, and a list of one sentence on them, or none. Raises
+    TactileError if half of the electrodes are missing."""
     unread = ~np.isfinite(electrodes)
     empty = unread.all(axis=0) & (len(electrodes) >= DEAD_FRAMES) & ~unread.all()  # where all are, rows are to blame
     absent = np.array([not name for name in names]) | empty
@@ -62,12 +63,11 @@ def without_absent(
 
 
 def silent(electrodes: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) bool without a response of the finger; up to a few are a glitch, which is interpolated.
+    """Return (T,) bool, true for frames in which the finger does not respond; up to a few in a row are a glitch.
 
     electrodes : (T, e) float, in any unit of measurement. A frame has no response if most electrodes read one end of
-        the range, or if nothing changes in a whole recording. (Raw electrodes rest hundreds of counts apart; changes
-        against rest may all be 0, so equal readings count only beside raw ones.) Where the noise of a raw recording
-        stops in all electrodes for `FROZEN` frames, it repeats an old response."""
+        the range, if nothing changes in the whole recording, or if the noise of all electrodes stops for `FROZEN`
+        frames, which repeats an old response. (Only beside raw readings: changes against rest may all be 0.)"""
     same = _lasting(alike(electrodes))
     change = electrodes[1:] != electrodes[:-1]
     if same.all() or (len(electrodes) >= FROZEN and not change.any()):
@@ -83,7 +83,8 @@ def silent(electrodes: np.ndarray) -> np.ndarray:
 
 
 def alike(electrodes: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) bool in which most electrodes (T, e) read the same end of the range, in any unit."""
+    """Return (T,) bool, true where most electrodes (T, e), in any unit of measurement, read the same end of the
+    range."""
     found = (electrodes[:, 1:] == electrodes[:, :-1]).any(axis=1)  # where most are the same, two neighbours are
     middle = np.median(electrodes[found], axis=1)
     same = (electrodes[found] == middle[:, None]).mean(axis=1) >= ALIKE
@@ -92,7 +93,7 @@ def alike(electrodes: np.ndarray) -> np.ndarray:
 
 
 def _lasting(same: np.ndarray) -> np.ndarray:
-    """Return the frames (T,) bool of runs in same (T,) bool that are longer than a glitch may be."""
+    """Return same (T,) bool without the runs of true values that are as short as a glitch may be."""
     found = same.copy()
     for first, last in runs(same):
         longest = END if first == 0 or last == len(same) else SHORT
@@ -101,14 +102,15 @@ def _lasting(same: np.ndarray) -> np.ndarray:
 
 
 def runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """Return first frame and one past the last, of each run of true values in a mask (T,)."""
+    """Return the pairs (first frame, one past the last) of the runs of true values in a mask (T,)."""
     bounds = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(int))).tolist()
     return list(zip(bounds[::2], bounds[1::2], strict=True))
 
 
 def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark the frames (T,) bool of long runs in which no electrode changes, in a recording that is noisy elsewhere.
-    electrodes : (T, e); change : (T - 1, e), of each frame from the one before"""
+    """Return (T,) bool, true for frames in runs of `FROZEN` or more in which no electrode changes; none are if the
+    recording is not noisy elsewhere.
+    electrodes : (T, e) readings; change : (T - 1, e) bool, true if a reading differs from that of the frame before"""
     still = np.r_[False, ~change.any(axis=1)]
     found = np.zeros(len(still), bool)
     for first, last in runs(still):
@@ -117,8 +119,8 @@ def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def noise_turns(electrodes: np.ndarray) -> float:
-    """Return the share of rows at which an electrode's readings turn, from rising to falling or back: the median over
-    electrodes (T, e), in any unit, no row equal to the one before; 0 of fewer than three."""
+    """Return the share of rows at which an electrode's readings turn from rising to falling or back, the median over
+    electrodes (T, e), in any unit of measurement; 0 for fewer than three rows. No row may equal the one before."""
     moves = np.diff(electrodes, axis=0)
     return float(np.median(np.mean(moves[1:] * moves[:-1] < 0, axis=0))) if len(moves) > 1 else 0.0
 
@@ -126,8 +128,10 @@ def noise_turns(electrodes: np.ndarray) -> float:
 def mended(
     recording: Recording, readings: np.ndarray, flags: np.ndarray, warnings: list[str], kind: str, *, repair: bool
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
-    """Interpolate NaN in readings (T, e) and, with `repair`, glitches and repeats (of kind "raw"); return them, flags
-    (T,) with REPAIRED and DEAD_CHANNEL added, and a report: samples_interpolated, samples_glitch, rows_repaired."""
+    """Interpolate unreadable readings (T, e) counts and, if `repair` is true, glitches and, in a raw recording,
+    repeated rows and ends that fade.
+    Returns the readings, flags (T,) uint16 with REPAIRED and DEAD_CHANNEL added, and a report: samples_interpolated,
+    samples_glitch, rows_repaired. kind : the recording's, such as "raw"; warnings : list, extended by what was found"""
     unreadable = ~np.isfinite(recording.electrodes)
     glitches, interpolated = np.zeros_like(unreadable), int(unreadable.sum())
     if repair:
@@ -155,16 +159,17 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Mark rows (T,) of electrodes (T, e) equal to the row before; also true if noise elsewhere makes these faults."""
+    """Return (T,) bool, true for rows of electrodes (T, e) equal to the row before; and whether these are faults: they
+    are few, and the other rows noisy."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 
 
 def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) -> tuple[np.ndarray, np.ndarray]:
-    """Mark the frames (T,) bool that repeat the row before, and those of longer runs of repeats, which are held.
+    """Return two masks (T,) bool of frames that repeat the row before, in runs of `STALE` and more equal rows: those in
+    runs short enough to interpolate, and those in longer runs. The warnings are extended by a sentence on them.
 
-    Runs of `STALE` and more equal rows, in electrodes (T, e) counts whose noise should differ, are lost packets or a
-    driver that stood still. Findings are added to the warnings."""
+    In electrodes (T, e) counts, whose noise should differ, these are lost packets or a driver that stood still."""
     found, long = np.zeros((2, len(electrodes)), bool)
     same, noisy = repeats(electrodes)
     again = [(first, last) for first, last in runs(same) if last - first >= STALE - 1] if noisy else []
@@ -181,7 +186,8 @@ def _stale(recording: Recording, electrodes: np.ndarray, warnings: list[str]) ->
 
 
 def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Mark samples (T, 19) bool of readings (T, 19) counts to repair, and report them in the warnings."""
+    """Return (T, 19) bool, true for samples of readings (T, 19) counts that are glitches; extend the warnings by these.
+    None are if so many rows hold one that neighbouring rows seem not to belong together."""
     found = find_glitches(readings)
     if not is_time_series(found):
         warnings.append(
@@ -202,7 +208,7 @@ def _glitches(recording: Recording, readings: np.ndarray, warnings: list[str]) -
 
 
 def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
-    """Return true and add a warning if rest (e,) counts, or one electrode's, are those of no unit of the sensor."""
+    """Return true and add a warning if rest (e,) counts, or that of one electrode, is no rest of any of its units."""
     typical = typical_rest(sensor)
     if typical is None:
         return False
@@ -231,7 +237,8 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,), SATURATED where one of readings (T, 19), of kind "raw", is 0 or 4095; extends warnings."""
+    """Return flags (T,) uint16: SATURATED in frames where one of readings (T, 19) counts is at an end of the 12-bit
+    range, 0 in others and for another kind than "raw"; extend the warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)
@@ -245,7 +252,8 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,): DEAD_CHANNEL where one of readings (T, 19) counts stands still for 1 s; extends warnings."""
+    """Return flags (T,) uint16: DEAD_CHANNEL in frames where one of readings (T, 19) counts stands still for
+    `DEAD_FRAMES` or longer, 0 in others; extend the warnings."""
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():
@@ -260,9 +268,9 @@ def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.
 
 
 def _still(readings: np.ndarray) -> np.ndarray:
-    """Mark (T, 19) bool the samples of runs of ``DEAD_FRAMES`` or more equal readings. Runs in which no electrode
-    changes are no fault, nor is a run of an electrode that is quiet elsewhere too, unless they span the whole
-    recording."""
+    """Return (T, 19) bool, true for samples in runs of ``DEAD_FRAMES`` or more equal readings (T, 19) counts of an
+    electrode. Unless it spans the whole recording, a run is no fault if the other electrodes hardly move in it, nor if
+    the electrode rarely changes elsewhere."""
     still = np.zeros(readings.shape, bool)
     for j in range(readings.shape[1]):
         column = readings[:, j].copy()
@@ -282,10 +290,10 @@ def _still(readings: np.ndarray) -> np.ndarray:
 
 
 def _moves(readings: np.ndarray) -> bool:
-    """Return true if half of the electrodes of readings (T, 19) change by more than `STEADY`."""
+    """Return true if half of the electrodes in readings (T, 19) counts span more than `STEADY` counts."""
     return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 
 def named_electrodes(mask: np.ndarray | np.bool) -> str:
-    """Name the electrodes of a mask (19,) bool: ``"E3, E7"``."""
+    """Return the names of the electrodes that are true in a mask (19,) bool, as ``"E3, E7"``."""
     return ", ".join(f"E{j + 1}" for j in np.flatnonzero(mask))

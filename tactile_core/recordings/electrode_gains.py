@@ -31,14 +31,15 @@ Row = Annotated[list[float], Meta(min_length=1, max_length=MOST_ELECTRODES)]
 
 
 class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Gains of a unit relative to the simulated one: reading - rest = gain * simulated change + offset, E1 .. E19.
+    """Gains of a unit relative to the simulated one: reading - rest = gain * simulated change + offset. Lists hold a
+    number for each electrode, E1 to E19; None stands for what is not known.
 
-    gain : counts per count; offset_counts : counts; note : how it was made
-    rest_counts : readings without contact, where known; rest_spread_counts : half the range of its estimates from
-        single recordings; rest_pdc : counts
-    film : thickness of its fluid film, divided by a typical unit's, where known
-    stiffness : of its skin, divided by a typical unit's, where a measured force showed it: scales force and pressure
-        under the same signals; stiffness_error : relative"""
+    gain : counts per count; offset_counts : counts; note : how the gains were found, in words
+    rest_counts : readings without contact, counts; rest_spread_counts : half the range of the rests found in single
+        recordings, counts; rest_pdc : PDC without contact, counts
+    film : thickness of the unit's fluid film, divided by a typical unit's
+    stiffness : stiffness of its skin, divided by a typical unit's, by which force and pressure are multiplied; known if
+        a force was measured; stiffness_error : its relative error"""
 
     note: str
     gain: Row
@@ -51,16 +52,16 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
     stiffness_error: float | None = None
 
     def rest(self) -> Rest | None:
-        """Return the unit's rest as ``PrepareOptions.rest`` takes it; None where it is unknown."""
+        """Return the unit's rest, for ``PrepareOptions.rest``; None if it is unknown."""
         if self.rest_counts is None:
             return None
         return Rest(tuple(self.rest_counts), tuple(self.rest_spread_counts or [0.0] * len(self.gain)), self.rest_pdc)
 
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Calibration of one unit, or of those of a hand's fingers 0 to 4, each in its own section; format : FORMAT
-    topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
-    sensor : of the units: "biotac", or another, whose units have a rest and no gains"""
+    """Calibration of one unit, or of the units on a hand's fingers 0 to 4, each in its own section.
+    format : `FORMAT`; topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
+    sensor : name of the units' sensor: "biotac", or another, whose units have a rest and no gains"""
 
     format: str
     unit: ElectrodeGains | None = None
@@ -73,15 +74,15 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
     topics: dict[str, ElectrodeGains] | None = None
 
     def sections(self) -> dict[str, ElectrodeGains]:
-        """Return the sections present, by name: ``unit``, ``finger2``, ``left/biotac/finger2``."""
+        """Return the file's sections, by names such as ``unit``, ``finger2`` or ``left/biotac/finger2``."""
         names = ("unit", *(f"finger{number}" for number in range(FINGERS)))
         return {name: found for name in names if (found := getattr(self, name)) is not None} | (self.topics or {})
 
     def gains_for(
         self, recording: str | os.PathLike, section: str, where: str | os.PathLike, sensor: str = SOURCE
     ) -> ElectrodeGains:
-        """Return a unit's gains, by its section. recording, where : path of one by the unit, this file, for messages
-        Raises TactileError where there is none."""
+        """Return the gains in a section. Raises TactileError if there is no such section, or for another sensor.
+        recording, where : paths of the unit's recording and of this file, which the error names"""
         if self.sensor != sensor:
             found = f"a unit of {electrode_count(self.sensor)} electrodes, {self.sensor!r}"
             expected = f"one of {electrode_count(sensor)} electrodes, {sensor!r}, as {recording} is of"
@@ -94,16 +95,17 @@ class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_d
 
 
 def units_file(units: dict[str, ElectrodeGains], sensor: str = SOURCE) -> SensorFile:
-    """Return the content of a file of units, section -> unit; sensor : whose units they are"""
+    """Return the content of a sensor file; units : section's name -> gains; sensor : name of the units' sensor"""
     topics = {name: unit for name, unit in units.items() if "/" in name}
     plain: dict[str, Any] = {name: unit for name, unit in units.items() if name not in topics}
     return SensorFile(FORMAT, **plain, sensor=sensor, topics=topics or None)
 
 
 def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
-    """Convert signals of a unit, sensor, to those with the simulated one's gains: (change - offset) / gain, rectified
-    without offset. Raw changes are converted to a typical unit's rest before that and back to this unit's after it.
-    The unit's stiffness is noted, and the law of contacts checked again (`doubt_law`)."""
+    """Return signals with the changes that a unit with the simulated one's gains would have shown: (change - offset) /
+    gain; of rectified signals change / gain. sensor : gains of the unit that was recorded
+    Raw changes are converted to a typical unit's rest before, and back to this unit's rest after. The unit's stiffness
+    is added, and it is checked again whether the contacts resemble simulated ones (`doubt_law`)."""
     offset = np.zeros(len(sensor.gain)) if signals.kind == "rectified" else np.array(sensor.offset_counts)
     applied = {"gain": list(sensor.gain), "offset_counts": offset.tolist(), "note": sensor.note}
     stiffness = 1.0 if sensor.stiffness is None else sensor.stiffness
@@ -119,7 +121,8 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
 
 
 def read(path: str | os.PathLike) -> SensorFile:
-    """Read a sensor file; raises TactileError naming file and field for what is unreadable, unknown or out of range."""
+    """Return the content of a sensor file. Raises TactileError, which names file and field, if it cannot be read, has
+    an unknown field, or a value out of range."""
     file = Path(path)
     try:
         text = read_toml_text(file)
@@ -136,7 +139,7 @@ def read(path: str | os.PathLike) -> SensorFile:
 
 
 def check(sensor: SensorFile, where: str | os.PathLike) -> None:
-    """Raise TactileError naming the field that is out of range. where : the file, for messages"""
+    """Raise TactileError, which names the field, for a value out of range. where : the file's path, for the message"""
     if sensor.format != FORMAT:
         raise TactileError(f"{where}, format", repr(sensor.format), repr(FORMAT), ADVICE)
     try:
@@ -170,7 +173,7 @@ def check(sensor: SensorFile, where: str | os.PathLike) -> None:
 
 
 def write(path: str | os.PathLike, sensor: SensorFile) -> None:
-    """Write a sensor file, whole or not at all; equal sensors give equal bytes."""
+    """Write a sensor file, whole or not at all. Equal content gives equal bytes."""
     name, last = title(sensor.sensor), f"E{electrode_count(sensor.sensor)}"
     head: tuple[str, ...] = (
         f"A {name} against the simulated one: reading - rest = gain * simulated change + offset, E1 to {last}.",

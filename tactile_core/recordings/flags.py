@@ -6,7 +6,7 @@ import enum
 
 
 class Flag(enum.IntFlag):
-    """Bits of the dataset ``flags``. Their names are written into every file that holds them."""
+    """Bits of a frame's flags, in a file the dataset ``flags``; the file's attributes name them."""
 
     REPAIRED = 1  # one or more electrode samples were bad (drop-out, NaN, glitch) and were interpolated
     TIME_JUMP = 2  # the time stamp went back, stood still or left a gap before this frame
@@ -27,5 +27,5 @@ class Flag(enum.IntFlag):
 
 
 def names() -> dict[str, int]:
-    """Map flag names in lower case to bits, for attributes and notes."""
+    """Return the flags' names in lower case, each with its bit as a number, for files' attributes and notes."""
     return {str(flag.name).lower(): int(flag) for flag in Flag}

@@ -23,12 +23,13 @@ ADVICE = "Leave in it what is measured beside the recording, in newtons"
 
 
 def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray]:
-    """Read the force beside a recording. named : a file, or columns of the recording's own file, ``"fx,fy,fz"``
+    """Return rising times (n,) s from the recording's first frame, and the magnitude (n,) N of the force measured then.
 
-    A file with as many rows as the recording has frames needs no time. Otherwise unix time aligns the two if both have
-    it; else both begin at the same moment.
-    Returns rising times (n,) s from the recording's first frame, and the magnitude (n,) N of the force.
-    Raises TactileError: no such file or column, other rows, a clock that does not overlap, values not in newtons."""
+    named : path of a file with the force, or names of columns in the recording's own file, as ``"fx,fy,fz"``
+    A file without a column of time needs as many rows as the recording has frames. With one, unix time aligns the two
+    if both have it; else both begin at the same moment.
+    Raises TactileError if there is no such file or column, for another number of rows, for times that cover less than
+    half of the recording, and for values that cannot be newtons."""
     own = not os.path.exists(named)
     path, where = (split(recording.path).file, f"{recording.path}, {named}") if own else (named, named)
     names = [name.strip().lower() for name in named.split(",")] if own else None
@@ -49,7 +50,8 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
 
 
 def read_columns(path: str, names: list[str]) -> np.ndarray:
-    """Read columns, by names in any case, of a recording's own file: (n, c) as it has them. TactileError for none."""
+    """Return the columns (n, c) of those names, in any case, from a recording's file, as they are there. Raises
+    TactileError for a missing column."""
     table = _table(path, [name.lower() for name in names])
     missing = [name for name in names if name.lower() not in table.header]
     if missing:
@@ -58,7 +60,8 @@ def read_columns(path: str, names: list[str]) -> np.ndarray:
 
 
 def _table(path: str, names: list[str] | None) -> Table:
-    """Read a table of numbers: a text whole, of other files the arrays of these names."""
+    """Return a table of numbers: all of a text file, or the arrays `names` of another. Raises TactileError for a bag,
+    and for another file than a text if `names` is None."""
     with opened(path) as (container, where, _, file):
         if container in ("csv", "json"):
             return read_json(where, file) if container == "json" else read_table(where, file)
@@ -70,7 +73,8 @@ def _table(path: str, names: list[str] | None) -> Table:
 
 
 def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
-    """Return the magnitude (n,) N of a force, columns (n, 1) or (n, 3) N; lines : (n,) rows in the file, for errors"""
+    """Return the magnitude (n,) N of a force, given as columns (n, 1) or (n, 3) N. Raises TactileError for what cannot
+    be a finger's force. lines : (n,) int, the rows' lines in the file `where`, for messages"""
     if columns.shape[1] not in (1, 3):
         raise TactileError(where, f"{columns.shape[1]} columns", COLUMNS, ADVICE)
     size = np.linalg.norm(columns, axis=1)
@@ -84,7 +88,8 @@ def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 
 def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:
-    """Convert stamps (n,) of another clock to times (n,) s from the recording's first frame."""
+    """Convert stamps (n,) of the force's clock, s to ns, to times (n,) s from the recording's first frame. Raises
+    TactileError if they do not rise, or cover less than half of the recording."""
     time, start, _ = seconds_of(stamps)
     if not np.isfinite(stamps).all() or not (np.diff(time) > 0).all():
         raise TactileError(f"{where}, column 1", "numbers that do not rise", "the time", ADVICE)

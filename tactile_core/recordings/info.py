@@ -33,9 +33,10 @@ ADVICE = (
 def describe(
     path: str | os.PathLike[str], options: PrepareOptions | None = None, unit: SensorFile | None = None
 ) -> str:
-    """Describe sensor, channels, rate, duration, tare, gaps and suspicious samples with their lines, as a short table.
-    A sensor without a typical rest is described by its readings alone. unit : rest and gains, of `tactile adapt`
-    options : of preparation. Raises TactileError where the file is no recording, or not of the unit's sensor."""
+    """Return a short table, as text, of a recording's sensor, channels, rate, duration, tare, gaps and suspicious
+    samples with their lines. A sensor without a typical rest is described by its readings alone.
+    options : how to prepare its signals; unit : the unit's rest and gains, a file of `tactile adapt`
+    Raises TactileError if the file is no recording, or not of the unit's sensor."""
     columns = None if options is None else options.columns
     sensor = sensor_of(path, columns)
     recording = read(path, columns, sensor, lean=True)
@@ -139,7 +140,7 @@ def _drift(signals: Signals) -> str:
 
 
 def unit_rows(signals: Signals) -> list[tuple[str, str]]:
-    """Return what is known of the unit as label and words: its file's note, film, fluid and stiffness."""
+    """Return pairs (label, words) of what is known of the unit: its file's note, its fluid film and its stiffness."""
     note = signals.report.get("sensor", {}).get("note")
     return [*([("unit", note)] if note else []), *_film(signals), *_stiffness(signals)]
 
@@ -172,7 +173,8 @@ def _flags(flags: np.ndarray) -> str:
 
 
 def _of_counts(recording: Recording, unit: ElectrodeGains | None, pac: int) -> list[tuple[str, str]]:
-    """Return the rows for a recording whose changes are unknown, because its unit's rest is; pac : samples per frame"""
+    """Return pairs (label, words) for a recording of a sensor without a typical rest, of which only readings are shown.
+    unit : the unit's rest, or None; pac : number of samples of PAC per frame"""
     electrodes = recording.electrodes
     finger = recording.about.get("finger")
     name = f", {HAND[finger]} ({finger})" if finger else ""
@@ -200,8 +202,8 @@ def _time_of_sp(recording: Recording) -> str:
 
 
 def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
-    """Return (e,) by name: each electrode's median (or its unit's rest), least and largest count; against rest if
-    known."""
+    """Return pairs (label, (e,) counts): each electrode's rest and its least and largest change; without a unit, its
+    median, least and largest count."""
     if unit is None:
         counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
     else:

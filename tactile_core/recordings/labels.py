@@ -1,4 +1,4 @@
-"""Labels of frames, such as object, material or trial: (T,) texts that no translation reads and results keep."""
+"""Labels of frames, such as object, material or trial: (T,) texts that translation ignores and results keep."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ MOST_WORDS = 20  # of a label that a summary counts one by one
 
 
 def labels_of(columns: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Return named texts as (T,) object arrays of str, shortened, fit for HDF5; all-empty ones are dropped."""
+    """Return columns of texts as labels, name -> (T,) object array of str, cut to `LONGEST` characters and fit for
+    HDF5. Columns of empty texts are dropped."""
     found = {}
     for name, column in columns.items():
         found[_plain(name).replace("/", "_").strip(". ")] = [_plain(text) for text in column]
@@ -25,7 +26,8 @@ def _plain(text: str) -> str:
 
 
 def summary(labels: Mapping[str, np.ndarray]) -> dict[str, dict[str, int]]:
-    """Return label -> text -> number of frames, from labels, name -> (T,) texts; rare texts are counted together."""
+    """Return name -> text -> number of frames with it, for labels, name -> (T,) texts. Beyond the `MOST_WORDS`
+    commonest texts of a label, the others are counted together."""
     found = {}
     for name, column in labels.items():
         counts = Counter(column.tolist()).most_common()
@@ -39,7 +41,8 @@ Runs = dict[str, list[tuple[str, int]]]  # name -> texts in order, each with the
 
 
 def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) -> None:
-    """Add to ``runs``, name -> pairs (text, frames in a row) before start, labels (stop - start,) of start to stop."""
+    """Add the labels (stop - start,) of frames start to stop to ``runs``, which hold those of the frames before start:
+    name -> pairs (text, number of frames in a row with it)."""
     for name in {**runs, **labels}:
         held = runs.setdefault(name, [("", start)] * bool(start))
         column = labels[name].tolist() if name in labels else [""] * (stop - start)
@@ -47,7 +50,7 @@ def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) 
 
 
 def unfold(runs: Runs) -> dict[str, np.ndarray]:
-    """Return the labels, name -> (T,) texts, that runs, name -> pairs (text, frames in a row with it), shorten."""
+    """Return labels, name -> (T,) texts, from runs: name -> pairs (text, number of frames in a row with it)."""
     return {
         name: np.array([text for text, frames in each for _ in range(frames)], dtype=object)
         for name, each in runs.items()

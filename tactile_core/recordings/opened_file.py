@@ -31,8 +31,9 @@ HEAD, DIRECTORY = 1024, 2**16  # bytes in which the first one's name is; at a zi
 
 
 class Opened(NamedTuple):
-    """Open file. container : csv, json, hdf5, npz, mat or bag; path : without #finger; finger : requested, or None
-    file : its bytes, unpacked; none of a bag that is a folder"""
+    """An open file of recordings.
+    container : "csv", "json", "hdf5", "npz", "mat" or "bag"; path : the file's, without #finger
+    finger : number of the finger that the path named, or None; file : its bytes, unzipped; empty for a bag's folder"""
 
     container: str
     path: str
@@ -42,7 +43,7 @@ class Opened(NamedTuple):
 
 @contextmanager
 def _reading(path: str) -> Iterator[None]:
-    """Turn errors of the operating system into a TactileError."""
+    """Raise an OSError or MemoryError of the block as TactileError, which names the path."""
     try:
         yield
     except OSError as error:
@@ -55,7 +56,8 @@ def _reading(path: str) -> Iterator[None]:
 
 @contextmanager
 def opened(path: str) -> Iterator[Opened]:
-    """Open a file once, and detect its kind from its first bytes. Raises TactileError, for the system's errors too."""
+    """Open a file, or the one in ``path#finger``, and detect its kind from its first bytes. Raises TactileError if it
+    is missing or packed, or of a kind without fingers or topics, and for the system's errors in the block."""
     with _reading(path):
         file, finger, topic = split(path)
         if is_bag_folder(file):
@@ -86,7 +88,7 @@ def _end(file: BinaryIO) -> bytes:
 
 
 def container_of(path: str) -> str:
-    """Detect the container: csv, json, hdf5, npz, mat or bag. Raises TactileError where there is no regular file."""
+    """Return a file's container: "csv", "json", "hdf5", "npz", "mat" or "bag". Raises TactileError for no file."""
     with opened(path) as found:
         return found.container
 
@@ -104,7 +106,7 @@ def _check_file(path: str) -> None:
 
 
 def _container(start: bytes) -> str:
-    """Return the container that begins with these bytes; anything but a known signature is a table of text."""
+    """Return the container of a file that starts with these bytes; "csv" if they are no known signature."""
     if kind_of(start) is not None:
         return "bag"
     if start.startswith(START):
@@ -117,7 +119,7 @@ def _container(start: bytes) -> str:
 
 
 def refuse_finger(path: str, finger: int | None) -> None:
-    """Raise TactileError where the path names a finger of a file with only one."""
+    """Raise TactileError if a finger's number is given, for a file that holds only one."""
     if finger is not None:
         raise TactileError(path, f"finger {finger} of a file of one", "one recording", "Leave out the #")
 
@@ -127,7 +129,8 @@ GZIP, STEP = b"\x1f\x8b", 2**20
 
 @contextmanager
 def unpacked(path: str, file: BinaryIO) -> Iterator[BinaryIO]:
-    """Yield the file from its start, unpacked where gzipped. Raises TactileError for damage and too long a text."""
+    """Yield the file from its start, unpacked if it is gzipped. Raises TactileError for damage, and for more than
+    `MAX_BYTES` unpacked."""
     packed = file.read(len(GZIP)) == GZIP
     file.seek(0)
     if not packed:

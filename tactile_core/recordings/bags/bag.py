@@ -29,7 +29,9 @@ UNDAMAGED = re.compile(r"not supported|[Uu]nsupported|not ros2|not indexed|not i
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic with BioTacs. kind : message type; definitions : candidates for its definition; connections : rosbags'"""
+    """A topic whose messages hold BioTacs.
+    kind : name of its message type; definitions : what that type may hold, one of which fits
+    connections : the topic's connections, objects of the library rosbags"""
 
     name: str
     kind: str
@@ -39,8 +41,10 @@ class Topic:
 
 @dataclass(frozen=True)
 class Bag:
-    """Open bag. ros1 : true of ROS 1, false of ROS 2; reader : rosbags', open; middle : of its time, unix ns
-    topics : with BioTacs, by name; others : without, in words"""
+    """An open bag.
+    ros1 : true for a bag of ROS 1, false for ROS 2; reader : opened reader of the library rosbags
+    topics : topics with BioTacs, sorted by name; others : the other topics, each in words
+    middle : unix time half-way between the bag's start and end, ns"""
 
     path: str
     ros1: bool
@@ -51,7 +55,8 @@ class Bag:
 
 
 def is_bag_folder(path: str) -> bool:
-    """Return true for a ROS 2 bag's folder. TactileError for a bag of compressed files, or one with links out of it."""
+    """Return true if a path is the folder of a ROS 2 bag. Raises TactileError if its files are compressed, or link to
+    others outside the folder."""
     if not os.path.isfile(os.path.join(path, MARK)):
         return False
     with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
@@ -66,14 +71,16 @@ def is_bag_folder(path: str) -> bool:
 
 
 def kind_of(start: bytes) -> str | None:
-    """Return the kind of bag that a file's first START_BYTES begin: ros1, mcap or sqlite; None for any other file."""
+    """Return the kind of bag that a file with this start is: "ros1", "mcap" or "sqlite"; None if it is no bag.
+    start : the file's first `START_BYTES` bytes"""
     return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
 
 
 @contextmanager
 def open_bag(path: str, file: BinaryIO) -> Iterator[Bag]:
-    """Open a bag to read; raises TactileError for damage, for a bag without a BioTac, and without the extra [ros].
-    file : the opened file, from its start; an empty one where the bag is a folder that `is_bag_folder` has passed"""
+    """Open a bag to read. Raises TactileError for damage, for a bag without a BioTac, and if rosbags (the package's
+    extra [ros]) is not installed.
+    file : the opened file, at its start; an empty one if the bag is a folder, which `is_bag_folder` has checked"""
     with installed.needing("ros"):
         from rosbags.rosbag1 import Reader as Reader1
         from rosbags.rosbag2 import Reader as Reader2
@@ -96,7 +103,7 @@ def open_bag(path: str, file: BinaryIO) -> Iterator[Bag]:
 
 @contextmanager
 def refused(path: str) -> Iterator[None]:
-    """Turn rosbags' errors in the block into a TactileError; it speaks of damage only where rosbags found damage."""
+    """Raise errors of rosbags in the block as TactileError: of damage, or of a bag that is whole but cannot be read."""
     try:
         with damage_reported(path, "bag"):
             yield
@@ -108,7 +115,8 @@ def refused(path: str) -> Iterator[None]:
 
 
 def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
-    """Separate the topics with BioTacs from the others. Raises TactileError where there are none."""
+    """Return the bag of an open reader, its topics with BioTacs apart from the others. Raises TactileError if no topic
+    has a BioTac and a message."""
     grouped: dict[tuple[str, str], list[Any]] = {}
     for connection in reader.connections:
         grouped.setdefault((connection.topic, connection.msgtype), []).append(connection)
@@ -135,7 +143,7 @@ def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
 
 
 def _bound_unpacking() -> None:
-    """Make the library unpack no chunk to more than MAX_CHUNK; by default it unpacks whatever size a file declares."""
+    """Make rosbags stop at `MAX_CHUNK` bytes where it unpacks a chunk, whatever size the file declares."""
     import bz2
 
     import lz4.frame
@@ -143,10 +151,10 @@ def _bound_unpacking() -> None:
     from rosbags.rosbag2 import storage_mcap
 
     def bounded(unpacker: Callable[[], Any]) -> Callable[..., bytes]:
-        """Return a function that unpacks a chunk with an ``unpacker()`` and stops at MAX_CHUNK."""
+        """Return a function that unpacks a chunk by a new ``unpacker()``, to less than `MAX_CHUNK` bytes."""
 
         def unpack(data: bytes, size: int = 0) -> bytes:
-            """Unpack a chunk, whatever size it declares; raises ValueError for one of MAX_CHUNK and more."""
+            """Return the bytes of a chunk; size is ignored. Raises ValueError for `MAX_CHUNK` bytes and more."""
             found = unpacker().decompress(data, max_length=MAX_CHUNK)
             if len(found) >= MAX_CHUNK:
                 raise ValueError(f"a chunk of over {MAX_CHUNK // 2**20} MB")

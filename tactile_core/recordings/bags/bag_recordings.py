@@ -1,4 +1,4 @@
-"""Make recordings of a bag: one of each finger of each topic."""
+"""Make recordings of a bag: one for each finger in each topic."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ LOOKED_AT = 100
 
 @dataclass
 class Finger:
-    """A sensor in a topic's messages. electrodes : their number; live : true if one of them is ever non-zero"""
+    """One sensor in a topic's messages. electrodes : their number; live : true if one of them is ever non-zero"""
 
     electrodes: int
     live: bool = False
 
     @property
     def silence(self) -> str:
-        """Return in words why a finger is taken for silent: an unknown number of electrodes, or zeros alone."""
+        """Return in words why a finger is not live: no sensor has so many electrodes, or all its readings are 0."""
         known = sensor_with(self.electrodes)
         return f"{self.electrodes} electrodes" if not known else "all zeros at the start and in the middle"
 
 
 @dataclass(frozen=True)
 class Stream:
-    """One finger in a topic's messages. number : its index in hand, the list of all fingers of the topic"""
+    """One finger in a topic's messages. hand : all fingers in the topic; number : this one's index in that list"""
 
     topic: Topic
     number: int
@@ -51,14 +51,14 @@ class Stream:
 
     @property
     def sensor(self) -> str:
-        """Return the name of the sensor that has as many electrodes as this finger; empty for none."""
+        """Return the name of the sensor that has as many electrodes as this finger; "" if there is none."""
         return sensor_with(self.hand[self.number].electrodes)
 
 
 def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
-    """Return the fingers with signals in the chosen topic, or in all; of a topic without any, its first finger.
-    chosen : `split` of a path; a finger that it names is returned alone of each topic, with signals or not
-    Raises TactileError for a topic or finger that the bag does not have."""
+    """Return the fingers with signals in the chosen topic, or in all topics if none is chosen; the first finger of a
+    topic without signals. A chosen finger is returned alone, with signals or not.
+    chosen : what a path names, by `recording.split`. Raises TactileError for a topic or finger that the bag lacks."""
     topics, finger = _topics(bag, chosen)
     found: list[Stream] = []
     fingers = 0
@@ -73,7 +73,8 @@ def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
 
 
 def _topics(bag: Bag, chosen: Chosen) -> tuple[list[Topic], int | None]:
-    """Return the chosen topics, and the finger of them; a topic may itself be called ``left/finger0``."""
+    """Return the chosen topics and the chosen finger's number, or None. Raises TactileError for a topic without
+    BioTacs. A topic may itself be called ``left/finger0``: then that is no finger."""
     named = {topic.name.strip("/"): topic for topic in bag.topics}
     if chosen.topic in named:
         return [named[chosen.topic]], chosen.finger
@@ -88,8 +89,8 @@ def _topics(bag: Bag, chosen: Chosen) -> tuple[list[Topic], int | None]:
 
 
 def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
-    """Return the path of each recording, as ``bag#0``, or of a bag of several topics ``bag#topic/finger0``.
-    path : as given, kept where it names one recording; chosen : its `split`"""
+    """Return a path for each recording: ``bag#0``, in a bag of several topics ``bag#topic/finger0``; the path itself if
+    it names one recording. chosen : what the path names, by `recording.split`"""
     found = streams_of(bag, chosen)
     whole = bool(chosen.topic) or len(bag.topics) > 1
     if len(found) == 1 and (not whole or (chosen.topic and chosen.finger is not None)):
@@ -98,7 +99,8 @@ def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
 
 
 def _hand(bag: Bag, topic: Topic) -> list[Finger]:
-    """Read some of a topic's messages, until a finger has signals; return all its fingers."""
+    """Return all fingers of a topic, after reading `LOOKED_AT` messages from its start and from its middle, more if no
+    finger has signals in these."""
     hand: list[Finger] = []
     for start in (None, bag.middle):
         for count, (_, sensors) in enumerate(_messages(bag, topic, start), start=1):
@@ -114,10 +116,9 @@ def _hand(bag: Bag, topic: Topic) -> list[Finger]:
 def read_bag(
     bag: Bag, chosen: Chosen, frames: int = MAX_FRAMES + 1, context: int = 0
 ) -> Iterator[tuple[Recording, int]]:
-    """Yield a stream's frames as recordings of up to `frames` new ones, each with how many frames it first repeats of
-    the recording before, at most `context`.
-    Reads the chosen topic and finger, or the first with signals; a warning names the others. Raises TactileError for
-    messages that do not fit their type."""
+    """Yield pairs (recording, repeated) of the chosen finger, or of the first with signals: a warning names the others.
+    A recording has up to `frames` new frames, after `repeated` ones (at most `context`) of the recording before.
+    Raises TactileError for a topic or finger that the bag lacks, and for messages that do not fit their type."""
     first, *others = streams_of(bag, chosen)
     warnings = _warnings(bag, chosen, first, others)
     not_taken = _not_taken(bag, first)
@@ -130,7 +131,7 @@ def read_bag(
 
 
 def _warnings(bag: Bag, chosen: Chosen, first: Stream, others: list[Stream]) -> list[str]:
-    """Return sentences on what reading the bag as one recording leaves out."""
+    """Return sentences on the fingers with signals that are not read, or on the lack of any signal."""
     if chosen.finger is None and not first.hand[first.number].live:
         return [f"all electrodes of all {len(first.hand)} fingers are 0: finger {first.number} is read"]
     if not others:
@@ -141,7 +142,7 @@ def _warnings(bag: Bag, chosen: Chosen, first: Stream, others: list[Stream]) -> 
 
 
 def _not_taken(bag: Bag, stream: Stream) -> tuple[str, ...]:
-    """Return the topics, fingers and fields that are not read."""
+    """Return the topics, silent fingers and fields of messages that are not read, each in words."""
     topic = stream.topic
     silent: dict[str, list[str]] = {}
     for number, one in enumerate(stream.hand):
@@ -153,7 +154,8 @@ def _not_taken(bag: Bag, stream: Stream) -> tuple[str, ...]:
 
 
 def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
-    """Yield (n, columns) float, n up to `frames`: stamp, pdc, tac, tdc, pac, electrodes."""
+    """Yield rows (n, columns) float of up to `frames` messages: stamp (unix s), pdc, tac, tdc, pac, electrodes
+    (counts). Raises TactileError if the number of fingers or of readings changes."""
     topic, wanted = stream.topic, stream.hand[stream.number].electrodes
     if not stream.sensor:
         check_electrodes(bag.path, wanted, f"{topic.name}, finger {stream.number}")
@@ -178,7 +180,8 @@ def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
 def _messages(
     bag: Bag, topic: Topic, start: int | None = None
 ) -> Iterator[tuple[float, list[tuple[list[float], list[float]]]]]:
-    """Yield stamp (unix s; else the bag's) and each sensor's (others, electrodes) of messages from `start` ns on."""
+    """Yield, for each message from `start` (unix ns) on, its stamp, unix s, and for each sensor the other readings
+    (pdc, tac, tdc, pac) and the electrodes, counts. A message without a stamp has the time at which it was recorded."""
     known = [(Decoder(each, bag.ros1), sensors_in(each)) for each in topic.definitions]
     with refused(bag.path):
         for count, (_, written, data) in enumerate(bag.reader.messages(topic.connections, start)):
@@ -188,7 +191,8 @@ def _messages(
 
 
 def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict[str, Any], list[Any]]:
-    """Decode a message by the first definition that fits; also return that definition alone, with its sensors."""
+    """Return a message, decoded by the first of the `known` pairs (decoder, sensors) that fits, and a list of that
+    pair. Raises TactileError if none fits."""
     for one in known:
         try:
             return one[0](data), [one]
@@ -199,7 +203,7 @@ def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict
 
 
 def _recording(bag: Bag, stream: Stream, rows: np.ndarray, warnings: list[str]) -> Recording:
-    """Make the recording of rows (n, columns) as `_blocks` yields them."""
+    """Return the recording of rows (n, columns): stamp (unix s), pdc, tac, tdc, pac, electrodes (counts)."""
     count = stream.hand[stream.number].electrodes
     slow = [values if np.isfinite(values).any() else None for values in rows[:, 1:4].T]
     pac = rows[:, 4:-count]

@@ -64,20 +64,20 @@ KNOWN: dict[str, list[dict[str, str]]] = {
 
 @dataclass(frozen=True)
 class Definition:
-    """Fields of a message, whose type is `root`, and of those inside it.
-    types : name -> names and kinds of fields, as rosbags parses them"""
+    """Definition of a message type, and of the types inside it.
+    root : name of the message's type; types : type's name -> names and kinds of its fields, as rosbags parses them"""
 
     root: str
     types: dict[str, list[tuple[str, Any]]]
 
     def fields(self, name: str) -> list[tuple[str, Any]]:
-        """Return names and kinds of the fields of a type; none of an unknown type."""
+        """Return names and kinds of the fields of the type of that name; an empty list if it is unknown."""
         return self.types.get(name, [])
 
 
 def definitions(kind: str, text: str, idl: bool) -> list[Definition]:
-    """Return the possible definitions of message type `kind`: of the bag's own text, in IDL if idl, or, where that is
-    empty, those of `KNOWN`; unreadable ones are left out."""
+    """Return the possible definitions of the message type `kind`, an empty list if they cannot be read.
+    text : the definition in the bag, in IDL if `idl` is true; if it is empty, the drivers' own (`KNOWN`) are taken"""
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 
     if len(text) > MOST_TEXT or (text and "electrode" not in text.lower()):
@@ -100,13 +100,13 @@ def _parsed(texts: dict[str, str]) -> dict[str, Any]:
 
 
 class Decoder:
-    """Decoder of one type's messages to a dictionary: field -> number, array, text, dictionary or list of these."""
+    """Decode the messages of one type to dictionaries: field -> number, array, text, dictionary or list of these."""
 
     def __init__(self, definition: Definition, ros1: bool) -> None:
         self._definition, self._ros1 = definition, ros1
 
     def __call__(self, data: bytes) -> dict[str, Any]:
-        """Decode a message. Raises ValueError, or another error of its bytes, where it does not fit the definition."""
+        """Return a decoded message. Raises ValueError, KeyError or RecursionError if it does not fit the definition."""
         cursor = _Cursor(data, self._ros1)
         message = self._message(cursor, self._definition.root)
         if not 0 <= len(data) - cursor.place <= PADDING * (not self._ros1):
@@ -135,7 +135,7 @@ class Decoder:
 
 
 class _Cursor:
-    """A place in a message's bytes: ROS 1 packs them, ROS 2 (CDR) aligns each number to its own size."""
+    """Reader of a message's bytes in order: ROS 1 packs them, ROS 2 (CDR) aligns each number to its own size."""
 
     def __init__(self, data: bytes, ros1: bool) -> None:
         self.data, self.place, self._aligned, self._order, self._messages = data, 0, not ros1, "<", 0
@@ -150,7 +150,7 @@ class _Cursor:
             raise ValueError("more entries than bytes")
 
     def numbers(self, kind: str, count: int) -> np.ndarray:
-        """Return the next numbers (count,); kind : numpy's type without byte order"""
+        """Return the next numbers (count,); kind : their type as numpy writes it, without byte order, as "u4" """
         dtype = np.dtype(self._order + kind)
         if count == 0:
             return np.empty(0, dtype)

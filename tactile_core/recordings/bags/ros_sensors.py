@@ -19,9 +19,10 @@ PAC = re.compile(r"(^|.*_)pac(\d*|_?(data|values?|vals?|raw))$", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class SensorFields:
-    """Names of a sensor's fields in a message. path : fields that lead to the sensor, or to a list of sensors
-    electrodes : field of all electrodes; slow : of pdc, tac, tdc, "" for a missing one; pac : of its samples
-    others : fields that are not read"""
+    """Names of the fields of a sensor, or of each in a list of sensors, in a message.
+    path : names of the fields that lead to it; electrodes : name of the field that holds all electrodes
+    slow : names of the fields of pdc, tac and tdc, "" for a missing one; pac : names of the fields with PAC's samples
+    others : names of the fields that are not read"""
 
     path: tuple[str, ...]
     electrodes: str
@@ -31,12 +32,13 @@ class SensorFields:
 
 
 def sensors_in(definition: Definition) -> list[SensorFields]:
-    """Return the fields of each sensor, or list of sensors, in a type of message; none where it has no electrodes."""
+    """Return the fields of each sensor, or list of sensors, in a message type; an empty list without electrodes."""
     return list(islice(_search(definition, definition.root, (), set()), MOST))
 
 
 def _search(definition: Definition, name: str, path: tuple[str, ...], searched: set[str]) -> Iterator[SensorFields]:
-    """Yield the sensors in a type of message. searched : types without any, or that are being searched"""
+    """Yield the fields of the sensors in the type `name`, which the fields of `path` lead to.
+    searched : names of types without sensors, or whose search is not over"""
     fields = definition.fields(name)
     row = next((field for field, kind in fields if ELECTRODES.search(field) and _is_row(kind)), None)
     if row is not None:
@@ -67,7 +69,7 @@ def _is_time(kind: Any) -> bool:
 
 
 def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, Any]]:
-    """Return the sensors in a decoded message, each a dictionary by field, at the path of ``fields``."""
+    """Return the sensors that a decoded message holds at the path of ``fields``, each a dictionary field -> value."""
     found = [message]
     for name in fields.path:
         found = [each for one in found for each in (one[name] if isinstance(one[name], list) else [one[name]])]
@@ -75,8 +77,8 @@ def in_message(message: dict[str, Any], fields: SensorFields) -> list[dict[str, 
 
 
 def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float], list[float]]:
-    """Return a sensor's pdc, tac, tdc (NaN where missing) and samples of pac in one list, and its electrodes. Raises
-    ValueError for over MOST_PAC samples. sensor : its part of a message; fields : their names in it"""
+    """Return two lists of counts: a sensor's pdc, tac, tdc (NaN if missing) and PAC's samples; and its electrodes.
+    sensor : its part of a decoded message. Raises ValueError for more than `MOST_PAC` samples."""
     row = [float(sensor[name]) if name else float("nan") for name in fields.slow]
     for name in fields.pac:
         samples = sensor[name]
@@ -87,14 +89,14 @@ def channels(sensor: dict[str, Any], fields: SensorFields) -> tuple[list[float],
 
 
 def stamp_of(message: dict[str, Any]) -> float:
-    """Return the unix time, s, of a message's header or of its own stamp; 0 where it has none."""
+    """Return the unix time, s, that a message's header, or the message itself, states; 0 if there is none."""
     held = message.get("header", message)
     stamp = held.get("stamp", held.get("time")) if isinstance(held, dict) else None
     return float(stamp["sec"] + 1e-9 * stamp["nanosec"]) if isinstance(stamp, dict) and "sec" in stamp else 0.0
 
 
 def not_read(definition: Definition, fields: list[SensorFields]) -> list[str]:
-    """Return the names of a message's fields that are not read: all beside its sensors' fields, and others in these."""
+    """Return the names of a message's fields that are not read: those beside its sensors, and the sensors' `others`."""
     used = {each.path[0] for each in fields if each.path}
     beside = [
         name for name, kind in definition.fields(definition.root) if used and name not in used and not _is_time(kind)

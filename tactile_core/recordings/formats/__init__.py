@@ -6,8 +6,9 @@
 ``read(source) -> Recording``  source is a ``table.Table`` for CSV, an ``array_store.Store`` for all others; it picks
                its columns and gives them to ``assemble.assemble``, which checks them; the rest is reported as not taken
 
-A MATLAB layout has also ``fingers(keys)``, and ``read(store, finger)``, as a BioTac SP's has, whose ``SENSOR`` names
-it. An HDF5 layout has also ``ELECTRODES_NAME``, the array whose length is the number of frames (see ``chunks``).
+A MATLAB or BioTac SP layout also has ``fingers(keys) -> tuple[int, ...]``, the fingers in the file, and its function is
+``read(source, finger)``. A BioTac SP layout has ``SENSOR``, the sensor's name. An HDF5 layout has ``ELECTRODES_NAME``,
+the name of the array whose length is the number of frames.
 """
 
 from __future__ import annotations
@@ -30,14 +31,16 @@ TURN_ADVICE = "Transpose it, or give a map, which does: tactile info FILE --colu
 
 
 def share(keys: Collection[str], wanted: Collection[str]) -> float:
-    """Return the share of the wanted names that are among the keys."""
+    """Return the share (0..1) of the wanted names that are among the keys."""
     return sum(name in keys for name in wanted) / len(wanted)
 
 
 def of_table(table: Table, layout: str, time: str, electrodes: list[str], **channels: list[str]) -> Recording:
-    """Build a table's recording, pdc, tac, tdc included. layout : in words; time, electrodes, channels : columns' names
+    """Return the recording of a table, whose columns pdc, tac and tdc keep these names. layout : its name in words
+    time, electrodes : names of columns; channels : field of `Recording` -> names of its columns
 
-    Missing channels are None, missing electrodes dead. TactileError for other missing columns, and as of `assemble`."""
+    A channel that lean reading left out is None, a missing electrode a dead channel. Raises TactileError for any other
+    missing column, and for what `assemble` refuses."""
     _check_numbers(table, electrodes)
     columns: dict[str, Any] = {
         channel: table.columns(names, np.float32)
@@ -64,7 +67,7 @@ def of_table(table: Table, layout: str, time: str, electrodes: list[str], **chan
 
 
 def _check_numbers(table: Table, electrodes: list[str]) -> None:
-    """Raise TactileError where a missing electrode's column has another number: ele0 to ele18, or ele01."""
+    """Raise TactileError if electrodes' columns are numbered otherwise, as ele0 to ele18 or ele01 for ele1 to ele19."""
     stem, missing = electrodes[0].rstrip("01"), [name for name in electrodes if not table.has(name)]
     other = [name for name in table.header if re.fullmatch(rf"{stem}\d+", name) and name not in electrodes]
     if other and missing:
@@ -77,20 +80,22 @@ HAND = {"ff": "first finger", "mf": "middle finger", "rf": "ring finger", "lf": 
 
 
 def share_of_fingers(keys: Collection[str], style: str) -> float:
-    """Return the largest share (0..1) of a finger's columns in keys, a file's. style : of names, "{}_e{}" for ff_e1"""
+    """Return the share (0..1) of a finger's columns that a file has, for the finger of which it has the most.
+    keys : names of the file's columns; style : format of their names, by finger and electrode: "{}_e{}" for ff_e1"""
     return max(share(keys, _of_finger(style, number)) for number in range(len(HAND)))
 
 
 def fingers_of(keys: Collection[str], style: str) -> tuple[int, ...]:
-    """Return the numbers of the fingers of which keys, a file's, hold columns; style : of names, "{}_e{}" for ff_e1"""
+    """Return the numbers of the fingers of which a file has any column.
+    keys : names of the file's columns; style : format of their names, by finger and electrode: "{}_e{}" for ff_e1"""
     return tuple(number for number in range(len(HAND)) if share(keys, _of_finger(style, number)))
 
 
 def of_finger(table: Table, finger: int, *, layout: str, style: str, snapshots: bool) -> Recording:
-    """Build one finger's recording of a BioTac SP's table; `about` lists the names of the other columns.
-    finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : the file's, in words, for `about`
-    style : how columns are named after finger and electrode, "{}_e{}" for ff_e1. Raises TactileError as ``assemble``
-    snapshots : true where frames do not follow each other in time"""
+    """Return the recording of one finger in a table of BioTac SPs; its `about` lists the names of the other columns.
+    finger : 0 first, 1 middle, 2 ring, 3 little, 4 thumb; layout : the layout's name in words
+    style : format of the columns' names, by finger and electrode: "{}_e{}" for ff_e1
+    snapshots : true if frames do not follow each other in time. Raises TactileError for what `assemble` refuses."""
     names = _of_finger(style, finger)
     electrodes = {name for number in range(len(HAND)) for name in _of_finger(style, number)}
     table.taken.update(electrodes)
@@ -116,7 +121,8 @@ def _of_finger(style: str, finger: int) -> list[str]:
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
-    """Read the array (T, 19) of that name. Raises TactileError for another sensor's, or another shape."""
+    """Return the electrodes (T, 19) in the array `name`, float32 if they are 16-bit integers. Raises TactileError for
+    another shape, such as that of another sensor."""
     shape, kind = store.shapes[name]
     if len(shape) == 2 and shape[0] == ELECTRODES != shape[1]:
         raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {ELECTRODES})", TURN_ADVICE)

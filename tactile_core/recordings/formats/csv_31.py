@@ -25,7 +25,7 @@ OTHER = re.compile(r"(?:^|.*[^a-z])(electrodes|pac|pdc|tac|tdc|time)\W*(\d*)\W*$
 
 
 def canonical(names: Sequence[str]) -> list[str]:
-    """Translate column names to this layout's; unknown ones stay."""
+    """Return the column names in this layout's spelling; unknown names stay as they are."""
     found = []
     for name in names:
         vector, other = VECTOR.match(name), OTHER.match(name)
@@ -43,7 +43,8 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Read counts (T, 19), place and force (T, 3) in the file's units. Raises TactileError as `of_table` does."""
+    """Return the recording of a table, place and force (T, 3) in the file's own units. Raises TactileError for a
+    missing column, and for what `assemble` refuses."""
     names = canonical(table.header)
     known, called = dict(zip(table.header, names, strict=False)), dict(zip(names, table.header, strict=False))
     table.taken.update(called.get(name, name) for name in COLUMNS)

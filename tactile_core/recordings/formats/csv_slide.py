@@ -22,7 +22,8 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Read counts (T, 19), pdc, tac, tdc and 22 samples of pac per line. Raises TactileError as `of_table` does."""
+    """Return the recording of a table, with 22 samples of pac per line. Raises TactileError for a missing column, and
+    for what `assemble` refuses."""
     held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")

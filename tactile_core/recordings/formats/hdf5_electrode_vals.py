@@ -19,12 +19,12 @@ NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indente
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where the electrodes' array is among keys, the arrays' names, else 0."""
+    """Return 1 if the electrodes' array is among keys, the arrays' names, else 0."""
     return float(ELECTRODES_NAME in keys)
 
 
 def read(store: Store) -> Recording:
-    """Read electrodes (T, 19), place, force (T, 3), indenters' numbers. Raises TactileError for other shapes."""
+    """Return the file's recording; its `about` lists the indenters' numbers. Raises TactileError for other shapes."""
     electrodes = electrodes_of(store, ELECTRODES_NAME)
     frames = len(electrodes)
     return assemble(
@@ -39,7 +39,7 @@ def read(store: Store) -> Recording:
 
 
 def _indenters(store: Store, frames: int) -> dict[str, list[float]]:
-    """Return the distinct indenter numbers of the file, where it has them."""
+    """Return {"indenter_types": distinct numbers of the indenters}, empty if the file has none."""
     name = "indenter_type/data"
     if name not in store.shapes:
         return {}

@@ -14,10 +14,10 @@ NAME = f"HDF5 simulated recording ({FORMAT})"
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where keys, the arrays' names and ``format=...``, have "format=tactile-recording-1", else 0."""
+    """Return 1 if "format=tactile-recording-1" is among keys, the arrays' names and ``format=...``, else 0."""
     return float(f"format={FORMAT}" in keys)
 
 
 def read(store: Store) -> Recording:
-    """Read counts and true values. Raises the errors of ``read_simulated``."""
+    """Return the recording with its true values. Raises TactileError for misfits, and for a file without electrodes."""
     return read_simulated(store, NAME)

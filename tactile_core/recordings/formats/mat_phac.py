@@ -1,5 +1,5 @@
-"""MATLAB 5 of the Penn Haptic Adjective Corpus 2: F0Electrodes, F1Electrodes (19, T) of two fingers, 100 Hz. Also F0pac
-(22, T), F0pdc, F0tac, F0tdc (1, T), likewise F1; the gripper's channels are ignored."""
+"""MATLAB 5 files of the Penn Haptic Adjective Corpus 2: F0Electrodes and F1Electrodes (19, T) of two fingers at 100 Hz,
+F0pac (22, T), F0pdc, F0tac, F0tdc (1, T) and the same of F1. The gripper's channels are ignored."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ELECTRODES = re.compile(r"F([0-4])Electrodes")
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where a finger's electrodes are among keys, the arrays' names, else 0."""
+    """Return 1 if a finger's electrodes are among keys, the arrays' names, else 0."""
     return float(bool(fingers(keys)))
 
 
@@ -29,7 +29,8 @@ def fingers(keys: Collection[str]) -> tuple[int, ...]:
 
 
 def read(store: Store, finger: int) -> Recording:
-    """Read one finger. Raises TactileError for another sensor's arrays, and for fingers of different length."""
+    """Return the recording of one finger, by its number. Raises TactileError for another sensor's arrays, for fingers
+    of different length, and for too many frames."""
     lengths = {number: store.shapes[f"F{number}Electrodes"][0] for number in fingers(store.shapes)}
     name = f"F{finger}Electrodes"
     if len(lengths[finger]) == 2 and lengths[finger][0] != ELECTRODES:

@@ -1,4 +1,4 @@
-"""NPZ with electrodes (T, 19) and maybe time, pdc, tac, tdc (T,), pac (T, P), position, force (T, 3); no pickle."""
+"""NPZ with electrodes (T, 19); time, pdc, tac, tdc (T,), pac (T, P), position and force (T, 3) are optional."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position
 
 
 def score(keys: Collection[str]) -> float:
-    """Return 1 where the electrodes' array is among keys, the arrays' names, else 0."""
+    """Return 1 if the electrodes' array is among keys, the arrays' names, else 0."""
     return float("electrodes" in keys)
 
 
 def read(store: Store) -> Recording:
-    """Read (T, 19) electrodes and the optional arrays. Raises TactileError for arrays of other shapes."""
+    """Return the file's recording. Raises TactileError for arrays of other shapes."""
     electrodes = electrodes_of(store, "electrodes")
     frames = len(electrodes)
     columns: dict[str, Any] = {name: store.optional(name, (frames,)) for name in ("pdc", "tac", "tdc")}
