@@ -20,6 +20,7 @@ class JobOperator(TactileOperator):
     _job: Job | None = None
     _folder: JobFolder | None = None
     _timer: bpy.types.Timer | None = None
+    _scene = 0  # the session_uid of the one that it began in
 
     def begin(self, context: bpy.types.Context) -> None:
         """Start the job: set ``_folder`` and ``_job``, or leave both None without work to do. Raises TactileError."""
@@ -51,6 +52,7 @@ class JobOperator(TactileOperator):
             return {"CANCELLED"}
         if self._job is None:
             return {"FINISHED"}
+        self._scene = context.scene.session_uid
         self._timer = context.window_manager.event_timer_add(_STEP, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.window_manager.progress_begin(0, 100)
@@ -69,7 +71,10 @@ class JobOperator(TactileOperator):
                 over = self._job.poll()
                 share = round(100 * self._job.share)
                 context.window_manager.progress_update(share)
-                context.workspace.status_text_set(f"{self._job.stage}: {share} %   (Esc stops)")
+                words = f"{self._job.stage}: {share} %"
+                if over and context.scene.session_uid != self._scene:
+                    over, words = False, "Done, for the scene that it began in: go back to it"
+                context.workspace.status_text_set(f"{words}   (Esc stops)")
                 if over:
                     self.finish(context)
         except Refused:

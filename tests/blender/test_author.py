@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -381,6 +382,21 @@ def test_a_simulation_keeps_the_frames_it_began_with(gel_alone, part, monkeypatc
     assert part("addon.objects.motion").played(gel) == (1, 3) and "mine simulated" in gel_alone.objects
     gel_alone.frame_set(2)
     assert gel["force"][2] == pytest.approx(-0.05, rel=0.05)
+
+
+def test_a_result_waits_for_the_scene_that_it_is_of(scene, part):
+    """As ``modal`` is called by a window's timer."""
+    base, said, done = part("addon.operators.job_operator").JobOperator, [], []
+    job = SimpleNamespace(poll=lambda: True, share=1.0, stage="Solving")
+    operator = SimpleNamespace(_job=job, _scene=scene.session_uid, finish=done.append, _close=lambda context: None)
+    for seen, returned in ((bpy.data.scenes.new("other"), "RUNNING_MODAL"), (scene, "FINISHED")):
+        context = SimpleNamespace(
+            scene=seen,
+            window_manager=bpy.context.window_manager,
+            workspace=SimpleNamespace(status_text_set=said.append),
+        )
+        assert base.modal(operator, context, SimpleNamespace(type="TIMER")) == {returned}
+    assert "go back to it" in said[0] and done == [context]
 
 
 def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
