@@ -29,8 +29,8 @@ MORE_ALIKE = 0.15
 
 
 def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Picture (H, W, 3) float32, levels, of the untouched gel: the calibration's photograph, if there is one, times the
-    modelled effect of LEDs or albedo changed since; else the model's picture. radiance : (H, W, LED), at rest
+    """Return the picture (H, W, 3) float32, levels, of the untouched gel: the calibration's photograph, scaled by the
+    modelled effect of LEDs or albedo changed since; without one the model's. radiance : (H, W, LED) levels, at rest
 
     Raises TactileError for a photograph that cannot be read or has another size than the camera's pictures."""
     if not unit.photograph:
@@ -45,8 +45,8 @@ def resting_picture(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 
 
 def correction(unit: Calibration, radiance: np.ndarray, picture: np.ndarray) -> dict[str, float]:
-    """Return ``mean_levels`` and ``largest_levels`` by which a picture at rest (H, W, 3) differs from the one that
-    the coating's radiance (H, W, LED), levels, gives."""
+    """Return the mean and largest absolute difference, ``mean_levels`` and ``largest_levels``, of a picture at rest (H,
+    W, 3) from the modelled one. radiance : (H, W, LED) levels, of the coating at rest, which the model starts from"""
     off = np.abs(picture - by_led(unit, radiance).sum(-1))
     return {"mean_levels": round(float(off.mean()), 2), "largest_levels": round(float(off.max()), 1)}
 
@@ -56,7 +56,7 @@ def _open_light(unit: Calibration) -> np.ndarray:
 
 
 def open_radiance(unit: Calibration) -> np.ndarray:
-    """Radiance (H, W, LED), levels, of the untouched gel without shadows, as on a smooth dome."""
+    """Return the radiance (H, W, LED), levels, of the untouched gel without shadows: a smooth dome casts none."""
     height = of_unit(rest_height_map(unit.camera), unit).astype(np.float32)
     right, down = unit.camera.right.astype(np.float32)[None, :], unit.camera.down.astype(np.float32)[:, None]
     surface = Surface(right, down, height, *slopes(height, unit.camera))
@@ -64,14 +64,14 @@ def open_radiance(unit: Calibration) -> np.ndarray:
 
 
 def raised_light(unit: Calibration, seen: np.ndarray) -> np.ndarray:
-    """Return the part of ambient light (LED, H, W) float32, levels, in proportion to the seen heights (H, W) m."""
+    """Return the ambient light (LED, H, W) float32, levels, proportional to the gel's ``seen`` heights (H, W) m."""
     share = unit.ambient_unit * unit.ambient_rise
     return share.astype(np.float32)[:, None, None] * seen
 
 
 def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
-    """Return grey levels (H, W, channel, LED) of the gel at rest; their sum over LEDs is the picture.
-    radiance : (H, W, LED), to which each LED's ambient light is added"""
+    """Return each LED's part of the picture at rest, grey levels (H, W, channel, LED); the picture is their sum.
+    radiance : (H, W, LED) levels, of the coating; each LED's ambient light is added to it"""
     right, down = unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT
     ambient = np.zeros((*unit.camera.shape, 3))
     table = np.asarray(unit.ambient)
@@ -86,8 +86,9 @@ def by_led(unit: Calibration, radiance: np.ndarray) -> np.ndarray:
 def fit_ambient(
     picture: np.ndarray, unit: Calibration, radiance: np.ndarray, degree: int = AMBIENT_DEGREE
 ) -> tuple[tuple[float, ...], ...]:
-    """Fit the ambient light (LED, n), factors of ``terms``, by least squares to a ``picture`` (H, W, 3) at rest.
-    radiance : (H, W, LED) of the coating at rest; degree : of the polynomial, 5 or, for a photograph, 7"""
+    """Fit each LED's ambient light to a picture at rest by least squares; return coefficients (LED, n) of ``terms``.
+    picture : (H, W, 3) levels; radiance : (H, W, LED) levels of the coating at rest; degree : of the polynomials, 5 or,
+        for a photograph, 7"""
     right, down = np.meshgrid(unit.camera.right / AMBIENT_UNIT, unit.camera.down / AMBIENT_UNIT)
     basis = np.stack([(right**i * down**j).ravel() for i, j in terms(degree)], -1)
     left = picture - np.einsum("hwcl,hwl->hwc", unit.pixel_response, radiance)
@@ -97,15 +98,15 @@ def fit_ambient(
 
 
 def terms(most: int) -> Iterator[tuple[int, int]]:
-    """Exponents (i, j) of right and down of a polynomial of degree ``most``, by i + j, then by j."""
+    """Yield the exponents (i, j) of right and down in a polynomial of degree ``most``, sorted by i + j, then by j."""
     for degree in range(most + 1):
         for j in range(degree + 1):
             yield degree - j, j
 
 
 def check_way(picture: np.ndarray, own: np.ndarray) -> None:
-    """Raise TactileError for a background that is much more like a unit's with its colours exchanged, or turned.
-    picture, own : (H, W, 3) levels, the background and the unit's"""
+    """Raise TactileError for a background that is much more like the unit's own after its colours are exchanged or it
+    is turned. picture, own : (H, W, 3) levels, the background and the unit's own"""
     ways = {"as it is": picture, "picture[..., ::-1]": picture[..., ::-1], "picture[::-1, ::-1]": picture[::-1, ::-1]}
     alike = {way: _correlation(each, own) for way, each in ways.items()}
     best = max(alike, key=alike.__getitem__)
@@ -115,14 +116,14 @@ def check_way(picture: np.ndarray, own: np.ndarray) -> None:
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the correlation of two pictures, one and other (H, W, 3), less each channel's mean; 0 for a plain one."""
+    """Return the correlation of pictures one, other (H, W, 3), each less its channels' means; 0 if one is uniform."""
     one, other = (each - each.mean(axis=(0, 1)) for each in (one, other))
     return float(np.vdot(one, other) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-9))
 
 
 def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np.ndarray:
-    """Read an image file as a picture (H, W, 3) uint8, red, green, blue; raises TactileError for another file, or
-    another size than that of ``camera``'s pictures (None for any)."""
+    """Read an image file as a picture (H, W, 3) uint8, red, green, blue. Raises TactileError for a file that is no
+    image of 8 bits a colour, and for a size other than that of ``camera``'s pictures (None accepts any)."""
     from PIL import Image
 
     expected = f"an image file of 8 bits a colour ({', '.join(FORMATS)})"

@@ -16,9 +16,10 @@ LEAST = 1.0  # level, least range of an end
 
 
 def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change (...), levels, that the camera shows for a ``change`` of linear light, and its derivative.
+    """Apply the camera's curve to a ``change`` (...) of linear light: return the change that the picture shows, and its
+    derivative by ``change``. rest : (...) grey levels of the untouched gel, from which changes are counted
 
-    Toe: toe + fall (exp((change - toe) / fall) - 1); the shoulder likewise. rest : (...) levels of the untouched gel"""
+    Below the toe's begin the shown change is toe + fall (exp((change - toe) / fall) - 1); the shoulder is alike."""
     toe, fall, shoulder, rise = ends(rest)
     below, above = np.minimum(change - toe, 0), np.maximum(change - shoulder, 0)
     dark, bright = np.exp(below / fall), np.exp(-above / rise)
@@ -26,7 +27,8 @@ def bent(change: np.ndarray, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ends(rest: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return where toe and shoulder begin, as changes (...) levels from ``rest`` (...), each followed by its range."""
+    """Return (toe, fall, shoulder, rise), (...) levels: changes from ``rest`` (...) at which toe and shoulder begin,
+    and after each the most that a shown change goes beyond it."""
     rest = np.clip(rest, 0, LARGEST_LEVEL)
     toe, fall = np.float32(TOE - 1) * rest, np.maximum(np.float32(TOE - FLOOR) * rest, np.float32(LEAST))
     shoulder = np.maximum(np.float32(SHOULDER) - rest, np.float32(0))

@@ -1,7 +1,8 @@
-"""Soft shadows that the gel casts in the light of one small LED: a march toward the light in polar rows.
+"""Compute the soft shadows that the gel casts in the light of one small LED, by marching toward it on a polar grid.
 
 The projective map (right, down, h) -> (right, down, h) / (1 - h / apparent height) takes lines to lines and the pinhole
-to infinity. It makes the seen gel a height field over the pixels, whose shadows are those of the LED under the map."""
+to infinity. Mapped, the gel that pixels see is a height field over the pixels (the mapped field below), and its shadows
+in the light of the mapped LED are those that the picture shows."""
 
 from __future__ import annotations
 
@@ -23,11 +24,11 @@ _TABLE_STEPS = 256
 
 
 class ShadowCaster:
-    """Visible share of one LED at each pixel over the gel.
+    """Finds the share of one LED that is visible from the gel at each pixel.
 
-    The mapped field is sampled on rays from the LED's foot point, (angle, distance), where a march toward the light is
-    a shift along rows. Gel outside the picture is assumed flat, at the height of the picture's edge. Raises
-    TactileError for an LED whose foot point lies in the picture, or that is as high as the camera."""
+    The mapped field is sampled on rays from the LED's foot point (right, down of the mapped LED), (angle, distance),
+    where a march toward the light is a shift along rows. Gel outside the picture is assumed flat, as high as its edge.
+    Raises TactileError for an LED whose foot point lies in the picture, or that is as high as the camera."""
 
     def __init__(self, camera: Camera, led: Led) -> None:
         self.led = led
@@ -63,12 +64,12 @@ class ShadowCaster:
         self._shape, self.polar_shape = camera.shape, (rows, columns)
 
     def _radii_of_slope(self, camera: Camera, across: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """Return (rows, columns), LED radii per unit slope: how far a mapped line of sight rises at the LED.
+        """Return by how many LED radii a mapped line of sight rises at the LED per unit of its slope, (rows, columns).
         across, along : (rows, columns) m, right and down of the polar grid's places
 
         A rise dw of the mapped line at the LED is a displacement (1 - h / H)^2 (-right / H, -down / H, 1) dw in space,
-        with the mapped LED's right and down, h and H the LED's and the apparent height; its part across the line
-        counts. The line starts at height zero, which changes its angle by a few degrees."""
+        where right, down are the mapped LED's, h is the LED's height and H the apparent height. Only its component
+        across the line counts. The line is taken to start at height zero, which changes its angle by a few degrees."""
         led, inverse = np.asarray(self.led.position), 1 / camera.apparent_height
         rise = (1 - led[2] * inverse) ** 2 * np.array([-self.foot[0] * inverse, -self.foot[1] * inverse, 1.0])
         to_led = np.stack([led[0] - across, led[1] - along, np.full_like(across, led[2])], -1)
@@ -76,8 +77,8 @@ class ShadowCaster:
         return self.distance * np.sqrt(rise @ rise - part) / self.led.radius
 
     def sight(self, height: np.ndarray, box: tuple[slice, slice]) -> tuple[np.ndarray, tuple[slice, slice]]:
-        """Return the height (h, w) of the LED's centre above the horizon, in LED radii from -1 (hidden) to 1 (fully
-        visible), at the pixels of the returned box of rows and columns; the LED is fully visible from all others.
+        """Return the sight (h, w), and the box of pixels that it is for; from all others the whole LED is visible.
+        Sight is the height of the LED's centre over the horizon in LED radii, from -1 (hidden) to 1 (visible).
         height : (H, W) float32, m, the mapped field; box : rows and columns of pixels that may cast shadows"""
         reach = self.reach(float(height[box].max()), float(height.min()))
         rows = _span(self.row[box], self.polar_shape[0] - 1)
@@ -97,14 +98,15 @@ class ShadowCaster:
         return bilinear(sight, row, column), pixels
 
     def reach(self, highest: float, lowest: float) -> int:
-        """Return the polar columns that the longest shadow covers; highest, lowest : m, of the mapped field."""
+        """Return the polar columns that the longest shadow covers; highest, lowest : m, largest and least mapped
+        height"""
         rise = self.foot[2] - highest
         slope = max(rise / float(self.distance[-1]) - 1 / float(self.radii[:, -1].min()), SMALLEST_SLOPE)
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
-        """Return sight (rows, columns) at distances r from the foot, where the mapped field has heights h(r): ((foot -
-        h(r)) / r - horizon) radii, -1 to FREE, with horizon = max over steps d of (h(r - d) - h(r)) / d.
+        """Return the sight (rows, columns), -1 to FREE: at distance r from the foot ((foot - h(r)) / r - horizon)
+        radii, with foot the mapped LED's height and horizon the largest (h(r - d) - h(r)) / d over steps d.
         field : (rows, columns) m, h in the part ``polar`` of the polar grid; reach : columns of the longest shadow"""
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)
@@ -124,8 +126,8 @@ class ShadowCaster:
 
 @functools.cache
 def march_steps(reach: int) -> tuple[int, ...]:
-    """Return the distances, columns up to ``reach``, at which a march looks: 1 apart at first, then a tenth of the way
-    (long shadows are wide)."""
+    """Return the distances, in columns up to ``reach``, at which a march looks for the horizon: 1 apart at first, then
+    a tenth of the distance apart (long shadows are wide)."""
     steps, k = [], 1
     while k <= reach:
         steps.append(k)
@@ -134,7 +136,8 @@ def march_steps(reach: int) -> tuple[int, ...]:
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
-    """Return rows and columns that enclose a mask's true part with a ``margin``, within (h, w); None for nothing."""
+    """Return rows and columns that enclose the true pixels of ``mask`` (h, w) and a ``margin``, cut at its edges; or
+    None."""
     box = []
     for axis in (1, 0):
         found = np.flatnonzero(mask.any(axis))
@@ -145,8 +148,8 @@ def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | Non
 
 
 def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
-    """Return the slice of 2 or more integers from 0 to highest that encloses values wanted (...), and ``more``
-    above."""
+    """Return the slice from the least of ``wanted`` (...) to the largest plus ``more``, rounded outward, within the
+    integers 0 to ``highest``; it holds 2 or more."""
     first = min(max(int(np.floor(wanted.min())), 0), highest - 1)
     last = min(int(np.ceil(wanted.max())) + more, highest)
     return slice(first, max(last, first + 1) + 1)
@@ -154,7 +157,7 @@ def _span(wanted: np.ndarray, highest: int, more: int = 0) -> slice:
 
 @functools.cache
 def disc_tables() -> tuple[np.ndarray, np.ndarray]:
-    """Return tables, (257,) float32, of ``disc_share``'s area and moment at even steps of sight from -1 to 1."""
+    """Return the areas and moments of ``disc_share``, (257,) float32 each, at even steps of sight from -1 to 1."""
     t = np.linspace(-1, 1, _TABLE_STEPS + 1)
     share = 0.5 + (t * np.sqrt(1 - t**2) + np.arcsin(t)) / np.pi
     moment = 2 / (3 * np.pi) * (1 - t**2) ** 1.5
@@ -172,8 +175,8 @@ def disc_share(sight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @Loop
 def march(field, foot, distance, radii, steps, grid_step):  # noqa: ANN001, ANN201
-    """Return the sight (rows, columns), -1 hidden to 1 visible, of an LED at height ``foot``, m, from polar places of
-    the mapped heights, field (rows, columns) m: ((foot - field) / distance - slope of the horizon) radii.
+    """March toward an LED of mapped height ``foot``, m, over field (rows, columns) m, mapped heights; return the sight,
+    -1 hidden to 1 visible, (rows, columns): ((foot - field) / distance - slope of the horizon) radii.
     distance : (columns,) m from the LED's foot point; radii : (rows, columns), LED radii per unit of slope
     steps : (k,) columns, each of grid_step m, at which the horizon is looked for toward the LED"""
     rows, columns = field.shape

@@ -16,7 +16,7 @@ REACH = 4.0  # standard deviations; beyond lie 6e-5 of the light
 
 
 class CoatingSpread:
-    """Gaussian filter for pictures of one camera; deviation : m, its standard deviation on the gel, 0 for no filter"""
+    """Gaussian filter for pictures of one camera. deviation : m on the gel, its standard deviation; 0 for no filter"""
 
     def __init__(self, camera: Camera, deviation: float) -> None:
         self.none = deviation == 0
@@ -28,7 +28,7 @@ class CoatingSpread:
 
     @in_one_thread
     def __call__(self, pictures: np.ndarray) -> np.ndarray:
-        """Smooth pictures (..., H, W) float32; near an edge, over the part inside the picture."""
+        """Return pictures (..., H, W) float32 smoothed; near an edge, the mean is over the part inside the picture."""
         if self.none:
             return pictures
         sums = _summed(_summed(pictures.swapaxes(-1, -2), self.right[0]).swapaxes(-1, -2), self.down[0])
@@ -42,8 +42,8 @@ class CoatingSpread:
 
 
 def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
-    """Return sums (..., ceil(H / step), W) of each ``step`` rows of pictures (..., H, W); ten times as fast as
-    reduceat."""
+    """Return the sums (..., ceil(H / step), W) of ``step`` rows each of pictures (..., H, W); faster than
+    np.add.reduceat."""
     sums = pictures[..., ::step, :].copy()
     for later in range(1, step):
         row = pictures[..., later::step, :]
@@ -52,8 +52,8 @@ def _summed(pictures: np.ndarray, step: int) -> np.ndarray:
 
 
 def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
-    """Return the length n of runs of pixels along a side, and weights (count, runs) of their sums at each pixel.
-    deviation : px. Summing runs first costs a fraction of a full Gaussian, and interpolates as well."""
+    """Return the number of pixels in a run, and the weights (count, runs) of runs' sums in the Gaussian mean at each
+    pixel of a side. deviation : px. To sum runs first costs a fraction of a full Gaussian."""
     step = max(int(deviation / FINE), 1)
     starts = step * np.arange(-(-count // step))
     ends = np.minimum(starts + step, count)
@@ -66,7 +66,7 @@ def _means(count: int, deviation: float) -> tuple[int, np.ndarray]:
 
 
 def _blocks(weights: np.ndarray) -> list[tuple[slice, slice, np.ndarray]]:
-    """Cut weights (count, n) into blocks: slices of pixels and of the runs with weight there, and the weights."""
+    """Cut weights (count, n) into blocks: slices of pixels, of the runs that have weight there, and these weights."""
     blocks = []
     for start in range(0, len(weights), BLOCK):
         part = weights[start : start + BLOCK]

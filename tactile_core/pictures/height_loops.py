@@ -11,9 +11,9 @@ from ..files.compiled import Loop
 def heights_above(  # noqa: ANN201
     coefficients, x, z, to_x, to_z, miss, start, step, tolerance, most_steps,  # noqa: ANN001
 ):  # fmt: skip
-    """Find heights (n,) float32 m of the gel points displaced to places x, z (n,) m, and how many were not found.
+    """Return heights (n,) float32 m of the gel points that have moved to places x, z (n,) m, and the number not found.
 
-    Place by place, Broyden's method finds the point's place at rest, whose height is taken; the cubic B-splines of
+    For each place Broyden's method finds where the point rested; its height is taken there. The cubic B-splines of
     ``geometry.cubic_spline.bspline_weights`` are written out.
     coefficients : (3, rows, columns), of the splines of sideways motion along x, along z and of the height
     to_x, to_z, miss : (2, n), rows of the inverse Jacobian and the residual of each place at the start

@@ -3,8 +3,8 @@
 A height is the position of the coating toward the camera, in metres. It grows with y of the shared frame: an
 indentation raises it. Zero is the plane ``camera.height_zero_y``, which touches the resting gel's lowest point, so the
 dome is part of the map: about 0 in the middle, up to 1.7 mm where the resting gel falls away. Sideways motion is
-included: each value is that of the gel point that has moved there. Pixels stand for places on the plane of height zero
-where the camera sees them, along the gel's normal; ``perspective`` comes later."""
+included: each value is that of the gel point that has moved there. A pixel stands for the place where it looks at the
+plane of height zero; its height is the one straight over it. ``perspective`` finds what its slanted ray meets."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def folds_counted() -> Iterator[list[int]]:
 
 
 class HeightMapper:
-    """Height maps of one surface under one camera; matrices are made once.
+    """Makes height maps of one surface under one camera; its spline matrices are computed once.
 
     surface : a lattice with an evenly spaced ``window`` that covers the camera's picture, but for 1 mm at its edges
     camera : None for the shipped calibration's
-    Raises TactileError where the picture reaches further.
+    Raises TactileError if the picture reaches further than that.
     """
 
     def __init__(self, surface: Lattice, camera: Camera | None = None) -> None:
@@ -81,9 +81,9 @@ class HeightMapper:
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
         """Return heights (H, W) float32, m, of displacement (n_nodes, 3) m; or (T, H, W) of (T, n_nodes, 3).
 
-        They are twice differentiable where the surface does not fold, and exactly ``rest`` where nothing moves. A point
-        from outside the window counts as its edge. Raises TactileError for another shape, a value that is not finite,
-        and places in place of displacements."""
+        They are twice differentiable by place if the surface does not fold, and exactly ``rest`` if nothing moves. A
+        point that comes from outside the window counts as the window's edge. Raises TactileError for another shape, a
+        value that is not finite, and positions in place of displacements."""
         displacement = np.asarray(displacement)
         expected = (len(self.surface.rest), 3)
         if displacement.ndim not in (2, 3) or displacement.shape[-2:] != expected:
@@ -112,7 +112,7 @@ class HeightMapper:
     def follow(
         self, displacement: np.ndarray, x: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return places x, z and heights (n,) m, by displacement (n_nodes, 3) m, of points at rest at x, z (n,) m."""
+        """Return places x, z and heights (n,) m under displacement (n_nodes, 3) m of points at rest at x, z (n,) m."""
         move = self.surface.grid(displacement)[self.surface.window].astype(float)
         tables = np.stack([move[..., 0], move[..., 2], self.rest_y + move[..., 1]])
         coefficients = self.along.to_coefficients @ tables @ self.across.to_coefficients.T
@@ -127,8 +127,8 @@ class HeightMapper:
         return self.rest + down @ self._raised(move).astype(np.float32) @ right
 
     def _raised(self, move: np.ndarray) -> np.ndarray:
-        """Return the change of height (fine rows, fine columns) m at the refined grid's nodes, which stay in place, by
-        a move (rows, columns, 3) m of the window's nodes."""
+        """Return the change of height (fine rows, fine columns) m over the fixed places of the refined grid.
+        move : (rows, columns, 3) m, displacement of the window's nodes"""
         down, right = self.to_fine[0]
         if not move[..., [0, 2]].any():
             return down @ move[..., 1] @ right.T
@@ -140,8 +140,9 @@ class HeightMapper:
         return height.reshape(len(down), len(right)) - down @ self.rest_y @ right.T
 
     def _moved_heights(self, move: np.ndarray, coefficients: np.ndarray) -> tuple[np.ndarray, int]:
-        """Heights (n,) m of the gel points displaced to the refined grid's nodes, and how many were not found.
-        move : (2, rows, columns) sideways displacement x, z at the window's nodes
+        """Return heights (n,) m of the gel points that have moved to the refined grid's nodes, and the number not
+        found.
+        move : (2, rows, columns) m, sideways displacement x, z of the window's nodes
         coefficients : (3, rows + 2, columns + 2), of its splines and the height's"""
         (down, right), (down_slope, right_slope) = self.to_fine
         to_x, to_z = _inverse(down_slope @ move @ right.T, down @ move @ right_slope.T)
@@ -158,10 +159,10 @@ class HeightMapper:
     def _source(
         self, coefficients: np.ndarray, to_x: np.ndarray, to_z: np.ndarray, miss: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, int]:
-        """Rest places (n,) x, z m of gel points displaced to the refined grid's nodes, and how many were not found.
+        """Return where gel points now at the refined grid's nodes rested, x, z (n,) m, and the number not found.
 
-        Broyden's method (1965) for X + u(X) = x from X = x: Newton's first step, then rank-one updates of the inverse
-        Jacobian, so that nothing is differentiated again.
+        Solves X + u(X) = x, u the sideways displacement, from X = x by Broyden's method (1965): Newton's first step,
+        then rank-one updates of the inverse Jacobian, so that nothing is differentiated again.
         coefficients : (2, rows + 2, columns + 2), of the splines of u; to_x, to_z : (2, n), rows of the Jacobian's
             inverse; miss : (2, n) m, u at the start"""
         target = self.fine_places
@@ -183,8 +184,8 @@ class HeightMapper:
         return *source, len(active)
 
     def _look_up(self, coefficients: np.ndarray, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Evaluate k splines of coefficients (k, rows, columns) at places x, z (n,) m; (n, k) float32, to .1 nm
-        per mm."""
+        """Evaluate k splines at places x, z (n,) m; return (n, k) float32, right to .1 nm in values of 1 mm.
+        coefficients : (k, rows, columns), of the splines"""
         (row, t), (column, s) = self.along.cells(x), self.across.cells(z)
         weights_x, weights_z = bspline_weights(t.astype(np.float32)), bspline_weights(s.astype(np.float32))
         windows = np.lib.stride_tricks.sliding_window_view(coefficients, (4, 4), axis=(1, 2)).transpose(1, 2, 0, 3, 4)
@@ -195,7 +196,7 @@ class HeightMapper:
 
 
 def _say_folded(count: int, places: int) -> None:
-    """Count, or log, a map that folds over itself at ``count`` of its places."""
+    """Add ``count``, the folded of a map's ``places``, to the list of ``folds_counted``, or else log a warning."""
     folded = _folded.get()
     if folded is None:
         _log.warning("gel surface folds over itself at %d of %d places: height there is a guess", count, places)
@@ -204,7 +205,7 @@ def _say_folded(count: int, places: int) -> None:
 
 
 def check_covered(surface: Lattice, camera: Camera) -> None:
-    """Raise TactileError for a surface without an evenly spaced window, and for a picture that reaches past it."""
+    """Raise TactileError for a surface without an evenly spaced window, or a picture that reaches over 1 mm past it."""
     if surface.window is None:
         raise TactileError("surface", "no evenly spaced window", "one", "Use a gel's: sensors.sensor_surface(name)")
     rest = surface.window_rest
@@ -223,8 +224,8 @@ def check_covered(surface: Lattice, camera: Camera) -> None:
 
 
 def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
-    """Advise a scale at which a picture, its pixels seen (p,) m along axis name ("x", "z"), lies inside nodes (n,)
-    m."""
+    """Advise a scale, px per mm, at which a picture lies inside the surface's nodes along one axis.
+    name : the axis, "x" or "z"; seen : (p,) m, places of its pixels; nodes : (n,) m"""
     room = 2e3 * min(seen.mean() - nodes[0], nodes[-1] - seen.mean())
     if room <= 0:
         return f"Its centre_{name}_mm lies outside"
@@ -233,13 +234,13 @@ def _nearer(name: str, seen: np.ndarray, nodes: np.ndarray) -> str:
 
 
 def _short(matrix: np.ndarray) -> np.ndarray:
-    """Convert a spline's matrix to float32 without subnormal weights, at which processors are ten times slower."""
+    """Convert a spline's ``matrix`` to float32, tiny weights to zero: processors are ten times slower at subnormals."""
     return np.where(np.abs(matrix) > NEGLIGIBLE, matrix, 0).astype(np.float32)
 
 
 def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return rows (2, n) each of the inverse of I + du/dX, n = rows x columns, from by_x = du/dx and by_z = du/dz (2,
-    rows, columns), u = sideways displacement (x, z)."""
+    """Return both rows, (2, n) each, of the inverse of I + du/dX at n = rows x columns nodes; u is the sideways
+    displacement (x, z). by_x, by_z : (2, rows, columns), du/dx and du/dz"""
     a, c = 1 + by_x[0].ravel(), by_x[1].ravel()
     b, d = by_z[0].ravel(), 1 + by_z[1].ravel()
     determinant = np.maximum(a * d - b * c, SMALLEST_AREA)
@@ -247,7 +248,7 @@ def _inverse(by_x: np.ndarray, by_z: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def gel_mapper(camera: Camera | None = None) -> HeightMapper:
-    """Return the mapper of the gel that a camera looks at, made once per camera; None for the shipped DIGIT's."""
+    """Return the ``HeightMapper`` of a camera's gel, made once per camera; camera : None for the shipped DIGIT's"""
     return _gel_mapper(camera or load_calibration().camera)
 
 
@@ -257,8 +258,8 @@ def _gel_mapper(camera: Camera) -> HeightMapper:
 
 
 def height_map(displacement: np.ndarray, camera: Camera | None = None) -> np.ndarray:
-    """Return heights (H, W) float32, m, of a camera's gel under displacement (n_nodes, 3) m; (T, H, W) of (T, n_nodes,
-    3). camera : None for the shipped DIGIT's"""
+    """Return heights (H, W) float32, m, of a camera's gel under displacement (n_nodes, 3) m; (T, H, W) under (T,
+    n_nodes, 3). camera : None for the shipped DIGIT's"""
     return gel_mapper(camera)(displacement)
 
 
@@ -268,8 +269,8 @@ def rest_height_map(camera: Camera | None = None) -> np.ndarray:
 
 
 def of_unit(heights: np.ndarray, calibration: Calibration) -> np.ndarray:
-    """Convert heights (H, W) or (T, H, W) m to float32 of a unit with another dome: what a contact raises stays, the
-    resting dome is the descriptor's times the calibration's ``dome_scale``."""
+    """Convert heights (H, W) or (T, H, W) m of the sensor's typical gel to float32 of a unit whose dome is
+    ``dome_scale`` (of its calibration) times as high; what a contact raises stays."""
     heights = np.asarray(heights, np.float32)
     if calibration.dome_scale == 1:
         return heights

@@ -1,7 +1,7 @@
 """Heights and reflectance that pixels show of gel under a body whose shape, pose and texture are known.
 
-Contact is solved at nodes; between them the surface's spline dips into a body finer than their spacing, as an edge, a
-letter or a groove. No gel is inside a rigid body: there its heights are the body's own, at each pixel."""
+Contact is solved at nodes; between them the surface's spline dips into details finer than their spacing: an edge, a
+letter, a groove. No gel is inside a rigid body: there its heights are the body's own, at each pixel."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ _ALL = slice(None)
 def out_of_body(
     heights: np.ndarray, camera: Camera, indenter: Indenter, pose: Pose, touching: np.ndarray
 ) -> np.ndarray:
-    """Return heights (H, W) float32, m, none of which is inside the body that presses: such gel is moved along +y, away
-    from the body, onto its surface.
+    """Return heights (H, W) float32, m, with gel that is inside the body moved along +y onto its surface.
 
     heights : (H, W) m, of ``HeightMapper`` for the same camera; pose : of the body, in the sensor's frame
     touching : (k, 3) m, the displaced nodes that touch; pixels outside their bounding box keep their heights"""

@@ -1,5 +1,5 @@
 """Light of L small LEDs on the gel: Lambert's cosine over the squared distance, and cast shadows. The fast picture and
-calibrations use it on the gel in perspective; Mitsuba without LLVM, and the untouched gel, at points in space.
+calibrations compute it on gel seen in perspective; Mitsuba without LLVM, and the picture at rest, at points in space.
 
 Light also comes through the coating from the object that touches it. Photographs show it even over the contact, in an
 LED's light and shadow alike, since it scatters in the object (docs/calibration.md); it is proportional to each LED's
@@ -45,15 +45,16 @@ class Surface(NamedTuple):
 
     @classmethod
     def in_perspective(cls, view: Perspective, height: np.ndarray) -> Surface:
-        """Return the surface that a camera's pixels see at height (H, W) m, as ``view`` returned; makes slopes."""
+        """Return the surface, with slopes, that pixels see; height : (H, W) m, heights that ``view`` returned"""
         return cls(view.right, view.down, height, *slopes(height, view.camera), view.inverse)
 
 
 class Lit(NamedTuple):
     """Light of L LEDs on a surface without shadows, float32.
-    near, tilt, length : (H, W), s, the normal's third component and its length, as in ``Surface``
-    facing : (L, H, W) m, cosine times distance times the normal's length
-    square : (L, H, W) m2, of the distance; light : (L, H, W), relative to a coating that faces the LED at the origin"""
+    near : (H, W), s of ``Surface``; tilt, length : (H, W), third component and length of the normal given there
+    facing : (L, H, W) m, cosine of incidence times distance from the LED times ``length``
+    square : (L, H, W) m2, of that distance; light : (L, H, W), over that on a coating at the origin that faces the
+        LED"""
 
     near: np.ndarray
     tilt: np.ndarray
@@ -99,7 +100,8 @@ def lambert(surface: Surface, positions: np.ndarray) -> Lit:
 
 
 def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
-    """Return strength facing / (length square^1.5), one LED's light (H, W), as ``Lit`` names; strength : m2, |l|^2"""
+    """Return one LED's light (H, W), strength facing / (length square^1.5), from these fields of ``Lit``; strength :
+    m2, its squared distance from the origin"""
     return facing / (square * np.sqrt(square) * length) * strength
 
 
@@ -111,14 +113,14 @@ def open_light(surface: Surface, unit: Calibration) -> np.ndarray:
 
 
 class Lamps:
-    """LEDs' light on a gel, with shadows. Raises TactileError for one over the picture or as high as the camera."""
+    """Light of LEDs on a gel, in shadows. Raises TactileError for an LED over the picture or as high as the camera."""
 
     def __init__(self, camera: Camera, leds: Sequence[Led]) -> None:
         self._casters = [ShadowCaster(camera, led) for led in leds]
         self._positions = np.array([led.position for led in leds])
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
-        """Return the light (L, H, W) float32, as ``Lit.light`` but in soft shadows, on gel seen at height (H, W) m."""
+        """Return the light (L, H, W) float32 of ``Lit`` in soft shadows; height : (H, W) m, gel that ``view`` sees"""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):
@@ -135,7 +137,8 @@ def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, map
     The part of its disc above the horizon shines. With l the vector to the LED and e the unit vector upward across l,
     that part's centre is l + (radius moment / share) e, and
     normal . e = (tilt |l|^2 - above facing) / (|l| sqrt(|l|^2 - above^2)).
-    lit : changed; mapped : (H, W) m, the field for shadows, see ``cast_shadows``; edge : box where they may begin"""
+    lit : its light is changed; mapped : (H, W) m, height by the map of ``cast_shadows``; edge : box of shadows'
+        beginnings"""
     sight, box = caster.sight(mapped, edge)
     facing, square = lit.facing[k][box], lit.square[k][box]
     share, moment = disc_share(sight)
@@ -150,8 +153,8 @@ def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, map
 
 @Loop
 def _lambert_loop(right, down, height, slope_right, slope_down, inverse, position, strength):  # noqa: ANN001, ANN202
-    """Compute the fields of ``Lit`` as ``lambert`` does, from the fields of ``Surface``, right (W,) and down (H,), and
-    the LEDs' position l (L, 3) m and strength |l|^2 (L,) m2."""
+    """Compute the fields of ``Lit`` in a compiled loop, by ``lambert``'s formula, from the fields of ``Surface`` with
+    right (W,) and down (H,), and the LEDs' position l (L, 3) m and strength |l|^2 (L,) m2."""
     rows, columns = height.shape
     one, zero, two = np.float32(1), np.float32(0), np.float32(-2)
     near, tilt = np.empty((rows, columns), np.float32), np.empty((rows, columns), np.float32)
@@ -187,7 +190,8 @@ def _lambert_loop(right, down, height, slope_right, slope_down, inverse, positio
 
 
 def contact_share(risen: np.ndarray) -> np.ndarray:
-    """Return the share (H, W) float32, 0..1, of an object's light in each pixel; risen : (H, W) m, over the rest"""
+    """Return the share (H, W) float32, 0 to 1, of a touching object's light that is seen; risen : (H, W) m, over the
+    rest"""
     deepest = float(risen.max())
     if deepest < LEAST_RISE:
         return np.zeros_like(risen)
@@ -196,8 +200,8 @@ def contact_share(risen: np.ndarray) -> np.ndarray:
 
 
 def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
-    """Return the radiance (3, H, W) float32, levels, of an object behind gel that has risen by ``risen`` (H, W) m.
-    reflectance : (H, W) of the object at each pixel, 0 black to 1 white; None for the calibration's, everywhere"""
+    """Return the radiance (3, H, W) float32, levels, that comes through the coating from an object touching it.
+    risen : (H, W) m, of the gel; reflectance : (H, W) of the object, 0 black to 1 white; None for the calibration's"""
     amount, share = unit.through, contact_share(risen)
     if reflectance is not None:
         amount, share = unit.coating.transmission, share * reflectance
@@ -205,8 +209,8 @@ def object_light(unit: Calibration, risen: np.ndarray, reflectance: np.ndarray |
 
 
 def checked_reflectance(given: np.ndarray, name: str) -> np.ndarray:
-    """Return a map `given` (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 0..1. Raises
-    TactileError, with ``name``, for another."""
+    """Return a map ``given`` (h, w) of reflectance, 0 black to 1 white or grey levels of 8 bits, as float32 0..1.
+    Raises TactileError, which calls it ``name``, for another shape or values out of range."""
     values = numbers(given, name)
     if values.ndim != 2 or min(values.shape) < 2:
         advice = "Average the three colours of a picture" if values.ndim == 3 else ""

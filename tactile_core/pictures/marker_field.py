@@ -12,8 +12,8 @@ LEAST_AREA = 1e-3  # px^2, of a dot seen from its edge: none is drawn
 
 
 class MarkerField:
-    """Dots of one unit under its camera, numbered row by row from the picture's upper left. Raises TactileError for a
-    unit without dots, or whose grid reaches beyond the even part of the gel's surface."""
+    """Dots printed on a unit's gel, numbered row by row from the picture's upper left. Raises TactileError for a unit
+    without dots, or whose grid of dots reaches beyond the even part of the gel's surface."""
 
     def __init__(self, unit: Calibration) -> None:
         if unit.markers is None:
@@ -60,8 +60,8 @@ class MarkerField:
         return np.stack([column, row], -1).reshape(*self._x.shape, 2)
 
     def _darken(self, share: np.ndarray, place: np.ndarray, axes: np.ndarray) -> None:
-        """Darken ``share`` (H, W) of light left, in place, by the part of each pixel that one dot's ellipse covers.
-        place : (2,) px, its middle, right and down; axes : (2, 2), from a unit disc to px"""
+        """Multiply ``share`` (H, W) of light left, in place, by what one dot's ellipse leaves of it in each pixel.
+        place : (2,) px, the ellipse's middle, right and down; axes : (2, 2) px, matrix from a unit disc to it"""
         area = abs(np.linalg.det(axes))
         if area < LEAST_AREA:
             return

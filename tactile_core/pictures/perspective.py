@@ -1,4 +1,4 @@
-"""Perspective: the heights that the pixels of a pinhole camera see on a height map of the gel."""
+"""Find the heights that the pixels of a pinhole camera see on a height map of the gel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MARCH_LEVELS, BISECTIONS = 64, 14  # of the search from above in that case: 2 mm
 
 
 class Perspective:
-    """A camera's view of height maps near the resting one.
+    """A camera's view of height maps; searches start from what it sees of the resting gel.
 
     A pixel at q = (right, down) on the plane of height zero sees the point q s, s = 1 - h / apparent height, where h =
     height(q s): the first such point from the camera. Presses of 1.5 mm are found within 1 um (tests).
@@ -68,8 +68,8 @@ class Perspective:
         return (bilinear(height, row, column) + turn * seen) / (1 + turn)
 
     def _steepness(self, height: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return (slope along p) |p| / apparent height, (H, W), of height (H, W) m, p from the middle; and its
-        least."""
+        """Return (slope along p) |p| / apparent height at each place p from the picture's middle, (H, W), and its least
+        value. height : (H, W) m"""
         slope_right, slope_down = slopes(height, self.camera)
         slope_right *= self.right * self.inverse
         slope_down *= self.down * self.inverse
@@ -77,7 +77,8 @@ class Perspective:
         return slope_right, float(slope_right.min())
 
     def _places(self, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return rows and columns of the map, fractional, clipped to it, of the points q ``near`` seen by pixels q."""
+        """Return row and column, fractional, in the map, of the points q near that pixels q see; near : (H, W), s of
+        the class"""
         row, column = near * self.rows, near * self.columns
         row += self.middle[0]
         column += self.middle[1]
@@ -85,8 +86,8 @@ class Perspective:
         return row, np.clip(column, 0, 2 * self.middle[1], out=column)
 
     def _from_above(self, height: np.ndarray) -> np.ndarray:
-        """Find the heights (H, W) m that pixels see of ``height`` (H, W) m by a march along each ray from the highest
-        level down: slower, but right where gel hides gel."""
+        """Find the heights (H, W) m that pixels see of a map ``height`` (H, W) m by a march down each ray: slower, but
+        right where gel hides gel."""
         high, low = np.float32(height.max() + 1e-6), np.float32(height.min() - 1e-6)
         above = np.full(self.camera.shape, high)
         below = np.full(self.camera.shape, low)
@@ -104,7 +105,8 @@ class Perspective:
         return (above + below) / 2
 
     def seen_of(self, values: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        """Return what the pixels see (H, W) of a map ``values`` (H, W) float32; seen : (H, W) m, heights they see."""
+        """Return the values (H, W) float32 of a map at the points that pixels see; seen : (H, W) m, heights that they
+        see"""
         return bilinear(values, *self._places(1 - seen * self.inverse))
 
 
@@ -117,7 +119,7 @@ def _nearest(row: np.ndarray, column: np.ndarray, width: int) -> np.ndarray:
 
 
 def slopes(height: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes (H, W) of height (H, W) m along the picture's right, and down; second order, at edges too."""
+    """Return the slopes (H, W) of height (H, W) m to the picture's right, and down; second order, at edges too."""
     right, down = camera.pixel_size
     return _differences(height, 1, right), _differences(height, 0, down)
 
@@ -133,7 +135,7 @@ def _differences(values: np.ndarray, axis: int, step: float) -> np.ndarray:
 
 
 def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Return float32 values (h, w), 2 x 2 or more, interpolated at fractional row, column (...) within them."""
+    """Interpolate ``values`` (h, w) float32, 2 x 2 or more, bilinearly at fractional row, column (...) within them."""
     if available() and values.dtype == row.dtype == column.dtype == np.float32 and row.ndim == 2:
         return interpolate(*map(np.ascontiguousarray, (values, row, column)))  # one kind of arrays is compiled
     height, width = values.shape
@@ -155,20 +157,20 @@ def bilinear(values: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 
 
 def map_lookup(right: np.ndarray, down: np.ndarray, camera: Camera) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that samples maps (H, W) of the gel at right, down (...) on it, m, image frame; edges held."""
+    """Return a function that samples the gel's maps (H, W) at right, down (...) m, image frame, clipped to the map."""
     step_right, step_down = camera.pixel_size
     row = down * np.float32(1 / step_down) + np.float32(camera.height / 2 - 0.5)
     return lookup(row, right * np.float32(1 / step_right) + np.float32(camera.width / 2 - 0.5), camera.shape)
 
 
 def lookup(row: np.ndarray, column: np.ndarray, shape: tuple[int, int]) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that samples maps of ``shape`` (H, W) bilinearly at fractional row, column (n,); edges held."""
+    """Return a function that samples maps of ``shape`` (H, W) bilinearly at row, column (n,), clipped to the map."""
     row, column = np.clip(row, 0, shape[0] - 1), np.clip(column, 0, shape[1] - 1)
     return lambda values: bilinear(values, row, column)
 
 
 def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return values (...) between those of flat (n,) at indices start (...) and the next, by a share (...), 0 to 1."""
+    """Interpolate flat (n,) linearly between index start (...) and the next, by a share (...), 0 to 1; return (...)."""
     left = flat.take(start)
     right = flat[1:].take(start)
     right -= left
@@ -179,11 +181,11 @@ def _between(flat: np.ndarray, start: np.ndarray, share: np.ndarray) -> np.ndarr
 
 @Loop
 def seen_heights(height, steepness, start, start_near, start_nearest, rows, columns, inverse):  # noqa: ANN001, ANN201
-    """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__``.
-    height, steepness : (H W,), of the map: m, and its slope outward from the middle times distance from there, times
-        inverse
-    start : (H, W) m, heights near the sought ones, with start_near : (H, W), 1 - start inverse, and start_nearest :
-        (H, W) int, index of the map's place nearest to each
+    """Return the heights (H, W) m that pixels see, by the two Newton steps of ``Perspective.__call__`` in a compiled
+    loop.
+    height, steepness : (H W,), the map, m, and its ``Perspective._steepness``
+    start : (H, W) m, heights near the sought ones; start_near : (H, W), 1 - start inverse
+    start_nearest : (H, W) int, flat index of the map's place nearest to each point that start sees
     rows, columns : (H,), (W,) px, from the map's middle; inverse : 1 / apparent height, 1/m"""
     count, width = start.shape
     middle_row, middle_column = np.float32((count - 1) / 2), np.float32((width - 1) / 2)

@@ -1,4 +1,4 @@
-"""Presets: how exactly a picture is made, and what that was measured to cost."""
+"""Presets of pictures: how exactly each is computed, and its measured error and time."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ SPACING = 0.107e-3  # m between vertices: two pixels of the default camera, abou
 
 @dataclasses.dataclass(frozen=True)
 class Gather:
-    """Resolution at which the gel's own light is gathered.
-    step : pixels between places; azimuths : number of directions around each
-    growth : each step outward as a share of the distance so far, at least one place; bounces : of light, 1 or more"""
+    """Resolution at which light that the gel reflects onto itself is summed.
+    step : pixels between places; azimuths : number of directions around each; bounces : of light, 1 or more
+    growth : each step outward as a share of the distance so far, but at least one place"""
 
     step: int
     azimuths: int
@@ -32,13 +32,14 @@ class Gather:
 class Preset:
     """Settings of a Mitsuba render.
 
-    says : the preset in words; points : number for each LED in a pass; spacing : m between vertices of the gel's mesh
+    says : the preset in words; points : points of light per LED and pass; spacing : m between vertices of the gel's
+        mesh
     bounce_step : by LLVM, pixels between the places at which one bounce is gathered; 0 leaves it out
     paths : by LLVM, passes of Mitsuba's path integrator, of 64 paths per pixel; 0 for our own integrator
 
     Without LLVM, on a matte coating:
     passes : pictures to average, each from other points of the LEDs and the pixels; 1 takes each pixel's middle
-    gather : resolution of the gel's own light; None leaves it out
+    gather : resolution of the gel's light on itself; None leaves it out
     window : true bends rays at the window"""
 
     name: str
@@ -79,24 +80,25 @@ def preset_named(name: str) -> Preset:
 
 @functools.cache
 def measured() -> dict[str, Any]:
-    """Return the table of ``measure_presets.py``: "presets" holds, by name, ``ms`` by variant and ``error``, levels."""
+    """Return the table of ``measure_presets.py``: in "presets", by name, ``ms`` by Mitsuba's variant, and ``error``,
+    levels."""
     return json.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def cheapest(error: float, variant: str) -> str:
-    """Return the name of the fastest preset whose measured error, levels rms from the full model, is at most ``error``,
-    drawn by a variant of Mitsuba's. Raises TactileError where none is."""
+    """Return the name of the fastest preset by a ``variant`` of Mitsuba whose measured ``error``, grey levels rms from
+    the full model, is at most this. Raises TactileError if none is."""
     table = measured()["presets"]
     rows = [Candidate(name, table[name]["error"], _ms(table[name]["ms"], variant)) for name in NAMES]
     return accuracy.cheapest(rows, error, "levels").name
 
 
 def describe_choice(name: str, error: float) -> str:
-    """Describe why the preset ``name`` was chosen for a largest ``error``, grey levels."""
+    """Return a sentence on why the preset ``name`` was chosen. error : grey levels, the largest that was allowed"""
     found = measured()["presets"][name]
     return f"pictures: {name}, {found['error']:.2g} levels rms from the full model, at most {error:g}; {found['says']}"
 
 
 def _ms(ms: dict[str, float], variant: str) -> float:
-    """Return the time of a preset, ms, without Mitsuba or by a variant; infinity for an unmeasured one."""
+    """Return a preset's time, ms, from its measured ones: numpy's, else the ``variant``'s; infinity if not measured."""
     return ms.get("numpy", ms.get(variant, float("inf")))

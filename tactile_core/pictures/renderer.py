@@ -113,8 +113,8 @@ class Renderer:
         return self.picture(self.radiance(height_map, reflectance), marks=marks)
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield pictures (H, W, 3) uint8 of a height_map (H, W) m, less and less noisy; the last is that of a call.
-        Only the preset ``reference`` by LLVM yields more than one."""
+        """Yield pictures (H, W, 3) uint8 of a height_map (H, W) m, less and less noisy; the last equals what a call
+        returns. Only the preset ``reference`` by LLVM yields more than one."""
         heights = self._heights(height_map, "height map")
         if not isinstance(self._light, GelLight):
             yield self.picture(self._spread_radiance(heights))
@@ -136,7 +136,8 @@ class Renderer:
         return pictures
 
     def marks(self, displacement: np.ndarray) -> np.ndarray | None:
-        """Return the share (H, W) of light that dots leave under displacement (n_nodes, 3) m; None without dots."""
+        """Return the share (H, W) of light that dots leave under displacement (n_nodes, 3) m; None for a gel without
+        dots."""
         return None if self.dots is None else self.dots.marks(displacement)
 
     def radiance(self, height_map: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
@@ -156,8 +157,9 @@ class Renderer:
         return self._completed(light, seen, reflectance)
 
     def _completed(self, light: np.ndarray, seen: np.ndarray, reflectance: np.ndarray | None = None) -> np.ndarray:
-        """Return (H, W, 3): the LEDs' radiance (3, H, W) and the ambient light of gel seen at heights (H, W) m, spread
-        by the coating, and the light of the touching object. reflectance : see ``__call__``"""
+        """Return the radiance (H, W, LED) of LEDs and ambient light, spread by the coating, and of the touching object.
+        light : (3, H, W), of LEDs; seen : (H, W) m, heights; reflectance : (H, W) of the object, None for the
+            calibration's"""
         spread = self._spread(light + raised_light(self.calibration, seen))
         if reflectance is not None:
             reflectance = self.view.seen_of(reflectance, seen)
@@ -169,9 +171,10 @@ class Renderer:
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
-        radiance : (H, W, LED), of ``radiance``. The change passes the camera's toe and shoulder (``camera_curve``).
-        noise : generator of the camera's noise, as measured on the unit; None for none
-        marks : (H, W) of ``marks``. Raises TactileError for a unit with dots without them."""
+        radiance : (H, W, LED) levels, of ``radiance``. The change passes the camera's toe and shoulder
+            (``camera_curve``).
+        noise : generator of the camera's noise, as strong as measured on the unit; None adds none
+        marks : (H, W) of ``marks``. Raises TactileError if they are missing for a unit with dots."""
         radiance = numbers(radiance, "radiance")
         if (other := radiance.shape != self.rest_radiance.shape) or not np.isfinite(radiance).all():
             found = f"shape {radiance.shape}" if other else "values that are not finite"
@@ -197,11 +200,11 @@ class Renderer:
         return np.clip(levels, 0, LARGEST_LEVEL, out=levels).astype(np.uint8)
 
     def correction(self) -> dict[str, float]:
-        """Return ``mean_levels`` and ``largest_levels``, by which the picture at rest differs from the modelled one."""
+        """Return how far the picture at rest is from the modelled one, ``mean_levels`` and ``largest_levels``."""
         return correction(self.calibration, self.rest_radiance, self.background)
 
     def _heights(self, given: np.ndarray, name: str) -> np.ndarray:
-        """Return the unit's heights (H, W) float32 m of a map ``given`` (H, W) m, checked. name : for errors"""
+        """Check a map ``given`` (H, W) m; return it as float32 with the unit's own dome. name : for errors"""
         heights = camera_array(given, self.camera.shape, name)
         if (below := float((self._resting - heights).max())) > MOST_BELOW:
             found = f"{below * 1e3:.2f} mm below the undeformed gel"
@@ -232,8 +235,8 @@ def camera_noise(unit: Calibration, random: np.random.Generator) -> np.ndarray:
 
 
 def _given_background(picture: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return a user's picture (H, W, 3), levels, as float32; raises TactileError for other units, and where it is much
-    more like the unit's ``own`` (H, W, 3) with colours exchanged, or turned."""
+    """Return a user's picture (H, W, 3) as float32. Raises TactileError for values that are not levels 0 to 255, and if
+    it is much more like the unit's ``own`` (H, W, 3) with colours exchanged, or turned."""
     levels = camera_array(picture, own.shape, "background")
     least, most = float(levels.min()), float(levels.max())
     shares = np.asarray(picture).dtype.kind == "f" and 0 < most <= 1
@@ -245,7 +248,8 @@ def _given_background(picture: np.ndarray, own: np.ndarray) -> np.ndarray:
 
 
 def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Return values (...) as float32. Raises TactileError, with ``name``, for another ``shape``, or if not finite."""
+    """Return values (...) as float32. Raises TactileError, with their ``name``, for another ``shape``, or if not
+    finite."""
     values = numbers(values, name)
     if values.shape != shape:
         raise TactileError(name, f"shape {values.shape}", f"{shape}, as the camera's picture")
@@ -255,7 +259,7 @@ def camera_array(values: np.ndarray, shape: tuple[int, ...], name: str) -> np.nd
 
 
 def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
-    """Raise TactileError, of the map ``name``, where ``height`` (H, W) m reaches an LED's middle or the camera."""
+    """Raise TactileError if a map called ``name``, height (H, W) m, reaches the lowest LED's middle or the camera."""
     lowest = min(unit.leds, key=lambda led: led.position[2])
     limits = {f"the {lowest.colour} LED": lowest.position[2], "the camera": unit.camera.apparent_height}
     for what, limit in limits.items():
@@ -266,8 +270,8 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 
 @Loop
 def _fill_levels(radiance, rest, response, background, ends, largest, picture):  # noqa: ANN001, ANN202
-    """Fill in a picture (H, 3 W): background (H, 3 W) + response (3, L, H, W) times radiance less rest (L, H, W), bent.
-    ends : (4, H, 3 W) of the camera's curve; largest : grey level"""
+    """Fill ``picture`` (H, 3 W) uint8 in place: background (H, 3 W) + response (3, L, H, W) times (radiance - rest),
+    both (L, H, W), the change bent by the camera's curve. ends : (4, H, 3 W), of the curve; largest : grey level"""
     leds, height, width = radiance.shape
     lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)

@@ -14,9 +14,10 @@ _STEPS, _STILL = 12, 1e-7  # most steps of the search for where a seen point res
 def seen_fields(
     renderer: Renderer, heights: np.ndarray, displacement: np.ndarray, touched: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Return fields (H, W) or (H, W, 3) float32 of the gel points that a renderer's pixels see, in the shared frame.
-    Height, m toward the camera; Normal, outward and of length 1; Contact, the share that is touched; Displacement, m.
-    heights : (H, W) m, as ``height_map`` gives them; displacement : (n, 3) m; touched : (n,) 0 to 1, of the nodes"""
+    """Return fields, float32, of the gel points that a renderer's pixels see, in the shared frame: Height (H, W) m
+    toward the camera; Normal (H, W, 3), of length 1, outward; Contact (H, W), share that is touched; Displacement (H,
+    W, 3) m.
+    heights : (H, W) m, of ``height_map``; displacement : (n, 3) m; touched : (n,) 0 to 1, of the nodes"""
     camera, surface = renderer.camera, renderer.camera.surface
     heights = of_unit(heights, renderer.calibration)
     seen = renderer.view(heights)

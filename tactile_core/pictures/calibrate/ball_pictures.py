@@ -28,8 +28,8 @@ WORKING_WIDTH = 120  # px, least short side of the pictures for fits, which are 
 
 
 class BallPictures(abc.ABC):
-    """Gel and camera of one calibration under a ball; subclasses compute the light. Raises TactileError for a camera
-    that sees past the gel."""
+    """Pictures of a ball pressed into the gel of one calibration; subclasses compute the light. Raises TactileError for
+    a camera that sees past the gel."""
 
     def __init__(self, calibration: Calibration) -> None:
         check_covered(calibration.camera.surface, calibration.camera)
@@ -46,8 +46,8 @@ class BallPictures(abc.ABC):
         self._view = Perspective(self.camera, self.rest)
 
     def lights(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the change (3, H, W) of each LED's light by a press, over its light on a coating that faces it; light
-        of the ball through the coating included. ball : right, down, depth, radius, m"""
+        """Return the change (3, H, W) of each LED's light that a press makes, the ball's light through the coating
+        included, over the LED's light on a coating that faces it. ball : right, down, depth, radius, m"""
         heights = self.heights(ball)
         seen = self._view(heights)
         light = self.spread(self._changed(heights, seen))
@@ -63,11 +63,12 @@ class BallPictures(abc.ABC):
         return print_on(self.rest, self.right, self.down, ball, self.thickness)
 
     def deepest(self, radius: float) -> float:
-        """Return the depth, m, up to which prints of a ball of a radius, m, are tabulated for this gel."""
+        """Return the depth, m, up to which the gel's shape under a ball of a radius, m, is tabulated."""
         return deepest(radius, self.thickness)
 
     def raised(self, seen: np.ndarray) -> np.ndarray:
-        """Return the ambient light (3, H, W) that rises with seen heights (H, W) m, over a facing coating's light."""
+        """Return ambient light (3, H, W) that grows with seen heights (H, W) m, over LED light on a coating that faces
+        it."""
         return raised_light(self.calibration, seen) / self.calibration.facing.astype(np.float32)[:, None, None]
 
     def change(self, ball: tuple[float, float, float, float]) -> np.ndarray:
@@ -75,8 +76,8 @@ class BallPictures(abc.ABC):
         return np.einsum("clhw,lhw->hwc", self.gain, self.lights(ball), optimize=True)
 
     def white(self, ball: tuple[float, float, float, float]) -> np.ndarray:
-        """Return the levels (H, W, 3) that a ball adds through the coating, if as bright as a coating facing LEDs.
-        ball : right, down, depth, radius, m"""
+        """Return the grey levels (H, W, 3) that a ball's light through the coating would add if it were as bright as a
+        coating that faces the LEDs. ball : right, down, depth, radius, m"""
         share = contact_share(self._view(self.heights(ball)) - self._view.start)
         return self.gain.sum(1).transpose(1, 2, 0) * share[..., None]
 
@@ -97,7 +98,7 @@ class FastPictures(BallPictures):
 
 
 def working_factor(width: int, height: int) -> int:
-    """Return the whole factor by which a fit reduces width x height px: to 120 px or more on either; 1 if none."""
+    """Return the whole factor by which a fit reduces width x height px, to 120 px or more on either side; 1 if none."""
     return whole_factor(width, height, WORKING_WIDTH)
 
 
@@ -115,8 +116,8 @@ def smaller(values: np.ndarray, factor: int) -> np.ndarray:
 
 
 def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
-    """Return the function that makes a unit's ``BallPictures`` by the preset of a name. Raises TactileError for one of
-    Mitsuba's where LLVM or Mitsuba is missing."""
+    """Return the function that makes a unit's ``BallPictures`` by the preset of this name. Raises TactileError for a
+    preset of Mitsuba's if Mitsuba or LLVM is missing."""
     if preset == FAST:
         return FastPictures
     if trouble := missing_mitsuba():
@@ -125,7 +126,7 @@ def pictures_of(preset: str) -> Callable[[Calibration], BallPictures]:
 
 
 def missing_mitsuba() -> str:
-    """Describe why Mitsuba cannot draw pictures by LLVM, as a fit needs: it or LLVM is missing; "" where it can."""
+    """Return why Mitsuba cannot draw pictures by LLVM, as a fit needs (it or LLVM is missing), or "" if it can."""
     try:
         import mitsuba  # noqa: F401
     except ModuleNotFoundError:
@@ -168,5 +169,5 @@ class _OfUnit(BallPictures):
 
 
 def working_preset(preset: Preset, factor: int) -> Preset:
-    """Return a preset for pictures reduced by ``factor``, its bounce at the same places, or at fewer, 4 px apart."""
+    """Return a preset for pictures reduced by ``factor``: its bounce is gathered at the same places, or 4 px apart."""
     return dataclasses.replace(preset, bounce_step=max(preset.bounce_step // factor, 4) if preset.bounce_step else 0)

@@ -1,9 +1,9 @@
-"""The gel under a pressed ball: not a sphere cut out, but a print with the shoulder of a bonded layer around it.
+"""The gel's shape under a pressed ball, its print: not a sphere cut out, but with the shoulder of a bonded layer.
 
 The rise of the gel comes from the project's axisymmetric finite-strain solver: balls of a few sizes on a disc of the
 DIGIT's thickness and half-width, frictionless, tabulated over depth (``make_ball_print.py``). On another layer all
-lengths scale with its thickness; a ball between two of the table has a print between theirs. A ball larger than all
-scales the largest one's lengths, which neglects that the layer is then relatively thinner."""
+lengths scale with its thickness. Between two tabulated balls the prints are interpolated; for a ball larger than all,
+the largest one's lengths are scaled, which neglects that the layer is then relatively thinner."""
 
 from __future__ import annotations
 
@@ -22,9 +22,8 @@ SPHERE_TO = 0.9  # of the radius: beyond, the profile continues as a cone, since
 
 @dataclasses.dataclass(frozen=True)
 class _Table:
-    """Prints of one ball.
-    radius : m; depths : (n,) m; coefficients : (n, k) of the spline of rise / depth by distance / sqrt(2 radius
-        depth)"""
+    """Prints of one ball. radius : m; depths : (n,) m, to which it was pressed
+    coefficients : (n, k), a row for each depth, of the spline of rise / depth over distance / sqrt(2 radius depth)"""
 
     radius: float
     depths: np.ndarray
@@ -32,7 +31,7 @@ class _Table:
     coefficients: np.ndarray
 
     def rise(self, distance: np.ndarray, depth: float, radius: float) -> np.ndarray:
-        """Return the flat layer's rise (...) m at distance (...) m from the axis of a ball of radius m at depth m.
+        """Return a flat layer's rise (...) m at distance (...) m from the axis of a ball of a radius and at a depth, m.
         The table's ball has ``self.radius``: all lengths are scaled by the ratio of the two radii."""
         scale = radius / self.radius
         distance, depth = distance / scale, depth / scale
@@ -67,14 +66,14 @@ def print_on(
 
 
 def deepest(radius: float, thickness: float = LAYER) -> float:
-    """Return the depth m up to which the print of a ball of radius m is tabulated for a gel of thickness m."""
+    """Return the depth, m, to which prints of a ball of a radius, m, are tabulated on a gel of a thickness, m."""
     near = _tables_near(radius, thickness)
     return sum(share * radius / table.radius * float(table.depths[-1]) for table, share in near)
 
 
 def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
-    """Return the tables next in size to a ball of radius m on a layer of thickness m, and their weights, which sum to
-    1: linear in the logarithm of radius over thickness. A table of weight 0 is left out."""
+    """Return the tables next in size to a ball of a radius, m, on a layer of a thickness, m, each with its weight:
+    linear in the logarithm of radius over thickness, sum 1. A table of weight 0 is left out."""
     tables = _tables()
     sizes = np.log([table.radius for table in tables])
     place = np.interp(np.log(radius * (LAYER / thickness)), sizes, np.arange(len(tables)))
@@ -84,8 +83,8 @@ def _tables_near(radius: float, thickness: float) -> list[tuple[_Table, float]]:
 
 
 def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
-    """Return the height (...) m of the underside of a ball of radius m over its lowest point, distance (...) m from its
-    axis."""
+    """Return the height (...) m of a ball's underside over its lowest point, distance (...) m from its axis. radius :
+    m"""
     edge = SPHERE_TO * radius
     inner = np.minimum(distance, edge)
     fall = np.sqrt(radius**2 - inner**2)
@@ -93,8 +92,8 @@ def _profile(distance: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _radius_of(gap: np.ndarray, radius: float) -> np.ndarray:
-    """Invert ``_profile``: return the distance (...) m from the axis where a ball of radius m is ``gap`` (...) m
-    high."""
+    """Invert ``_profile``: return the distance (...) m from the axis at which a ball's underside is ``gap`` (...) m
+    over its lowest point. radius : m"""
     edge = SPHERE_TO * radius
     fall = np.sqrt(radius**2 - edge**2)
     inner = np.minimum(gap, radius - fall)

@@ -1,4 +1,4 @@
-"""Fit a unit as ``tactile calibrate`` does: check orientation, evaluate on held-out presses, fit on all."""
+"""Fit a unit for ``tactile calibrate``: check orientation, evaluate fits on held-out presses, fit on all presses."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ CLEARLY = 0.8  # a way is clearly better if its residual is below this share of 
 
 
 class Way(NamedTuple):
-    """Steps that turn a picture, each if true: transpose, then reverse rows, columns, and exchange red with blue."""
+    """Steps that transform a picture, each if true: transpose, reverse rows, reverse columns, exchange red with
+    blue."""
 
     transposed: bool
     rows: bool
@@ -66,13 +67,13 @@ def check_orientation(
     start: Calibration,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> None:
-    """Raise TactileError for photographs that another orientation or order of colours explains clearly better, with the
-    share that each leaves unexplained.
+    """Raise TactileError if another orientation or order of colours explains the photographs clearly better than as
+    they are; it says which share of the presses each leaves unexplained.
 
     ball_diameter : m; start : calibration under which the balls are fitted; progress : called with (ways tried, in all)
     Of 8 orientations and 2 orders of colours, those that give pictures of the camera's shape are tried. Among ways that
-    explain the presses about equally well (lights may stand opposite each other) the untouched gel decides, compared
-    with the start's and the shipped unit's, as a start of round numbers hardly predicts it."""
+    explain the presses about equally well (lights may stand opposite each other) the untouched gel decides: it is
+    compared with the start's and the shipped unit's, as a start of round numbers hardly predicts it."""
     plain = sorted(photographs.presses, key=lambda press: -float(np.square(press.change).sum()))[:LOOKED_AT]
     height, width = photographs.shape
     factor = whole_factor(width, height, COARSE_SIDE)
@@ -99,16 +100,16 @@ def check_orientation(
 
 
 def _changed(press: Press, way: Way) -> Press:
-    """Return the press as its photograph shows it after the transformation ``way``."""
+    """Return the press with its photograph and masks transformed by ``way``."""
     picture, drift, change = way.applied_to(press.picture), way.applied_to(press.drift), way.applied_to(press.change)
     touched, region = way.applied_to(press.touched), way.applied_to(press.region)
     return dataclasses.replace(press, picture=picture, drift=drift, change=change, touched=touched, region=region)
 
 
 def _best(left: dict[Way, float], apart: dict[Way, float]) -> Way:
-    """Return the way with the least residual; of those within CLEARLY, one whose untouched gel is clearly nearer.
-    left : by way, share of the presses' squares left unexplained, median; apart : by way, mean difference in grey
-        levels between the untouched gel's photograph and the nearest known picture of it"""
+    """Return the way of least residual; of those within CLEARLY, one whose untouched gel is clearly nearer.
+    left : by way, median share of presses' squares left unexplained; apart : by way, mean difference, grey levels,
+        between the untouched gel's photograph and the nearest known picture of it"""
     best = min(left, key=left.__getitem__)
     near = [way for way in left if CLEARLY * left[way] <= left[best]]
     nearest = min(near, key=apart.__getitem__)
@@ -125,8 +126,8 @@ def _resting(unit: Calibration) -> list[np.ndarray]:
 
 
 def _units(photographs: Photographs, start: Calibration, shape: tuple[int, int]) -> dict[bool, Calibration]:
-    """Return the calibration ``start`` in the pixels of pictures of ``shape`` (h, w), by whether they are transposed. A
-    way whose aspect ratio is not the camera's is left out; raises TactileError where both are."""
+    """Return the calibration ``start`` in the pixels of pictures of ``shape`` (h, w), as they are (False) and
+    transposed (True), without those of another aspect ratio than the camera's. Raises TactileError if none is left."""
     units = {}
     for transposed, (height, width) in ((False, shape), (True, shape[::-1])):
         try:
@@ -155,11 +156,11 @@ def fit_unit(
     reflectance: float | None = None,
     progress: Progress = lambda done, total: None,
 ) -> tuple[Calibrated, list[Evaluation]]:
-    """Fit a unit, as ``fit.calibrate``, and evaluate each press by a fit to the other thirds of the presses; return the
-    fit, and the evaluations, empty for a single press.
-    ball_diameter : m; start : calibration that the fit starts from; unit : name; quick : without Mitsuba
+    """Fit a unit by ``fit.calibrate``. Return the fit, and each press evaluated by a fit to the other thirds of the
+    presses; of a single press no evaluation.
+    ball_diameter : m; start : calibration that the fit starts from; unit : name; quick : true fits without Mitsuba
     reflectance : of the ball, None to fit it; progress : called with (done, in all), in per cent
-    Raises TactileError for photographs in another orientation, and as ``fit.calibrate`` does."""
+    Raises TactileError for photographs in another orientation, without such a ball, or a ball too large for the gel."""
 
     def part(first: int, last: int) -> Progress:
         return lambda done, total: progress(first + (last - first) * done // total, 100)
@@ -178,8 +179,8 @@ def cross_validated(
     quick: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate each press by a calibration on the others, in thirds; none for a single press. ball_diameter : m;
-    start : where fits start; quick : without Mitsuba; progress : called with (steps done, in all)"""
+    """Evaluate each third of the presses by a calibration fitted to the others; return none for a single press.
+    ball_diameter : m; start : where fits start; quick : without Mitsuba; progress : called with (steps done, in all)"""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

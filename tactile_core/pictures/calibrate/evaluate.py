@@ -1,4 +1,4 @@
-"""Evaluate a calibration on photographs: fit place and depth of each press, compare the picture with the photograph.
+"""Evaluate a calibration on photographs: fit place and depth of each press, compare its picture with the photograph.
 The baseline beside each metric is the background alone, as if nothing had touched the gel."""
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ TARGETS = {
 class Evaluation:
     """Result of a calibration on one photograph.
 
-    ball : three numbers fitted, the radius known
-    picture : (H, W, 3) uint8, rendered; metrics, baseline : roi_l1 and others of ``TARGETS``; flags : doubts in words
-    through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; the
-        ``through_*`` metrics use the median share of the set's other photographs, all others the calibration's"""
+    ball : as fitted, its radius known; picture : (H, W, 3) uint8, rendered
+    metrics, baseline : of the picture and of the background alone, by the names of ``TARGETS``; flags : doubts in words
+    through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; metrics
+        ``through_*`` take the median of the set's other photographs for it, all others the calibration's"""
 
     press: Press
     ball: Ball
@@ -56,10 +56,10 @@ def evaluate_unit(
     pictures: Callable[[Calibration], BallPictures] = FastPictures,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> list[Evaluation]:
-    """Evaluate a calibration on each press of the photographs. radius : m, of balls for which none is given
-    search_radius : true also searches the ball's radius, for ``ball_radius_error``; progress : called with (done, in
-        all)
+    """Evaluate a calibration on each press of the photographs.
+    radius : m, of balls whose press gives none; search_radius : true also fits the radius, for ``ball_radius_error``
     pictures : class that draws the compared pictures; places and depths are found with the fast ones
+    progress : called with (presses done, in all)
     Raises TactileError for photographs of another shape than the calibration's pictures."""
     unit = fitted_size(calibration, photographs)
     factor = working_factor(unit.camera.width, unit.camera.height)
@@ -94,9 +94,9 @@ def fitted_size(calibration: Calibration, photographs: Photographs) -> Calibrati
 def _try_press(
     whole: BallPictures, working: BallPictures, press: Press, background: np.ndarray, radius: float, search_radius: bool
 ) -> Evaluation:
-    """Fit the ball to a press, compare its picture (of ``whole``) with the photograph, and fit the ball's light and,
-    with ``search_radius``, its radius as further unknowns.
-    working : pictures of reduced pixels, for fits; background : (H, W, 3) levels, of the untouched gel
+    """Evaluate one press: fit the ball, compare its picture (drawn by ``whole``) with the photograph; then fit the
+    ball's light too and, with ``search_radius``, its radius.
+    working : draws reduced pictures, for fits; background : (H, W, 3) levels, of the untouched gel
     radius : m, of the ball, if the press does not give its own"""
     sight = Sight(press)
     radius = sight.radius(radius)
@@ -119,15 +119,15 @@ def _try_press(
 
 
 def _compared(press: Press, background: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
-    """Return a press's picture (H, W, 3) uint8 by a ``change`` (H, W, 3), levels, of the ``background`` (H, W, 3), and
-    its metrics against the photograph. The photograph's drift of light is added, as to the baseline."""
+    """Return the picture (H, W, 3) uint8 of a press and its metrics against the photograph; the photograph's drift of
+    light is added. change : (H, W, 3) levels, by the press; background : (H, W, 3) levels"""
     untouched = background + press.drift
     picture = np.rint(untouched + bent(change, untouched)[0]).clip(0, LARGEST_LEVEL).astype(np.uint8)
     return picture, metrics(picture, press.picture, background, press.region)
 
 
 def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
-    """Return the press's flags in words, one more if the edge of the pictures of ``bench`` cuts the ball's print."""
+    """Return the press's flags in words, and one if the picture's edge cuts the contact. bench : whose camera it is"""
     camera = bench.camera
     contact = contact_radius(ball.depth, ball.radius)
     over_right = abs(ball.right) + contact > camera.width / 2 * camera.pixel_size[0]
@@ -136,7 +136,8 @@ def _flags(press: Press, ball: Ball, bench: BallPictures) -> tuple[str, ...]:
 
 
 def mean_metrics(tried: list[Evaluation]) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the means over presses ``tried`` of the metrics and of the baseline's, by name, without presses' NaN."""
+    """Return the means over presses ``tried`` of the metrics and of the baseline's, by name; NaN values are left
+    out."""
     means = []
     for which in ("metrics", "baseline"):
         rows = [getattr(each, which) for each in tried]
@@ -155,7 +156,7 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 
 def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
-    """Return rows of all metrics as means over presses, and rows of each press, with where its ball was found.
+    """Return a report's rows: of all metrics' means over presses; and of each press, with where its ball was found.
     name : of the set of photographs"""
     ours, baseline = mean_metrics(tried)
     means, by_press = [], []

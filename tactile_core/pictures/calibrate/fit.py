@@ -1,5 +1,5 @@
-"""A unit's calibration from photographs of a ball pressed into it, by Gauss-Newton: on the fast picture first, then on
-Mitsuba's, which adds the light of one bounce."""
+"""Fit a unit's calibration to photographs of a ball pressed into it, by Gauss-Newton: on the fast picture first, then
+on Mitsuba's, which adds the light of one bounce."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
-    """Result of `calibrate`. calibration : of the unit; tried : evaluations of it on the presses it was fitted to
-    warnings : sentences on what makes it doubtful"""
+    """Result of `calibrate`. calibration : of the unit; warnings : sentences on what makes it doubtful
+    tried : evaluations of it on the presses it was fitted to"""
 
     calibration: Calibration
     tried: list[Evaluation]
@@ -43,7 +43,7 @@ class Calibrated:
 
 
 def check_diameter(ball_diameter: float) -> None:
-    """Raise TactileError where a ball of ``ball_diameter``, m, does not fit on the gel: 0.5 to 16 mm do."""
+    """Raise TactileError for a ball_diameter, m, that does not fit on the gel: 0.5 to 16 mm do."""
     if not MM_LIMITS[0] <= 1e3 * ball_diameter <= MM_LIMITS[1]:
         expected = f"{MM_LIMITS[0]:g} to {MM_LIMITS[1]:g}"
         raise TactileError("ball diameter, mm", f"{1e3 * ball_diameter:g}", expected)
@@ -64,8 +64,8 @@ def calibrate(
     ball_diameter : m; unit : its name; progress : called with (steps done, in all)
     reflectance : of the ball, above 0 to 1; the coating's transmission is then fitted. None keeps the start's
         transmission and fits the reflectance: photographs of one object determine only the product
-    quick : stop after the fast picture, as where Mitsuba by LLVM does not work
-    Raises TactileError for a ball that does not fit on the gel, and where no photograph shows such a ball."""
+    quick : true stops after the fast picture, which also happens if Mitsuba by LLVM does not work
+    Raises TactileError for a ball that does not fit on the gel, and if no photograph shows such a ball."""
     check_diameter(ball_diameter)
     coating = dataclasses.replace(start.coating, spread=max(start.coating.spread, 1e-3 * LEAST_SPREAD))
     whole = fitted_size(dataclasses.replace(start, coating=coating), photographs)
@@ -116,8 +116,8 @@ def calibrate(
 
 
 def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
-    """Describe by what a calibration was fitted: pictures, presses, balls and background. finish : true if by Mitsuba
-    too; estimated : true if the background is"""
+    """Describe what a calibration was fitted to: pictures, presses, balls and background.
+    finish : true if the fit ended by Mitsuba; estimated : true if the background was not photographed"""
     light, rest = "Mitsuba" if finish else "fast picture", "estimated" if estimated else "photographed"
     balls = {f"{2e3 * press.radius:g}" for press in presses if press.radius is not None}
     of = f" by balls of {', '.join(sorted(balls, key=float))} mm" if balls else ""
@@ -125,8 +125,8 @@ def _note(presses: Sequence[Press], *, finish: bool, estimated: bool) -> str:
 
 
 class _Search:
-    """State of the search: the presses that are fitted, the unit's numbers and the balls.
-    radius : m, of balls for which none is given; progress : called with the steps done"""
+    """State of a fit: the presses that it uses, the unit's numbers and the balls' places.
+    radius : m, of balls whose press gives none; progress : called with the steps done"""
 
     def __init__(
         self, start: Calibration, photographs: Photographs, radius: float, progress: Callable[[int], None]
@@ -148,7 +148,7 @@ class _Search:
         self._minimise(min(starts, key=self._problem.cost), PLACING_STEPS)
 
     def put_aside(self) -> None:
-        """Leave out photographs that show no such ball. Raises TactileError where none does."""
+        """Leave out photographs that do not look like the ball. Raises TactileError if none does."""
         left = self._problem.unexplained()
         good = [k for k, share in enumerate(left) if share < UNEXPLAINED]
         if not good:
@@ -162,7 +162,7 @@ class _Search:
             self._minimise(self._x, PLACING_STEPS)
 
     def readmit(self) -> bool:
-        """Take back photographs that show the ball under this unit's lights; returns true if there are any."""
+        """Take photographs back that show the ball under the lights found so far; return true if there are any."""
         if not self.aside:
             return False
         bench, balls, taken = FastPictures(self.calibration()), self._problem.balls(self._x).tolist(), []
@@ -182,7 +182,7 @@ class _Search:
         return bool(taken)
 
     def _take(self, presses: list[Press], unit: Calibration, balls: np.ndarray) -> None:
-        """Continue with these presses. balls : (n, 3) mm, their positions; unit : whose numbers to start from"""
+        """Go on with these presses. balls : (n, 3) mm, right, down and depth; unit : whose numbers to start from"""
         self.presses, self._sights = presses, [Sight(press) for press in presses]
         self._problem = UnitResiduals(unit, self._sights, self.radius, self._object)
         self._x = np.array([unit.through, *balls.ravel()])
@@ -191,8 +191,8 @@ class _Search:
     def fit(
         self, free: np.ndarray, pictures: Callable[[Calibration], BallPictures] = FastPictures, steps: int = STEPS
     ) -> None:
-        """Continue the search; free : (22,) bool, numbers of the unit that may change; pictures : class that draws
-        them"""
+        """Go on with the search for the unit's numbers that are ``free`` (22,) bool, for ``steps`` at most; pictures :
+        class that draws them"""
         numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
         self._problem, self._free = UnitResiduals(self.start, self._sights, self.radius, free, pictures), free
         self._minimise(np.concatenate([numbers[free], balls.ravel()]), steps)
@@ -209,8 +209,8 @@ class _Search:
         return self._problem.unit(self._x)
 
     def identified(self, factor: int) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return standard errors by name, and the names of parameters that the photographs do not determine. How units
-        differ (assumed) counts as one more measurement, misfits of the model as MODEL_ERROR.
+        """Return standard errors by name, and the names of parameters that the photographs do not determine. The
+        assumed spread of units counts as one more measurement; misfits of the model count as MODEL_ERROR.
         factor : width of a fitted pixel, in pixels of the photographs"""
         matrix, _ = self._problem.normal_equations(self._x)
         errors = SPREAD.copy()  # of what was not fitted

@@ -1,4 +1,4 @@
-"""Metrics of a picture against a photograph of a press, as in ``tactile calibrate --test``, grey levels."""
+"""Metrics, for ``tactile calibrate --test``, of a picture against a photograph of a press, in grey levels."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ _C1, _C2 = (0.01 * PEAK) ** 2, (0.03 * PEAK) ** 2
 
 
 def metrics(picture: np.ndarray, photograph: np.ndarray, background: np.ndarray, region: np.ndarray) -> dict:
-    """Compare a picture (H, W, 3) with a photograph (H, W, 3), levels, by name: in a region, the mean absolute
-    difference roi_l1, roi_psnr (dB), structural similarity roi_ssim, overlap of shadows lobe_iou; in all, frame_l1.
-    region : (H, W) bool; background : (H, W, 3), untouched gel. lobe_iou is NaN where neither of the two has a lobe."""
+    """Return metrics by name of a picture (H, W, 3) against a photograph (H, W, 3), levels: in the region (H, W) bool,
+    mean absolute difference roi_l1, roi_psnr (dB), structural similarity roi_ssim, overlap of shadows lobe_iou; in all,
+    frame_l1. background : (H, W, 3), untouched gel. lobe_iou is NaN if neither of the two has a shadow."""
     picture, photograph = picture.astype(float), photograph.astype(float)
     error = picture - photograph
     return {
@@ -33,8 +33,8 @@ def psnr(error: np.ndarray) -> float:
 
 
 def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray) -> float:
-    """Return the intersection over union of shadow lobes (under -10 levels), mean over colours that have any.
-    change, true_change : (H, W, 3) grey levels against the background; region : (H, W) bool"""
+    """Return the intersection over union of both pictures' shadows (under -10 levels), mean over colours that have any.
+    change, true_change : (H, W, 3) grey levels against the background; region : (H, W) bool, pixels that count"""
     overlaps = []
     for channel in range(len(COLOURS)):
         ours, true = ((each[..., channel] < LOBE) & region for each in (change, true_change))
@@ -45,7 +45,7 @@ def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray
 
 
 def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the structural similarity (H, W, 3) of pictures one, other (H, W, 3) over 7 x 7 px; edges mirrored."""
+    """Return the structural similarity (H, W, 3) of pictures one, other (H, W, 3) over 7 x 7 px; edges are mirrored."""
     mean_one, mean_other = windowed(one), windowed(other)
     unbiased = WINDOW**2 / (WINDOW**2 - 1)
     var_one = unbiased * (windowed(one * one) - mean_one**2)

@@ -30,10 +30,10 @@ NOISE_LIMIT = 15  # grey levels; more is dust or the rim of a press
 class Press:
     """Photograph of a press.
 
-    picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, by which the light had drifted
+    picture : (H, W, 3) uint8; drift : (H, W, 3) float32, grey levels, change of the lighting since the background
     change : (H, W, 3) float32, grey levels, picture less background and drift; touched : (H, W) bool, near large
         changes
-    region : (H, W) bool, the region of interest, from picture and background alone
+    region : (H, W) bool, in which pictures are compared: near changes of picture from background, drift included
     flags : what is wrong with it, in words; empty for nothing
     radius : m, of its ball; None for that of the whole set"""
 
@@ -56,7 +56,7 @@ class Press:
 
 @dataclasses.dataclass(frozen=True)
 class Photographs:
-    """Photographs of one unit, prepared; folder : the one that holds all, or the video
+    """Photographs of one unit, prepared. folder : that holds all, or the video; presses : those of a press
     background : (H, W, 3) float32, grey levels; estimated : true if it was estimated from the set
     untouched : names of photographs that show no press; noise : (3,) grey levels, standard deviation of a pixel"""
 
@@ -79,9 +79,9 @@ def read_photographs(
     radii: Sequence[float] | None = None,
     only: list[str] | None = None,
 ) -> Photographs:
-    """Read all pictures of folders or videos, by name; without a background photograph it is estimated.
+    """Read all pictures of folders or videos; without a photograph of the background, estimate it from them.
 
-    radii : m, of each folder's ball; None where one ball, given elsewhere, made all presses
+    radii : m, of each folder's ball; None if one ball, given elsewhere, made all presses
     only : names of the presses to keep, in that order; None for all
     Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
     pictures to estimate the background; ModuleNotFoundError for a video without OpenCV."""
@@ -132,9 +132,9 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) that presses cover by less than half. At
-    each pixel it is the median of values within 18 levels of the plain median, which presses on a third of the pictures
-    pull by up to that much."""
+    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) of which presses cover less than half. At
+    each pixel it is the median of the values within 18 levels of the median of all: presses in a third of the pictures
+    pull that first median by up to 18 levels."""
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
     rest = np.where(touched, np.nan, pictures.astype(np.float32))
@@ -144,8 +144,9 @@ def estimated_background(pictures: np.ndarray) -> np.ndarray:
 
 
 def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[float, float, float]:
-    """Measure the standard deviation (3,) of the camera's noise, grey levels, outside the presses. Means over 41 px
-    (at 240 wide), which hold the drift of light, are subtracted first; a photographed background adds its own noise."""
+    """Return the standard deviation (3,) of the camera's noise, grey levels, beside the presses. Means over 41 px (at
+    240 wide), which hold the drift of light, are subtracted first; a photographed background (H, W, 3) adds its own
+    noise."""
     window = NOISE_WINDOW * background.shape[1] // 240 | 1
     found = []
     for press in presses:
@@ -159,14 +160,14 @@ def measured_noise(presses: tuple[Press, ...], background: np.ndarray) -> tuple[
 
 
 def region_of_interest(picture: np.ndarray, background: np.ndarray) -> np.ndarray:
-    """Return the mask (H, W) bool of pixels within 9 px of a change of picture (H, W, 3) from background (H, W, 3) over
-    18 levels in any channel."""
+    """Return the mask (H, W) bool of pixels within 9 px of one where picture (H, W, 3) and background (H, W, 3) differ
+    by over 18 levels in some channel."""
     changed = np.abs(picture.astype(np.float32) - background).max(-1) > CHANGE
     return dilated(changed, DILATION)
 
 
 def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
-    """Grow a mask's (H, W) true part by a disc of a ``radius``, px."""
+    """Return ``mask`` (H, W), its true part grown by a disc of a ``radius``, px."""
     height, width = mask.shape
     padded = np.zeros((height + 2 * radius, width + 2 * radius + 1), np.int32)
     padded[radius : radius + height, radius + 1 : radius + 1 + width] = mask
@@ -199,8 +200,8 @@ def _pictures(path: Path) -> dict[str, np.ndarray]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
-    """Return the press in a photograph ``picture`` (H, W, 3) uint8 of a gel whose untouched ``background`` is (H, W, 3)
-    levels; None where there is none. name : of the press; radius : m, of its ball, None for that of the whole set"""
+    """Return the press in a photograph ``picture`` (H, W, 3) uint8; None if it shows none. name : of the press
+    background : (H, W, 3) levels, of the untouched gel; radius : m, of its ball, None for that of the whole set"""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift
@@ -248,7 +249,7 @@ def lighting_drift(change: np.ndarray) -> np.ndarray:
 
 
 def _middles(count: int, step: int, size: int) -> np.ndarray:
-    """Return the middles (count,) of ``count`` squares of ``step`` px, on a scale of -1 to 1 over ``size`` px."""
+    """Return the middles (count,) of ``count`` intervals of ``step`` px, on a scale of -1 to 1 over ``size`` px."""
     return 2 * (np.arange(count) + 0.5) * step / size - 1
 
 

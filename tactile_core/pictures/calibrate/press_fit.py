@@ -1,4 +1,4 @@
-"""Fit the place and depth at which the ball of a photograph was pressed, under a known calibration."""
+"""Fit the place and depth at which the ball of a photograph was pressed, with a known calibration."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ EASIER, HARDER = 0.2, 8.0  # factors of the damping after a step that helped, an
 def minimise(
     problem: Any, x: np.ndarray, *, most: int, tolerance: float, progress: Callable[[int], None] = lambda _: None
 ) -> tuple[np.ndarray, float]:
-    """Minimise a sum of squares from x, by damped Gauss-Newton steps; return x and its cost, after ``most`` steps, when
-    one gains less than a share ``tolerance``, or when none helps. progress : called with the number of steps done
+    """Minimise a sum of squares by damped Gauss-Newton steps from x (n,); return the last x and its cost. It ends after
+    ``most`` steps, when a step gains less than a share ``tolerance``, or when none helps.
 
-    problem : sum of squares over x (n,): ``cost(x)`` is half of it, infinity where x is meaningless; ``inside(x)`` the
-        nearest valid x; ``normal_equations(x)`` Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last
-        accepted x"""
+    problem : has ``cost(x)``, half the sum of squares, infinity for a meaningless x; ``inside(x)``, the nearest valid
+        x; ``normal_equations(x)``, Gauss-Newton's matrix (n, n) and the cost's gradient (n,), at the last accepted x
+    progress : called with the number of steps done"""
     cost, damping = problem.cost(x), START_DAMPING
     for step in range(most):
         matrix, gradient = problem.normal_equations(x)
@@ -67,8 +67,8 @@ class Ball(NamedTuple):
 
 
 class Sight:
-    """Data of a fit: a photograph's change (h, w, 3) in working pixels, and the pixels that count (h, w).
-    shown : (n, 3) levels of change in pixels that count; untouched : (n, 3) of the gel at rest, in that day's light
+    """What a fit reads of a photograph: change (h, w, 3) in reduced pixels, and the mask (h, w) of the n that count.
+    shown : (n, 3) levels of change in those; untouched : (n, 3) levels, the gel at rest, in that day's light
     factor : by which the photograph is reduced; None for ``working_factor``"""
 
     def __init__(self, press: Press, factor: int | None = None) -> None:
@@ -82,17 +82,18 @@ class Sight:
         self.untouched = smaller(press.picture.astype(np.float32), factor)[self.counts] - self.shown
 
     def missed(self, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residual (n, 3), levels, of a change (n, 3) of linear light, and the curve's slope (n, 3)."""
+        """Return residuals (n, 3), levels, of a ``change`` (n, 3) of linear light, and the camera curve's slopes (n,
+        3)."""
         seen, slope = bent(change, self.untouched)
         return seen - self.shown, slope
 
     def radius(self, common: float) -> float:
-        """Return the radius, m, of the photograph's own ball, else ``common``, that of the whole set."""
+        """Return the radius, m, of the photograph's own ball, or if it gives none ``common``, that of the set."""
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
-        """Return starts (right, down) m for a ball of ``radius``, m: the change's centre of mass, and where its mean
-        over a print's width is largest. bench : gives the places of the working pixels"""
+        """Return two starts (right, down) m for a ball of a radius, m: the change's centre of mass, and where its mean
+        over the width of a print is largest. bench : gives the places of the reduced pixels"""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
@@ -104,9 +105,9 @@ class Sight:
 def fit_ball(
     bench: BallPictures, sight: Sight, radius: float, *, free_radius: bool = False, lit: bool = False
 ) -> tuple[Ball, float]:
-    """Fit the ball whose picture is nearest the photograph of ``sight``; return the ball and the mean squared residual,
+    """Fit the ball whose picture is nearest the photograph of ``sight``; return it and the mean squared residual,
     levels squared.
-    bench : draws balls in working pixels; radius : m, the ball's, or where its search starts with ``free_radius``
+    bench : draws balls in reduced pixels; radius : m, the ball's, or where its search starts with ``free_radius``
     lit : true fits the object's light through the coating as well (``missing_light``), false takes the unit's"""
     problem = _PressProblem(bench, sight, radius, lit)
     starts = [
@@ -120,7 +121,7 @@ def fit_ball(
 
 
 class _PressProblem:
-    """Squares of a ball's residual; x = right, down, depth and, if free, radius."""
+    """Squares of residuals of a ball's picture over x = right, down, depth and, if free, radius, all m."""
 
     def __init__(self, bench: BallPictures, sight: Sight, radius: float, lit: bool) -> None:
         self._bench, self._sight, self._radius, self._lit = bench, sight, radius, lit
@@ -132,7 +133,8 @@ class _PressProblem:
         return self._sight.missed(self._bench.change(ball)[self._sight.counts])[0].ravel()
 
     def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares, grey levels squared, at x (3,) or (4,) m; infinite off picture or table."""
+        """Return half the sum of squares, levels squared, at x (3,) or (4,) m; infinity far off the picture or
+        table."""
         radius = x[3] if len(x) > 3 else self._radius
         inside = np.abs(x[0]) < -2 * self._bench.right[0, 0] and np.abs(x[1]) < -2 * self._bench.down[0, 0]
         if not (inside and x[2] >= SHALLOWEST and SMALLEST_BALL <= radius <= LARGEST_BALL):
@@ -143,12 +145,12 @@ class _PressProblem:
         return float(np.square(self._last).sum() / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return x: ``cost`` rejects what lies outside picture and table."""
+        """Return x unchanged: ``cost`` rejects what lies outside picture and table."""
         return x
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return J^T J (n, n), grey levels squared / m2, and J^T r (n,), grey levels squared / m: r are the residuals,
-        J their derivatives by the n numbers of x. `cost` must have been called last with this x, whose r are used."""
+        """Return J^T J (n, n), grey levels squared / m2, and J^T r (n,), grey levels squared / m; r are the residuals,
+        J their derivatives by x (n,). `cost` must have been called last with this x: its residuals are used."""
         last = self._last
         jacobian = np.stack([(self._missed(x + step) - last) / STEP for step in STEP * np.eye(len(x))], -1)
         return jacobian.T @ jacobian, jacobian.T @ last
@@ -166,10 +168,10 @@ def contact_radius(depth: float, radius: float) -> float:
 def missing_light(
     bench: BallPictures, sight: Sight, ball: tuple[float, float, float, float]
 ) -> tuple[np.ndarray, float]:
-    """Fit the light of the object that comes through the coating and that the picture of a ball lacks.
-    bench : draws balls; ball : its right, down, depth and radius, m
-    Returns the residual (n, 3), grey levels, of the picture with that light, and the light over that of a coating that
-    faces the LEDs, by least squares."""
+    """Fit, by least squares, the object's light through the coating that the unit's picture of a ball lacks.
+    bench : draws balls; ball : its right, down, depth and radius, m; sight : of the photograph
+    Returns the residual (n, 3), grey levels, of the picture with that light; and the light, as a share of that of a
+    coating that faces the LEDs."""
     missed, slope = sight.missed(bench.change(ball)[sight.counts])
     white = slope * bench.white(ball)[sight.counts]
     more = -float((white * missed).sum()) / float((white * white).sum() + (MODEL_ERROR / LIKELY) ** 2)

@@ -1,8 +1,8 @@
-"""The sum of squares that a unit's calibration minimises: photographs of presses against their pictures.
+"""The sum of squares that a unit's calibration minimises: presses' pictures less their photographs, and priors.
 
 The unknowns are the unit's numbers and three numbers per press. The gain C is solved for at each step and eliminated
 (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973), by Gauss-Newton steps, since the camera's toe
-and shoulder are not linear. Gaussian priors of units (assumed) determine the numbers that few photographs do not."""
+and shoulder are not linear. Gaussian priors (units' assumed spread) determine numbers that few photographs do not."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SMALLEST_RADIUS, LARGEST_RADIUS = 0.1, 8.0  # mm; the gel's window is 18 mm wide
 
 
 def parameters_of(calibration: Calibration) -> np.ndarray:
-    """Return a calibration's numbers (22,) by ``NAMES``: of camera, dome, coating, then of each LED in turn."""
+    """Return a calibration's numbers (22,) in the order of ``NAMES``: camera, dome, coating, then each LED."""
     camera = calibration.camera
     lights = zip(calibration.leds, calibration.ambient_rise, strict=True)
     leds = [value for led, rise in lights for value in (*(1e3 * mm for mm in (*led.position, led.radius)), 1e-3 * rise)]
@@ -53,7 +53,7 @@ def parameters_of(calibration: Calibration) -> np.ndarray:
 
 
 def with_parameters(calibration: Calibration, numbers: np.ndarray) -> Calibration:
-    """Return a calibration with other numbers (22,), by ``NAMES``, its gain kept; raises TactileError out of range."""
+    """Return the calibration with other numbers (22,), by ``NAMES``, and its gain. Raises TactileError out of range."""
     scale_x, scale_y, height, dome, albedo, spread, through = (float(value) for value in numbers[:FIRST_LED])
     shares = np.asarray(calibration.coating.albedo)
     of_red, of_green, of_blue = (shares * (albedo / shares.mean())).tolist()
@@ -81,18 +81,17 @@ PRESS_STEP = 10e-3  # mm
 
 @dataclasses.dataclass(frozen=True)
 class _Lights:
-    """Radiance of a press. changes : (3, p), LED and counted pixel; terms : (9, p), the same times 1, right, down in
-    mm"""
+    """Light of a press on p pixels. changes : (3, p), by LED; terms : (9, p), changes times 1, right (mm), down (mm)"""
 
     changes: np.ndarray
     terms: np.ndarray
 
 
 class UnitResiduals:
-    """Cost and normal equations of x = the unit's free numbers, then right, down, depth of each press in mm.
-    start : the calibration that the priors are centred on, in working pixels; sights : a photograph's data each
-    radius : m, of balls for which none is given
-    free : (22,) bool, which of the unit's numbers may change; pictures : class that draws them"""
+    """Cost and normal equations over x = the unit's free numbers, then right, down, depth of each press in mm.
+    start : calibration in reduced pixels, the priors' mean; sights : one for each photograph
+    radius : m, of balls whose press gives none
+    free : (22,) bool, which of the unit's numbers may change; pictures : class that draws the unit's pictures"""
 
     def __init__(
         self,
@@ -115,7 +114,7 @@ class UnitResiduals:
         self.gain = self._start_gain
 
     def unit(self, x: np.ndarray) -> Calibration:
-        """Return the calibration of x (n,), with the gain of the last accepted cost."""
+        """Return the calibration that x (n,) describes, with the gain found at the last cost."""
         numbers = self._numbers.copy()
         numbers[self._free] = x[: self._free.sum()]
         centre, right, down = (tuple(map(tuple, part.tolist())) for part in np.split(self.gain, 3, axis=1))
@@ -128,11 +127,11 @@ class UnitResiduals:
         return with_parameters(self._start.with_gain(gain), numbers)
 
     def balls(self, x: np.ndarray) -> np.ndarray:
-        """Return each press's ball (n, 3) of x: right, down, depth, mm."""
+        """Return the balls (presses, 3) that x (n,) describes: right, down, depth, mm."""
         return x[self._free.sum() :].reshape(-1, 3)
 
     def cost(self, x: np.ndarray) -> float:
-        """Return half the sum of squares at x (n,), with the best gain; infinity where a number is meaningless."""
+        """Return half the sum of squares at x (n,), with the best gain; infinity if a number is meaningless."""
         if not self._sensible(x):
             return np.inf
         try:
@@ -151,18 +150,19 @@ class UnitResiduals:
         return float(cost / 2)
 
     def inside(self, x: np.ndarray) -> np.ndarray:
-        """Return the nearest x (n,) that ``cost`` takes: its light through the coating is at least 0."""
+        """Return x (n,), its light through the coating 0 if it was below."""
         least = np.full(len(x), -np.inf)
         least[: self._free.sum()][np.flatnonzero(self._free) == OBJECT_LIGHT] = 0
         return np.maximum(x, least)
 
     def unexplained(self) -> np.ndarray:
-        """Return the share (n,) of each photograph's squares that the last cost leaves."""
+        """Return the share (presses,) of each photograph's sum of squares that the last cost leaves as residual."""
         pairs = zip(self._missed(), self._sights, strict=True)
         return np.array([np.square(missed).sum() / np.square(sight.shown).sum() for (missed, _), sight in pairs])
 
     def gain_errors(self) -> tuple[float, float, float]:
-        """Return standard errors of the gain and its two slopes, per mm, rms over LEDs, at the last cost's presses."""
+        """Return standard errors, rms over LEDs, of the gain and its slopes per mm to right and down, at the last
+        cost."""
         inverse = np.linalg.inv(self._gain_equations()[0])  # (channel, 9, 9)
         squares = MODEL_ERROR**2 * inverse.diagonal(0, 1, 2).mean(0).reshape(3, 3).mean(1)
         return tuple(np.sqrt(squares).tolist())
@@ -183,8 +183,8 @@ class UnitResiduals:
         return np.concatenate([changes, right * changes, down * changes])
 
     def _missed(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return residuals (3, p), levels, of each press's p counted pixels, and slopes (3, p) of the camera's
-        curve."""
+        """Return each press's residuals (3, p), levels, of its p pixels that count, and the camera curve's slopes (3,
+        p)."""
         pairs = zip(self._last, self._sights, strict=True)
         found = (sight.missed((self.gain @ lights.terms).T) for lights, sight in pairs)
         return [(missed.T, slope.T) for missed, slope in found]
@@ -199,8 +199,8 @@ class UnitResiduals:
         return matrix, gradient
 
     def normal_equations(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return Gauss-Newton's matrix (n, n), gradient (n,) at x (n,), gain eliminated (Schur's complement): A - sum
-        over channels of B G^-1 B^T, A of x alone, G of the gain, B mixed. The gain's gradient is 0 at its optimum."""
+        """Return Gauss-Newton's matrix (n, n), gradient (n,) at x (n,), gain eliminated (Schur complement): A - sum
+        over channels of B G^-1 B^T; A for x, G for the gain, B mixed. The gain's gradient is 0 at its optimum."""
         self.cost(x)
         count, free = len(x), int(self._free.sum())
         matrix, gradient = np.zeros((count, count)), np.zeros(count)
@@ -222,8 +222,8 @@ class UnitResiduals:
         return matrix, gradient
 
     def _steps_of_unit(self, numbers: np.ndarray) -> list[np.ndarray]:
-        """Return derivatives (3, free, p) of each press's picture, channel first, by the free ones of the unit's
-        numbers (22,): forward differences."""
+        """Return for each press the derivatives (3, free, p) of its picture, channel first, by the free ones of the
+        unit's numbers (22,), by forward differences."""
         slopes = [np.zeros((3, int(self._free.sum()), lights.changes.shape[1])) for lights in self._last]
         column = {number: k for k, number in enumerate(np.flatnonzero(self._free).tolist())}
         for group in TOGETHER:
@@ -241,8 +241,8 @@ class UnitResiduals:
         return slopes
 
     def _moved(self, numbers: np.ndarray, group: tuple[int, ...]) -> tuple[BallPictures, int]:
-        """Return pictures with the numbers (22,) whose indices are in ``group`` one step larger, and 1; or one step
-        smaller, and -1, where a unit cannot have more."""
+        """Return pictures with the numbers (22,) of the indices ``group`` one step larger, and 1; or, if a unit cannot
+        have such numbers, one step smaller, and -1."""
         moved = np.zeros_like(numbers)
         moved[list(group)] = STEP[list(group)]
         try:

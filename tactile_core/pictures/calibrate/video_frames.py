@@ -21,8 +21,8 @@ SHALLOW = 0.3  # of the deepest press's change; a weaker peak is part of another
 
 
 def frames_of(path: Path) -> dict[str, np.ndarray]:
-    """Return frames (H, W, 3) uint8 by "FILE#NUMBER": the deepest of each press, and some of the untouched gel.
-    Raises TactileError for no video of OpenCV's, or one too long or large; ModuleNotFoundError without OpenCV."""
+    """Return frames (H, W, 3) uint8 by "FILE#NUMBER": the deepest of each press, and some of the untouched gel. Raises
+    TactileError for a file that OpenCV cannot read or that is too long or large; ModuleNotFoundError without OpenCV."""
     installed.require("camera", "cv2")
     small = np.stack([_small(frame) for frame in _read(path)])
     change = np.abs(small - np.median(small, axis=0).astype(np.float32)).max(-1) > CHANGE
@@ -35,7 +35,7 @@ def frames_of(path: Path) -> dict[str, np.ndarray]:
 
 
 def _wanted(changed: np.ndarray) -> set[int]:
-    """Return the indices of the frames to take, from the count of small pixels (n,) that changed in each."""
+    """Return the indices of the frames to take; changed : (n,), how many pixels of each, made small, have changed"""
     touched = np.r_[False, changed >= LEAST, False]
     edges = np.flatnonzero(touched[1:] != touched[:-1]).reshape(-1, 2)
     deepest = np.array([first + changed[first:end].argmax() for first, end in edges], int)
@@ -44,7 +44,7 @@ def _wanted(changed: np.ndarray) -> set[int]:
 
 
 def _spread(numbers: np.ndarray, most: int) -> list[int]:
-    """Return at most ``most`` of ``numbers`` (n,), indices of frames, evenly spread."""
+    """Return at most ``most`` of the frames' indices ``numbers`` (n,), evenly spread."""
     places = np.linspace(0, len(numbers) - 1, min(most, len(numbers))).round().astype(int)
     return numbers[places].tolist()
 

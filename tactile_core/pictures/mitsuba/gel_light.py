@@ -1,4 +1,4 @@
-"""Radiance of the gel in a scene of Mitsuba's, compiled by LLVM: by our integrator, or by Mitsuba's paths."""
+"""Radiance of the gel by Mitsuba with LLVM, in a compiled scene: by our own integrator, or by Mitsuba's path tracer."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ PATHS_A_PASS = 64  # per pixel; a square number, as the stratified sampler needs
 
 
 class GelLight:
-    """Radiance by one preset; scenes are made once, only the gel's vertices change. The coating's spread is not
-    included: ``Renderer`` adds it (``coating_spread``). rest : (H, W) m, heights that the scene starts with
+    """Radiance of a gel by one preset; scenes are made once, only the gel's vertices change. The coating's spread is
+    not included: ``Renderer`` adds it (``coating_spread``). rest : (H, W) m, heights that the scene starts with
     surroundings : lamps and bodies beside the unit's own; seed : of the reference's random numbers"""
 
     def __init__(
@@ -51,10 +51,10 @@ class GelLight:
         self._look(mi)
 
     def change_unit(self, unit: Calibration) -> None:
-        """Change to another unit with as many pixels in 10 ms, without compiling the scene again.
+        """Change to another unit of as many pixels, in 10 ms, without compiling the scene again.
 
         Its LEDs, camera, coating and index may differ in numbers, not in kind (the material's name; a sphere so small
-        that it is a point). Raises TactileError for a preset of paths, with further lamps, and for another kind."""
+        that it is a point). Raises TactileError for another kind, and for a preset of paths."""
         mi = activate(LLVM)
         mesh = GelMesh(unit.camera, self.preset.spacing)
         same = plugin_names(unit) == plugin_names(self.unit) and unit.camera.shape == self.unit.camera.shape
@@ -112,7 +112,8 @@ class GelLight:
         return found
 
     def refined(self, height_map: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m; of traced paths the mean so far after each pass."""
+        """Yield ``radiance`` (H, W, LED) of a height_map (H, W) m, once; by traced paths the mean so far after each
+        pass."""
         height = np.asarray(height_map, np.float32)
         vertices = self._mesh.vertices(height)
         check_mesh(vertices, self._mesh.faces, self._mesh.count)
@@ -130,7 +131,7 @@ class GelLight:
         yield found if self._coarse is None else found + self._bounced(mi)
 
     def _hit(self, ray: Any) -> Any:
-        """Intersect rays with the scene; the gel's shading normals are those of the map's slopes."""
+        """Return the rays' intersections with the scene, with shading normals by the slopes of the height map."""
         mi = activate(LLVM)
         import drjit as dr
 
@@ -160,7 +161,7 @@ class GelLight:
         return radiance
 
     def _bounced(self, mi: Any) -> np.ndarray:
-        """Light (H, W, 3) of one bounce, gathered on a coarse grid."""
+        """Return the light (H, W, 3) of one bounce, gathered on a coarse grid."""
         camera, step = self.unit.camera, self.preset.bounce_step
         shape = camera.height // step, camera.width // step
         hit = self._hit(self._coarse)

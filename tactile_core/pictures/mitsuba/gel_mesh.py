@@ -22,10 +22,10 @@ MOST_MISSED = 1e-3  # share of rays; measured: 1e-6 slip through
 class GelMesh:
     """Vertices and faces of height maps under one camera. Mesh coordinates: right, up and toward the camera, mm.
 
-    With square pixels, up is scaled: lines stay straight, so visibility is right, but lengths and angles are not."""
+    For square pixels, up is scaled: lines stay straight, so visibility is right, but lengths and angles are not."""
 
     def __init__(self, camera: Camera, spacing: float = SPACING, *, square: bool = False) -> None:
-        """Take spacing : m between vertices, in whole pixels; square : true scales the up axis for square pixels."""
+        """Take a camera; spacing : m between vertices, in whole pixels; square : true scales up, for square pixels."""
         self.camera = camera
         right, down = camera.pixel_size
         self.up_scale = right / down if square else 1.0
@@ -42,7 +42,7 @@ class GelMesh:
         self.count = len(along) * len(across)
 
     def vertices(self, height: np.ndarray) -> np.ndarray:
-        """Return the vertices (n, 3) float32 in mesh coordinates of heights ``height`` (H, W) m."""
+        """Return the vertices (n, 3) float32, mesh coordinates, of a gel of ``height`` (H, W) m."""
         self._plan[..., 2] = height[np.ix_(self._rows, self._columns)] * MM
         return self._plan.reshape(-1, 3).copy()
 
@@ -54,14 +54,14 @@ class GelMesh:
         return found.reshape(-1, 3).astype(np.float32)
 
     def shape(self, mi: Any, height: np.ndarray, *, smooth: bool = False) -> Any:
-        """Return the gel of height (H, W) m as a mesh of Mitsuba's, the module ``mi``; smooth : give it normals. Raises
-        TactileError as ``check_mesh`` does."""
+        """Return the gel of height (H, W) m as a mesh of Mitsuba's module ``mi``; smooth : true gives it normals.
+        Raises TactileError for heights that are not finite."""
         vertices = self.vertices(height)
         check_mesh(vertices, self.faces, self.count)
         return triangle_mesh(mi, "gel", vertices, self.faces, smooth=smooth)
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the lowest and highest corner (3,) of the plane of height zero, mesh coordinates."""
+        """Return the lowest and the highest corner (3,) of the mesh at height zero, mesh coordinates."""
         flat = self._plan[..., :2].reshape(-1, 2)
         return np.r_[flat.min(0), 0.0].astype(float), np.r_[flat.max(0), 0.0].astype(float)
 
@@ -71,7 +71,7 @@ class GelMesh:
 
 
 def _kept(count: int, step: int) -> np.ndarray:
-    """Indices of every step-th of count pixels, and of the last one."""
+    """Return the indices of every ``step``-th of ``count`` pixels, and of the last one."""
     kept = np.arange(0, count, step)
     return kept if kept[-1] == count - 1 else np.r_[kept, count - 1]
 
@@ -91,8 +91,8 @@ def triangle_mesh(mi: Any, name: str, vertices: np.ndarray, faces: np.ndarray, *
 
 
 def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
-    """Fill pixels whose rays missed the gel from their neighbours, in place. missed : (H, W) bool; maps : (H, W, ...).
-    A ray in a million slips between two triangles. Raises TactileError where more have missed."""
+    """Fill pixels whose rays missed the gel from a neighbour, in place. missed : (H, W) bool; maps : (H, W, ...). A ray
+    in a million slips between two triangles. Raises TactileError if over 0.1 % have missed."""
     if missed.mean() > MOST_MISSED:
         found = f"{missed.sum()} of {missed.size} rays miss it"
         raise TactileError("gel mesh", found, "a gel that fills the picture", "Check heights and camera")
@@ -102,9 +102,8 @@ def mend(missed: np.ndarray, *maps: np.ndarray) -> None:
 
 
 def check_mesh(vertices: np.ndarray, faces: np.ndarray, count: int) -> None:
-    """Refuse a mesh on which Mitsuba would crash or leave holes.
-    vertices (n, 3), faces (m, 3); count : number of vertices that the scene was made with
-    Raises TactileError for another number of vertices, values that are not finite, or a face with a missing vertex."""
+    """Raise TactileError for a mesh on which Mitsuba would crash or leave holes: with a number of vertices (n, 3) other
+    than ``count``, that of the scene, with values that are not finite, or with faces (m, 3) of missing vertices."""
     if vertices.shape != (count, 3):
         raise TactileError("gel mesh, vertices", f"shape {vertices.shape}", f"({count}, 3)")
     if not np.isfinite(vertices).all():

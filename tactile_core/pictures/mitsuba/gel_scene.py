@@ -24,14 +24,14 @@ _BLACK = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.0] * 3}}
 
 
 def gel_shape(mi: Any, mesh: GelMesh, height: np.ndarray, unit: Calibration, *, smooth: bool) -> Any:
-    """Return the gel as a mesh of Mitsuba's with its coating; height : (H, W) m; smooth : give its vertices normals."""
+    """Return the coated gel of height (H, W) m as a mesh of Mitsuba's; smooth : true gives its vertices normals"""
     gel = mesh.shape(mi, height, smooth=smooth)
     gel.set_bsdf(mi.load_dict(material(unit.coating, unit.gel_index)))
     return gel
 
 
 def material(coating: Coating, gel_index: float) -> dict[str, Any]:
-    """Return a coating, under gel of the refractive index ``gel_index``, as Mitsuba's plugin."""
+    """Return a coating as Mitsuba's plugin; gel_index : refractive index of the gel on it"""
     albedo = {"type": "rgb", "value": list(coating.albedo)}
     if coating.bsdf == DIFFUSE:
         return {"type": "diffuse", "reflectance": albedo}
@@ -47,12 +47,12 @@ def material(coating: Coating, gel_index: float) -> dict[str, Any]:
 
 
 def _outer_index(gel_index: float) -> float:
-    """Return gel_index, moved off the clear coat's: Mitsuba refuses equal indices, which reflect nothing."""
+    """Return gel_index, changed a little if it equals the clear coat's: Mitsuba refuses equal indices."""
     return gel_index if abs(gel_index - PIGMENT_INDEX) > LEAST_STEP else PIGMENT_INDEX - LEAST_STEP
 
 
 def lamps(unit: Calibration) -> dict[str, Any]:
-    """Return the LEDs, by colour, as Mitsuba's plugins: black spheres that shine, or points where that small."""
+    """Return the LEDs, by colour, as Mitsuba's plugins: black spheres that shine, or points if they are very small."""
     return {led.colour: _lamp(led) for led in unit.leds}
 
 
@@ -64,7 +64,7 @@ def _lamp(led: Led) -> dict[str, Any]:
 
 def sphere_lamp(position: Sequence[float], radius: float, brightness: Sequence[float]) -> dict[str, Any]:
     """Return a lamp as Mitsuba's plugin. position : (right, down, toward the camera) m
-    radius : m, 0 for a point, as is one below 0.01 of the distance
+    radius : m; a lamp of 0, or of less than 0.01 of its distance, is a point
     brightness : (3,) radiance x radius^2, levels m2, in the bands of the red, green and blue LED"""
     if radius < POINTLIKE * np.linalg.norm(position):
         intensity = [value * np.pi * MM**2 for value in brightness]  # of an evenly bright disc
@@ -83,8 +83,8 @@ def plugin_names(unit: Calibration) -> list[str]:
 
 
 def change_numbers(mi: Any, lights: Any, gel: Any, unit: Calibration) -> None:
-    """Give loaded LEDs and gel another unit's numbers. lights, gel : results of ``traverse`` on their scenes. The
-    plugins stay the same, so nothing is compiled again."""
+    """Give loaded LEDs and gel another unit's numbers, in place. lights, gel : results of ``traverse`` on their scenes.
+    The plugins stay the same, so nothing is compiled again."""
     for name, lamp in lamps(unit).items():
         if lamp["type"] == "point":
             lights[f"{name}.position"] = lamp["position"]
@@ -130,7 +130,7 @@ def walls(unit: Calibration, mesh: GelMesh) -> dict[str, Any]:
 
 
 def to_scene(place: Sequence[float]) -> list[float]:
-    """Return a place right, down, toward the camera in m, in the scene's mm."""
+    """Convert a place (right, down, toward the camera) m to the scene's (right, up, toward the camera) mm."""
     return [place[0] * MM, -place[1] * MM, place[2] * MM]
 
 
@@ -155,7 +155,7 @@ class Occluder:
 
 @dataclasses.dataclass(frozen=True)
 class Surroundings:
-    """All lamps beside a unit's own, and ``occluders``, bodies in the light's way."""
+    """Lamps beside a unit's own, and ``occluders``, bodies in the light's way."""
 
     lamps: tuple[Lamp, ...] = ()
     occluders: tuple[Occluder, ...] = ()

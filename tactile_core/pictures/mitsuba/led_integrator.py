@@ -23,7 +23,7 @@ DIRECTIONS = RINGS * SPOKES
 
 
 class EmitterLight(NamedTuple):
-    """Light of one emitter: its radiance without occluders, and the share that arrives."""
+    """Light of one emitter that surface points reflect: unobstructed (``open``), and the share that is not blocked."""
 
     open: Any
     share: Any
@@ -32,8 +32,8 @@ class EmitterLight(NamedTuple):
 def direct(
     mi: Any, scene: Any, emitters: Sequence[Any], hit: Any, points: int, phase: Any, lobe: Any = None
 ) -> list[EmitterLight]:
-    """Compute the light of each of the emitters at surface interactions ``hit``, from ``points`` points on the emitter.
-    mi : Mitsuba's module; scene : the occluders; phase : 0..1, rotates the points, in shares of their distance
+    """Return the light of each of the emitters at surface interactions ``hit``, from ``points`` points on the emitter.
+    mi : Mitsuba's module; scene : what blocks light; phase : 0..1, shifts the points, in shares of their distance
     lobe : cosine of the half vector beyond which light near the mirror's direction is left out; None for none"""
     import drjit as dr
 
@@ -59,8 +59,8 @@ def direct(
 def bounced(
     mi: Any, meet: Callable[[Any], Any], scene: Any, emitters: Sequence[Any], hit: Any, phase: Any, lobe: Any = None
 ) -> np.ndarray:
-    """Return the radiance (n, 3) of n surface interactions by light that other places reflect onto them, once.
-    meet : function that intersects rays; scene : occluders; emitters : lights
+    """Return the radiance (n, 3) at n surface interactions of light that one other place has reflected onto them.
+    mi : Mitsuba's module; meet : function that intersects rays; scene : what blocks light; emitters : lights
     hit : the interactions, each 16 times; phase : 0..1 of each, rotates its directions
     lobe : cosine of the half vector at the reflecting place beyond which light is left out, or None"""
     import drjit as dr
@@ -87,7 +87,7 @@ STEEPEST = 0.05  # least cosine between a pixel's surface and the camera
 
 
 def narrow_lobe(coating: Coating) -> tuple[float, float] | None:
-    """GGX's alpha of a coating's highlights and the cosine at their lobe's end; None for wide or no highlights."""
+    """Return the GGX alpha of a coating's highlights and the cosine at their lobe's end; None if wide or absent."""
     alpha = coating.roughness**2 if coating.bsdf == PRINCIPLED else coating.roughness
     if coating.bsdf == DIFFUSE or alpha > NARROW:
         return None
@@ -106,11 +106,11 @@ def mirrored(
     to_cell: Callable[[Any], Any],
     shape: tuple[int, int],
 ) -> np.ndarray:
-    """Compute the radiance (h, w, 3) of the picture's cells by light that other places mirror onto them, not smoothed.
-    meet : function that intersects rays; scene : the occluders; shape : (h, w)
+    """Return the radiance (h, w, 3) in a picture's cells of light that other places mirror onto them, not smoothed.
+    mi : Mitsuba's module; meet : function that intersects rays; scene : what blocks light; shape : (h, w)
     hit : the mirroring places, each 16 times, each standing for as much of the picture as a cell of the result
     phase : 0..1 of each, rotates its directions; lobe : alpha, and the cosine at its end
-    camera_height : mm; to_cell : (column, row) at which the camera sees a point"""
+    camera_height : mm; to_cell : function from a point to the (column, row) at which the camera sees it"""
     import drjit as dr
 
     number = mi.Float(dr.arange(mi.UInt32, dr.width(phase)) % DIRECTIONS)
@@ -146,8 +146,8 @@ def mirrored(
 
 
 def _deposited(cell: np.ndarray, light: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Sum light (3, n) into (h, w, 3), each shared among the four cells around its (column, row) of cell (2, n). In
-    numpy, whose sums have one order: Mitsuba's threads add in another each time."""
+    """Return the sum (h, w, 3) of light (3, n), each shared among the four cells around its (column, row) of cell (2,
+    n). Numpy sums in one order, Mitsuba's threads in another each time."""
     some = light.any(0)
     light, (column, row) = light[:, some], cell[:, some]
     left, upper = np.floor(column).astype(int), np.floor(row).astype(int)

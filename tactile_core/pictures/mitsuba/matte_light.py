@@ -29,7 +29,7 @@ _EVEN = 1 / 1.1673039782614187 ** np.arange(1, 5)
 
 
 class MatteLight:
-    """Radiance by one of Mitsuba's presets without LLVM, on a matte coating; the caller checks the arguments.
+    """Radiance of a gel with a matte coating by one of Mitsuba's presets without LLVM; arguments are not checked.
     variant : llvm_ad_rgb or scalar_rgb; rest : (H, W) m, heights to start with; seed : of the light points"""
 
     def __init__(self, unit: Calibration, preset: Preset, variant: str, rest: np.ndarray, seed: int) -> None:
@@ -43,7 +43,8 @@ class MatteLight:
         return self.completed(height, *self.direct(height))
 
     def direct(self, height: np.ndarray) -> tuple[np.ndarray, Surface]:
-        """Return the radiance (H, W, LED) float32, by the LEDs alone, of ``height`` (H, W) m, and the surface seen."""
+        """Return the radiance (H, W, LED) float32, by LEDs alone, of ``height`` (H, W) m, and the surface that pixels
+        see."""
         self._tracer.load(height)
         tilt = slopes(height, self.unit.camera)
         total, first = self._one_pass(0, tilt)
@@ -53,7 +54,7 @@ class MatteLight:
 
     def completed(self, height: np.ndarray, direct: np.ndarray, hits: Surface) -> np.ndarray:
         """Return the radiance (H, W, LED) with the preset's other effects: interreflection, refraction at the window.
-        height : (H, W) m, of the gel; direct, hits : what ``direct`` returned for it"""
+        height : (H, W) m, of the gel; direct, hits : what the method ``direct`` returned for it"""
         radiance, preset = direct, self.preset
         if preset.gather and any(self.unit.coating.albedo):
             radiance = direct + interreflection(height, direct, hits, self.unit, preset.gather)
@@ -95,7 +96,7 @@ def direct_light(
 
 def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray, soften: bool) -> None:
     """Replace ``facing`` (H, W), cosine times distance of a light's middle, in place, by the mean over its visible
-    points. These are so close together that they differ in direction alone: n . (l + d), d from the middle to a point.
+    points. These are so close together that only their direction differs: n . (l + d), d from the middle to a point.
     seen : (H, W) uint32, bit k for point k visible; cloud : (n, 3) m, the points; soften : smooth over 3 x 3 pixels"""
     every = 2 ** len(cloud) - 1
     box = bounding_box(seen != every, margin=1)
@@ -112,20 +113,20 @@ def _dim(facing: np.ndarray, hits: Surface, seen: np.ndarray, cloud: np.ndarray,
 
 
 def light_points(led: Led, count: int) -> np.ndarray:
-    """Return points (count, 3) m, image frame, around the light's middle, in the plane that faces the picture's middle:
-    a ring of sqrt(1/2) of its radius, which has the second moments of an even disc."""
+    """Return points (count, 3) m, image frame, that stand for an LED: a ring around its middle that faces the picture's
+    middle, with sqrt(1/2) of its radius and so the second moments of an even disc."""
     angle = 2 * np.pi * np.arange(count) / count
     return led.position + led.radius * np.sqrt(0.5) * _across(led, np.cos(angle), np.sin(angle))
 
 
 def sphere_points(led: Led, count: int, turn: float, depth: float) -> np.ndarray:
-    """Return points (count, 3) m, image frame, that together shine as an evenly bright sphere does.
+    """Return points (count, 3) m, image frame, that together shine like an evenly bright sphere.
 
     They fill the ball with density 1 / sqrt(1 - r^2), which shows an even disc to every side (Abel's transform).
     Without occluders such a cloud lights exactly as its middle would: the light of a point falls on a surface as the
     gradient of 1 / distance, to which Newton's shell theorem applies. Seen from the picture's middle they are a
-    sunflower.
-    turn, depth : 0..1, where the pattern starts, across and along the line from there"""
+    sunflower's seeds.
+    turn, depth : 0..1, where the pattern starts, across and along the line from the picture's middle"""
     number = np.arange(count)
     radius = np.sqrt((number + (turn * 7 % 1)) / count)  # the rings move as the pattern turns
     angle = number * _GOLDEN_ANGLE + 2 * np.pi * turn
@@ -150,9 +151,9 @@ REACH = 16e-3  # m, the whole picture and its rim: in a bowl each distance contr
 def interreflection(
     height: np.ndarray, direct: np.ndarray, hits: Surface, unit: Calibration, gather: Gather
 ) -> np.ndarray:
-    """Return the radiance (H, W, LED) float32 that the gel's own light adds to the pixels.
+    """Return the radiance (H, W, LED) float32 that light from the gel itself adds to the pixels.
     height : (H, W) m; direct : (H, W, LED) radiance of the pixels without it; hits : the surface that they see
-    gather : resolution, here and in ``irradiance``"""
+    gather : resolution of the sum"""
     camera, step = unit.camera, gather.step
     spacing = camera.pixel_size[0] * step, camera.pixel_size[1] * step
     first = step // 2
@@ -181,7 +182,7 @@ def _axis(first: float, step: float, count: int, margin: int) -> np.ndarray:
 def _on_gel(
     height: np.ndarray, right: np.ndarray, down: np.ndarray, direct: np.ndarray, unit: Calibration, margin: int
 ) -> np.ndarray:
-    """Return the radiance (h, w, 3) of a coarse map of gel: inside, the picture's; on the rim, unshadowed; beyond, 0.
+    """Return the radiance (h, w, 3) of a coarse map of gel: the picture's inside, unshadowed on the rim, 0 beyond.
     height : (h, w) m; right : (w,), down : (h,) m, its axes; margin : cells on each side that lie outside the picture
     direct : (H, W, 3) radiance of the picture by the LEDs alone"""
     camera = unit.camera
@@ -230,9 +231,9 @@ def irradiance(
 
 
 def _weight(tangent: np.ndarray, aside: np.ndarray, level: np.ndarray) -> np.ndarray:
-    """Return the cosine-weighted solid angle (...) below an elevation, a radian of azimuth: integral of (n . w) cos(e)
-    de from -90, up to a constant. With w = (cos e, sin e) in the plane of the azimuth and n = (aside, level) there.
-    tangent : (...), of the elevation"""
+    """Return the cosine-weighted solid angle (...) below an elevation, per radian of azimuth and up to a constant:
+    integral of (n . w) cos(e) de from -90 degrees, w = (cos e, sin e) and n = (aside, level) (...) in the plane of the
+    azimuth. tangent : (...), of the elevation"""
     share = tangent / (1 + tangent * tangent)
     return 0.5 * (aside * (np.arctan(tangent) + share) + level * (tangent * share))
 
@@ -246,7 +247,7 @@ def _distances(step: float, reach: float, growth: float) -> list[float]:
 
 
 def _shifted(field: np.ndarray, right: float, down: float, margin: int) -> np.ndarray:
-    """Return the field (h, w, k) shifted by fractions of cells, right and down, without its margin of cells."""
+    """Return the field (h, w, k) shifted by right and down, fractions of cells, without its margin of cells."""
     column, row = int(np.floor(right)), int(np.floor(down))
     s, t = np.float32(right - column), np.float32(down - row)
     height, width = field.shape[0] - 2 * margin, field.shape[1] - 2 * margin

@@ -82,13 +82,13 @@ def write_scene(path: str | os.PathLike, unit: Calibration, height_map: np.ndarr
 
 
 def square_pixels(camera: Camera) -> Camera:
-    """Return the same view with square pixels; the number of rows follows, to half a row."""
+    """Return the camera with the same view in square pixels: the number of rows changes, right to half a row."""
     rows = round(camera.height * camera.px_per_mm_x / camera.px_per_mm_y)
     return dataclasses.replace(camera, height=rows, px_per_mm_y=camera.px_per_mm_x)
 
 
 def camera_planes(unit: Calibration, ambient: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the planes (H, W) of an EXR file: response.R.red, ... and ambient.R, ... ambient : (H, W, 3) levels"""
+    """Return an EXR file's planes (H, W) by name, response.R.red and ambient.R etc. ambient : (H, W, 3) levels"""
     response = unit.pixel_response.astype(np.float32)
     planes = {f"ambient.{name}": ambient[..., k] for k, name in enumerate("RGB")}
     for k, name in enumerate("RGB"):

@@ -1,6 +1,6 @@
-"""Trace, by Mitsuba, where pixels' rays meet the gel, and which light points are visible from there.
+"""Trace by Mitsuba where pixels' rays meet the gel, and which points of the lights are visible from there.
 
-One persistent scene per tracer; only the gel's vertices change. Both variants trace one mesh with the same rays, so
+A tracer keeps one scene, in which only the gel's vertices change. Both variants trace one mesh with the same rays, so
 they agree but for rounding. Never dr.freeze here: with moving vertices it gives wrong pixels (blender.md)."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ BEHIND_MM = 1e3  # nothing of the gel lies farther behind the plane of height ze
 
 
 class Tracer(abc.ABC):
-    """Renderer of one scene in one ``variant`` of Mitsuba's. height : (H, W) m, of the gel, until ``load``"""
+    """Traces one scene by a ``variant`` of Mitsuba. height : (H, W) m, of the gel, until ``load`` gives others"""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         self.mesh, self.variant = mesh, variant
@@ -54,7 +54,7 @@ def make_tracer(mesh: GelMesh, height: np.ndarray, variant: str) -> Tracer:
 
 class _LlvmTracer(Tracer):
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Trace all pixels and points in one compiled kernel; see ``Tracer.trace``."""
+        """Trace all pixels and points in one compiled kernel; arguments and result: see ``Tracer.trace``."""
         mi = activate(self.variant)
         import drjit as dr
 
@@ -84,7 +84,7 @@ class _LlvmTracer(Tracer):
 
 
 class _ScalarTracer(Tracer):
-    """Renderer with one render for the places and one for each point, so that loops over pixels stay inside Mitsuba."""
+    """Traces by one render for the places and one for each point, so that loops over pixels stay inside Mitsuba."""
 
     def __init__(self, mesh: GelMesh, height: np.ndarray, variant: str) -> None:
         super().__init__(mesh, height, variant)
@@ -92,7 +92,7 @@ class _ScalarTracer(Tracer):
         self._lit = self.mi.load_dict({"type": "direct", "emitter_samples": 1, "bsdf_samples": 0})
 
     def around(self) -> dict[str, Any]:
-        """Return a point light, which goes to each point in turn, and the camera."""
+        """Return a camera, and a point light that ``trace`` moves to each point in turn."""
         camera = self.camera
         half_width = camera.width / 2 * camera.pixel_size[0]
         transform = self.mi.ScalarTransform4f()
@@ -109,7 +109,7 @@ class _ScalarTracer(Tracer):
         return {"light": {"type": "point", "position": [0, 0, 10]}, "eye": eye}
 
     def trace(self, points: np.ndarray, shift: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-        """Trace points (n, 3) m at a shift as ``Tracer.trace`` says; a point is seen where its light arrives."""
+        """Trace points (n, 3) m, see ``Tracer.trace``, at a shift; a point is seen if its light arrives."""
         mi = activate(self.variant)
         for axis, size, move in (("x", self.camera.width, shift[0]), ("y", self.camera.height, shift[1])):
             self.values[f"eye.principal_point_offset_{axis}"] = float(move / size)
@@ -125,7 +125,7 @@ class _ScalarTracer(Tracer):
 
 
 def _mended(place: np.ndarray, seen: np.ndarray, mesh: GelMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return places m, image frame, of ``place`` (H, W, 3) in mesh coordinates, and bits ``seen`` (H, W), holes filled:
-    a ray that misses the gel has its place at the origin, where no ray leads. Raises TactileError as ``mend`` does."""
+    """Return places m, image frame, from ``place`` (H, W, 3), mesh coordinates, and bits ``seen`` (H, W), holes filled:
+    a ray that misses the gel has its place at the origin, where no ray leads. Raises TactileError if over 0.1 % do."""
     mend(np.logical_not(place.any(-1)), place, seen)
     return place * np.array([1 / MM, -1 / (MM * mesh.up_scale), 1 / MM], np.float32), seen

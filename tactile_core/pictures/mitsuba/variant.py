@@ -38,14 +38,14 @@ for file in sorted(files):
 
 @dataclasses.dataclass(frozen=True)
 class Choice:
-    """The name of the variant of Mitsuba to use, and why, in a sentence."""
+    """Name of the variant of Mitsuba to use, and a sentence that says why."""
 
     name: str
     why: str
 
 
 def choose_variant(wanted: str | None = None) -> Choice:
-    """Choose the variant ``wanted``, llvm_ad_rgb or scalar_rgb, or for None the faster one that works here. Raises
+    """Choose a variant of Mitsuba. wanted : llvm_ad_rgb or scalar_rgb; None for the faster one that works here. Raises
     TactileError for an unknown one or one that does not work; ModuleNotFoundError without mitsuba."""
     import mitsuba  # noqa: F401 (so that its absence is reported before anything is probed)
 
@@ -62,8 +62,8 @@ def choose_variant(wanted: str | None = None) -> Choice:
 
 
 def fitting(error: float, variant: str | None = None) -> str:
-    """Return the name of the fastest preset within an ``error``, grey levels, by a variant of Mitsuba; None for the
-    variant that works here, or the one without LLVM where Mitsuba is missing."""
+    """Return the name of the fastest preset within an ``error``, grey levels. variant : of Mitsuba; None for the one
+    that works here, or the one without LLVM if Mitsuba is missing"""
     if measured()["presets"][FAST]["error"] <= error:
         return FAST  # the cheapest by any variant: Mitsuba need not even be looked for
     try:
@@ -74,14 +74,14 @@ def fitting(error: float, variant: str | None = None) -> str:
 
 
 def variant_for(preset: str, wanted: str | None = None) -> str:
-    """Return one variant of Mitsuba for all workers of a job, so that pictures agree; "" for the preset ``fast``.
-    wanted : the variant to use, None for the faster one that works here"""
+    """Return the variant of Mitsuba that all workers of a job use, so that pictures agree; "" for the preset ``fast``.
+    wanted : the variant to use; None for the faster one that works here"""
     return "" if preset == "fast" else choose_variant(wanted).name
 
 
 @functools.cache
 def llvm_trouble(library: str) -> str:
-    """Describe why LLVM does not work; "" where it works. library : DRJIT_LIBLLVM_PATH, "" where unset"""
+    """Return a sentence on why LLVM does not work, "" if it does. library : DRJIT_LIBLLVM_PATH, "" if unset"""
     try:
         command = [sys.executable, "-P", "-c", _PROBE]  # -P: nothing is imported from the current folder
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=PROBE_SECONDS)
@@ -99,7 +99,8 @@ def llvm_trouble(library: str) -> str:
 
 
 def _too_old(message: str) -> str:
-    """Describe an LLVM older than 16, from the probe's lines, as "LLVM 14 /usr/lib/libLLVM.so"; 0 counts as old."""
+    """Describe the LLVM older than 16 that a line of the probe's ``message`` names, "" for none; such a line is "LLVM
+    14 /usr/lib/libLLVM.so", and 0 counts as old."""
     for line in message.splitlines():
         word, _, rest = line.partition(" ")
         major, _, file = rest.partition(" ")

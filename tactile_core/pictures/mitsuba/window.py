@@ -26,14 +26,14 @@ def window_height(camera: Camera) -> float:
 
 
 def air_over_window(camera: Camera, index: float) -> float:
-    """Return the air, m, between window and pinhole that lets the pinhole appear at the camera's height, by Snell.
-    index : of refraction, of gel and window"""
+    """Return the thickness, m, of air between window and pinhole with which Snell's law shows the pinhole at the
+    camera's apparent height, along the axis. index : of refraction, of gel and window"""
     return (camera.apparent_height - window_height(camera)) / index
 
 
 def apparent_height(distance: np.ndarray, camera: Camera, index: float) -> np.ndarray:
-    """Return the pinhole's apparent height (...), m over height zero, for pixels that look ``distance`` (...) m aside.
-    Snell's law through a flat window of refractive ``index``; a camera nearer than its thickness keeps its height."""
+    """Return the pinhole's apparent height (...), m over height zero, for pixels that look ``distance`` (...) m aside:
+    Snell's law in a flat window of refractive ``index``. A camera nearer than the window is thick keeps its height."""
     air = air_over_window(camera, index)
     if air <= 0:
         return np.full(np.shape(distance), camera.apparent_height)
@@ -48,7 +48,8 @@ def tangent(sine: np.ndarray) -> np.ndarray:
 
 
 def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -> np.ndarray:
-    """Return a pinhole's picture (H, W, k) as seen through the window, float32. height : (H, W) m, of the gel in it"""
+    """Return a pinhole's picture (H, W, k) as seen through the window, float32. height : (H, W) m, seen by its
+    pixels"""
     camera = unit.camera
     right, down = np.meshgrid(camera.right, camera.down)
     nearer = 1 - height / apparent_height(np.hypot(right, down), camera, unit.gel_index)
@@ -60,17 +61,17 @@ def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -
 
 
 def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Interpolate a picture (h, w, k) at fractional ``row``, ``column`` (...), pixels, by Catmull-Rom splines, edges
-    held; exact at whole ones. Returns (..., k) float32."""
+    """Interpolate a picture (h, w, k) at fractional ``row``, ``column`` (...), pixels, by Catmull-Rom splines, exact at
+    whole ones, with edges repeated beyond it. Returns (..., k) float32."""
     nodes, weights = stencil(picture.shape[:2], np.stack([row.ravel(), column.ravel()]), closed=False)
     found = np.einsum("abn,abnk->nk", weights, picture.reshape(-1, picture.shape[2])[nodes])
     return found.reshape(*row.shape, -1).astype(np.float32)
 
 
 def camera_rays(unit: Calibration, right: np.ndarray, down: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return starts and unit directions (3, n) float32 of rays: right, up, toward the camera, mm.
-    right, down : (n,) m, where they meet the plane of height zero. Rays start at the window's side toward the camera;
-        at the camera if that is nearer than the window is thick."""
+    """Return starts and unit directions, (3, n) float32 each, of the rays to places of height zero: right, up, toward
+    the camera, mm. Rays start at the window's outer side; at the camera if that is nearer than the window is thick.
+    right, down : (n,) m, the places"""
     camera, index = unit.camera, unit.gel_index
     air, window = air_over_window(camera, index), window_height(camera)
     if air <= 0:
