@@ -39,9 +39,9 @@ REFERENCE_SHARE = 1 / 3  # of the full tier's error (assumed: halving cells of o
 
 
 def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
-    """Enlarge ``table``, a depth's errors (shape m, force relative), for a sharp indenter: by the root of 1.5 mm over
-    ``radius``, m, its least one of curvature.
-    nodes : number that touch; where none does, at ``depth`` m, the errors are that depth and 1, or 0 at first touch"""
+    """Return ``table``, the fast tier's errors at a contact's depth (shape m, force relative), enlarged for a sharp
+    indenter by sqrt(1.5 mm / ``radius``). radius : m, the indenter's least radius of curvature
+    nodes : number that touch; if none does, the errors are ``depth``, m, and 1, or 0 at first touch"""
     if not nodes:
         return _of_nothing(depth)
     sharper = math.sqrt(max(RESOLVED_RADIUS / radius, 1.0))
@@ -49,9 +49,9 @@ def of_fast(table: Errors, depth: float, nodes: int, radius: float) -> Errors:
 
 
 def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hidden: float) -> Errors:
-    """Enlarge ``table``, a depth's errors in full or reference tier, where few nodes touch or a body cuts in between
-    them.
-    nodes : number that touch; where none does, at ``depth`` m, the errors are that depth and 1, or 0 at first touch
+    """Return ``table``, the full or reference tier's errors at a contact's depth (shape m, force relative), enlarged if
+    few nodes touch or the indenter cuts in between them.
+    nodes : number that touch; if none does, the errors are ``depth``, m, and 1, or 0 at first touch
     across : nodes across the contact, at the full tier's spacing; hidden : m, the indenter's penetration between nodes
     """
     if not nodes:
@@ -65,8 +65,8 @@ def of_finite_strain(table: Errors, depth: float, nodes: int, across: float, hid
 
 
 def _of_nothing(depth: float) -> Errors:
-    """Return errors (shape m, force relative) at ``depth``, m, where no node touches: all of it, for the body lies
-    between nodes; 0 at first touch."""
+    """Return the errors (shape m, force relative) of a contact ``depth``, m, deep whose indenter touches no node
+    because it lies between them: that depth and 1; 0 at first touch."""
     return (depth, 1.0) if depth > _ROUNDING else (0.0, 0.0)
 
 
@@ -77,10 +77,10 @@ def measured() -> dict[str, Any]:
 
 
 def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
-    """Return the shape error, m rms, and relative force error that 95 of 100 contacts stay below at a depth.
-    tier : ``fast``, ``full`` or ``reference``; share : the depth, divided by the sensor's thickness; 0 has no error
-    The fast tier's errors are against the full tier, whose own errors add to them. Deeper than the deepest measured
-    bin, that bin's errors are returned; NaN for a sensor whose errors nobody has measured."""
+    """Return the errors that 95 of 100 contacts at a depth stay below: of shape, m rms, and relative, of force.
+    tier : ``fast``, ``full`` or ``reference``; share : the depth over the sensor's thickness; 0 has no errors
+    The fast tier's errors are against the full tier, whose own are not included. Deeper than the deepest measured bin,
+    that bin's errors are returned; NaN for a sensor whose errors nobody has measured."""
     if share <= 0:
         return 0.0, 0.0
     bins = measured()["tiers"][tier].get(sensor, _UNKNOWN)["bins"]
@@ -89,15 +89,15 @@ def expected_error(tier: str, sensor: str, share: float) -> tuple[float, float]:
 
 
 def unsure_side(contact: Contact, normals: np.ndarray, radius: float) -> float:
-    """Estimate the sideways error of shape, m rms, under a sharp indenter, whose normals are known at nodes alone.
-    Along the way round an edge, normals turn by a radian per radius. Nodes touch up to half a spacing beside the true
-    places, and their forces lean accordingly: a wedge that meets nodes on one of its faces alone pushes a fluid-filled
-    skin aside as a whole. Doubtful is the part of the sideways force that no node on another face balances, at most
-    what normals off by half a spacing can make. The estimate is the displacement under that part, over nodes that the
-    contact moves by more than 10 um; 0 without contact.
+    """Estimate the sideways error of shape, m rms, of a contact with a sharp indenter; 0 without contact.
+    The solver knows the indenter's normals at nodes alone. Round an edge of radius r they turn by 1 rad on a way of r,
+    and a node touches up to half a spacing beside the true place, so its force leans wrongly: a wedge that meets nodes
+    with one of its faces alone pushes a fluid-filled skin aside as a whole. In doubt is the part of the sideways force
+    that no node on another face balances, at most what normals off by half a spacing can make. The estimate is the
+    displacement under that part, over nodes that the contact moves by more than 10 um.
 
     contact : of the fast tier; normals : (n, 3), outward, of the resting surface, all nodes
-    radius : m, of the indenter where it is sharpest"""
+    radius : m, of curvature where the indenter is sharpest"""
     if not len(contact.nodes):
         return 0.0
     size, force = np.linalg.norm(contact.nodal_force, axis=1), float(np.linalg.norm(contact.force))

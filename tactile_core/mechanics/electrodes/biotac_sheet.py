@@ -36,13 +36,12 @@ _FINE = 2  # times the triangles are halved to find what the grid leaves unresol
 
 @dataclasses.dataclass(frozen=True)
 class BiotacSheet:
-    """The fluid film between core and inner skin; e electrodes, 19 of the BioTac.
-
-    fluid : what conducts; sheet : the grid for the currents, with the e electrodes, then the 4 of the excitation
-    wet : (k,) the sheet's nodes, by number in the inner skin's lattice
-    sensing : (k,) the same nodes' indices among ``sensing_points.sensing_nodes``
+    """The fluid film between core and inner skin as a conducting sheet with e electrodes, 19 on the BioTac.
+    fluid : the film's descriptor; sheet : grid for the currents, with the e electrodes, then the 4 that feed currents
+    wet : (k,) number of each of the sheet's k nodes in the inner skin's lattice
+    sensing : (k,) index of each of these nodes in ``sensing_points.sensing_nodes``
     film : (k,) m, thickness at rest; outward : (k, 3), unit, from the core to the skin
-    unresolved : (e + 4,) ohm that the grid leaves out at each electrode, in a film of 1 m and 1 S/m"""
+    unresolved : (e + 4,) ohm, resistance near each electrode that the grid misses in a film of 1 m and 1 S/m"""
 
     fluid: FluidFilm
     sheet: ThinSheet
@@ -53,17 +52,17 @@ class BiotacSheet:
     unresolved: np.ndarray
 
     def films(self, displacement: np.ndarray) -> np.ndarray:
-        """Return the film's thickness (k,) m, from ``fluid.thinnest`` up; displacement : (n, 3) m of the inner skin"""
+        """Return the film's thickness (k,) m, ``fluid.thinnest`` or more; displacement : (n, 3) m of the inner skin"""
         moved = np.einsum("ki,ki->k", displacement[self.wet], self.outward)
         return np.maximum(self.film + moved, self.fluid.thinnest)
 
     def films_of(self, change: np.ndarray) -> np.ndarray:
-        """Return the film's thickness (k,) m at the sheet's nodes, at least ``fluid.thinnest``, by the change (f,) m of
-        all f sensing nodes' gaps, positive where they open."""
+        """Return the film's thickness (k,) m, at least ``fluid.thinnest``, from the change (f,) m of the gap at each of
+        all f sensing nodes, positive if it opens."""
         return np.maximum(self.film + change[self.sensing], self.fluid.thinnest)
 
     def near(self, films: np.ndarray) -> np.ndarray:
-        """Return the resistance (e + 4,) ohm that the grid leaves out near each electrode, for films (k,) m."""
+        """Return the resistance (e + 4,) ohm near each electrode that the grid misses, for films (k,) m."""
         return self.unresolved / (self.fluid.conductivity * self.sheet.mean_over_electrodes(films))
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
@@ -72,17 +71,17 @@ class BiotacSheet:
         return resistances(potentials + np.diag(self.near(films)), len(potentials) - FED)
 
     def growth(self, resistance: np.ndarray, at_rest: np.ndarray) -> np.ndarray:
-        """Return each electrode's impedance over that at rest, (e,), from its resistance now and at_rest, both (e,)
-        ohm; the interface adds to both."""
+        """Return the ratio (e,) of each electrode's impedance to that at rest, from its resistance now and at_rest,
+        both (e,) ohm; the interface's resistance is added to both."""
         return (resistance + self.fluid.interface) / (at_rest + self.fluid.interface)
 
 
 @functools.cache
 def biotac_sheet(sensor: str = sensors.SOURCE) -> BiotacSheet:
-    """Make the sheet of a sensor's resting finger; a solve takes 10 ms.
+    """Return the conducting sheet of a sensor's resting finger; solving it takes 10 ms.
 
-    The film ends on a core that carries the electrodes, so that films over electrodes are the published gaps: the
-    public mesh's core stands 0.25 mm over the electrodes of the trunk and 0.6 mm under those of the tip."""
+    Its film is made as thick over each electrode as the published gap: the public mesh's core stands 0.25 mm over the
+    electrodes of the trunk and 0.6 mm under those of the tip."""
     skin, mesh, thinnest = sensors.skin_of(sensor), skin_mesh(sensor), film_floor(sensor)
     inner = skin.skin_surface("inner")
     outward, film = above_core(sensor)
@@ -119,7 +118,7 @@ def _spread(places: np.ndarray, values: np.ndarray, points: np.ndarray) -> np.nd
 
 
 def _mirrored_faces(inner: Lattice) -> np.ndarray:
-    """Triangles of the grid and its tip cap whose diagonals are each other's images in z, unlike the lattice's own."""
+    """Return triangles (m, 3) of the inner skin's grid and tip cap whose diagonals mirror each other in z."""
     rows, columns = inner.shape
     row, column = np.meshgrid(np.arange(rows - 1), np.arange(columns), indexing="ij")
     right = (column + 1) % columns
@@ -142,7 +141,7 @@ def _connected(faces: np.ndarray) -> np.ndarray:
 
 
 def film_floor(sensor: str) -> float:
-    """Return the least film thickness, m, at which the sheet's law is still valid for a sensor."""
+    """Return the least thickness, m, of a sensor's film that the sheet models."""
     return sensors.skin_of(sensor).descriptor.fluid.thinnest
 
 
@@ -155,7 +154,8 @@ _PAD = -2e-3  # m, y below which dents lie
 
 
 class ReducedSheet:
-    """A ``sheet`` that is quick to solve: its n potentials, V, the first 0, are sums of r fields (n - 1, r)."""
+    """A ``sheet`` that is solved quickly: the potentials of its n nodes, 0 V at the first, are sought among the
+    combinations of r fixed ``fields`` (n - 1, r)."""
 
     def __init__(self, sheet: BiotacSheet, fields: np.ndarray) -> None:
         self.sheet, self.fields = sheet, fields
@@ -163,14 +163,14 @@ class ReducedSheet:
         self.at_rest = self.resistances(sheet.film)
 
     def resistances(self, films: np.ndarray) -> np.ndarray:
-        """Resistance (e,) ohm of each electrode to the excitation for films (k,) m at the sheet's nodes."""
+        """Return the resistance (e,) ohm of each electrode to the excitation for films (k,) m at the sheet's nodes."""
         stiffness = self.sheet.sheet.matrix(films, self.sheet.fluid.conductivity)[1:, 1:]
         reduced = self.fields.T @ (stiffness @ self.fields)
         potentials = self._patches.T @ np.linalg.solve(reduced, self._patches)
         return resistances(potentials + np.diag(self.sheet.near(films)), len(potentials) - FED)
 
     def growth(self, films: np.ndarray) -> np.ndarray:
-        """Factor (e,) by which each electrode's impedance has grown since rest, for films (k,) m."""
+        """Return the factor (e,) by which each electrode's impedance has grown since rest, for films (k,) m."""
         return self.sheet.growth(self.resistances(films), self.at_rest)
 
 
@@ -189,12 +189,13 @@ def reduced_sheet(sensor: str = sensors.SOURCE) -> ReducedSheet:
 
 
 def _potentials(sheet: BiotacSheet, films: np.ndarray) -> np.ndarray:
-    """Return potentials (n - 1, e + 4) of nodes 1 to n, 1 A into each electrode at 1 S/m. films : (n,) m, thickness"""
+    """Return potentials (n - 1, e + 4) V of all nodes but the first (0 V) for 1 A into each electrode in turn, 1 S/m.
+    films : (n,) m, thickness"""
     return factor(sheet.sheet.matrix(films)[1:, 1:].tocsc())(sheet.sheet.patches[1:])
 
 
 def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
-    """Films (k,) m of sheets with one bell-shaped dent each, always the same."""
+    """Draw the films (k,) m of 60 sheets with one bell-shaped dent each, the same at every call."""
     random, nodes = np.random.default_rng(0), sheet.sheet.nodes
     pad = np.flatnonzero(nodes[:, 1] < _PAD)
     found = []
@@ -206,8 +207,8 @@ def _dents(sheet: BiotacSheet) -> list[np.ndarray]:
 
 
 def signal_of(contact: Contact | Solution, sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Return the change (e,) of the electrodes' raw counts against rest in a contact, without noise, of a unit whose
-    counts at rest are ``rest_counts``; takes 3 ms. sensor : the fluid sensor whose contact it is"""
+    """Return the change (e,) of the electrodes' raw counts from rest in a contact, without noise, for a unit whose
+    counts at rest are ``rest_counts``; takes 3 ms. sensor : name of the fluid sensor that is touched"""
     films = sensing_films(contact) if isinstance(contact, Contact) else contact.films
     rest = rest_counts(sensor)
     return divider.reading(reduced_sheet(sensor).growth(films), rest) - rest

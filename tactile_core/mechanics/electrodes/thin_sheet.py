@@ -12,10 +12,10 @@ _DISC_SAMPLES = 16  # parts of a triangle's edge, 0.03 mm each, to measure what 
 
 
 class ThinSheet:
-    """A conducting sheet on a triangulated surface, of a thickness that changes from solve to solve.
-
-    nodes : (n, 3) m; faces : (m, 3) int, one connected piece; centers : (k, 3) m, of the electrodes; radius : m, theirs
-    refine : how often each triangle is cut into four; films stay given at the n nodes before that"""
+    """A conducting sheet on a triangulated surface, whose thickness is given anew for each solve.
+    nodes : (n, 3) m; faces : (m, 3) int, triangles, one connected piece
+    centers : (k, 3) m, and radius : m, of the round electrodes
+    refine : how often each triangle is cut into four; films are still given at the original n nodes"""
 
     def __init__(
         self, nodes: np.ndarray, faces: np.ndarray, centers: np.ndarray, radius: float, refine: int = 0
@@ -43,8 +43,8 @@ class ThinSheet:
         return self.patches[1:].T @ answer
 
     def matrix(self, film: np.ndarray, conductivity: float = 1.0):  # noqa: ANN201 (scipy is imported where it is needed)
-        """Assemble the currents per potential, sparse (n_fine, n_fine) S: sum of sigma h grad N_i . grad N_j.
-        film : (n,) m, h at the given nodes; conductivity : S/m, sigma"""
+        """Return the conductances (n_fine, n_fine) S between nodes, sparse: sum of sigma h grad N_i . grad N_j.
+        film : (n,) m, h at the original nodes; conductivity : S/m, sigma"""
         if not (film > 0).all():  # false for NaN too
             raise ValueError("a film without thickness does not conduct")
         thickness = (self.prolong @ film)[self.faces].mean(1)  # exact for a film that is linear in each triangle
@@ -53,13 +53,13 @@ class ThinSheet:
         return matrix
 
     def mean_over_electrodes(self, film: np.ndarray) -> np.ndarray:
-        """Return the mean (k,) over each electrode of a film (n,), or any other values, at the given nodes."""
+        """Return the mean (k,) over each electrode of a film (n,) m, or of any other values, at the original nodes."""
         return (self.prolong @ film) @ self.patches
 
     def unresolved(self, refine: int) -> np.ndarray:
-        """Return each electrode's error of resistance on this grid against a refined one, (k,) ohm at 1 m and 1 S/m.
+        """Return the resistance (k,) ohm near each electrode that this grid misses against a refined one, 1 m, 1 S/m.
 
-        Near an electrode the film has nearly one thickness h: the error there is this value over conductivity times h.
+        Near an electrode a film has nearly one thickness h: there it misses this value over conductivity times h.
         refine : how often the finer grid cuts each triangle into four"""
         film = np.ones(len(self.given[0]))
         miss = ThinSheet(*self.given, refine).potentials(film) - self.potentials(film)
@@ -67,7 +67,7 @@ class ThinSheet:
         return np.diag(miss) - np.median(elsewhere)
 
     def _prepare_matrix(self) -> None:
-        """The pattern of the matrix, and the weights that fill it from the thicknesses of the triangles."""
+        """Find the matrix's sparsity pattern, and the weights that make its entries from the triangles' thicknesses."""
         import scipy.sparse
 
         local = _gradient_products(self.nodes[self.faces])
@@ -84,8 +84,8 @@ class ThinSheet:
 def resistances(potentials: np.ndarray, sensing: int) -> np.ndarray:
     """Return the resistances (sensing,) ohm from each of the first ``sensing`` electrodes to all later ones, joined.
 
-    potentials : (k, k), of ``ThinSheet.potentials``. The joined electrodes are at one potential, and their currents
-    sum to the one electrode's: a linear system for these currents and that potential.
+    potentials : (k, k) V, from ``ThinSheet.potentials``. The joined electrodes are at one potential, and their currents
+        add up to the single electrode's: a linear system for these currents and that potential.
     """
     joined = len(potentials) - sensing
     system = np.zeros((joined + 1, joined + 1))
@@ -104,8 +104,8 @@ def _gradient_products(corners: np.ndarray) -> np.ndarray:
 
 
 def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, object]:
-    """Cut each of triangles faces (m, 3) on nodes (n, 3) m into four: nodes and faces with a node on every edge, and
-    the sparse matrix that interpolates values linearly onto them."""
+    """Cut each of the triangles faces (m, 3) on nodes (n, 3) m into four. Return the new nodes, one more on every edge,
+    the new faces, and the sparse matrix that interpolates values linearly from old nodes to new ones."""
     import scipy.sparse
 
     ends = np.sort(np.stack([faces, np.roll(faces, -1, 1)], -1).reshape(-1, 2), 1)
@@ -122,7 +122,7 @@ def _halved(nodes: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _disc(nodes: np.ndarray, faces: np.ndarray, size: np.ndarray, center: np.ndarray, radius: float) -> np.ndarray:
-    """Return the mean over a disc of radius m at center (3,) m as weights (n,) of the nodes (n, 3) m; they sum to 1.
+    """Return weights (n,) of nodes (n, 3) m, of sum 1, for a function's mean over a disc of radius m at center (3,) m.
     faces : (m, 3), triangles; size : (m,) m, their longest edges"""
     near = np.flatnonzero(np.linalg.norm(nodes - center, axis=1)[faces].min(1) < radius + size)
     corners = nodes[faces[near]]
@@ -136,7 +136,7 @@ def _disc(nodes: np.ndarray, faces: np.ndarray, size: np.ndarray, center: np.nda
 
 
 def _sub_centroids(cuts: int) -> np.ndarray:
-    """Barycentric centroids (cuts^2, 3) of the equal triangles that a triangle is cut into."""
+    """Return barycentric centroids (cuts^2, 3) of the equal triangles that a triangle is cut into."""
     place = np.stack(np.meshgrid(np.arange(cuts), np.arange(cuts)), -1).reshape(-1, 2)
     upright, turned = place[place.sum(1) < cuts], place[place.sum(1) < cuts - 1]
     uv = np.concatenate([upright + 1 / 3, turned + 2 / 3]) / cuts

@@ -1,8 +1,8 @@
-"""The exact solution of a contact's linear complementarity problem: which nodes touch, and how hard.
+"""Solve a contact's linear complementarity problem exactly: which nodes touch, and with what force.
 
-Block principal pivoting changes all wrong nodes at once; where that makes no progress, one at a time, which always ends
-(a symmetric positive definite matrix). J. Judice, F. Pires, Computers and Operations Research 21, 1994, 587-596;
-K. Murty, Opsearch 11, 1974.
+Block principal pivoting exchanges all wrong nodes at once; if that makes no progress, one at a time, which always ends
+for a symmetric positive definite matrix. J. Judice, F. Pires, Computers and Operations Research 21, 1994, 587-596; K.
+Murty, Opsearch 11, 1974.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ _GAP_ROUNDING = 1e-10  # m: below what single precision of the compliance resolv
 
 
 class UnsolvedError(ArithmeticError):
-    """The matrix is not positive definite, or the exchanges do not end."""
+    """Error of a contact not found: no positive definite matrix, no node to carry the force, or endless iterations."""
 
 
 class ExhaustedError(UnsolvedError):
-    """Error of a contact that needs more than is left of the ``Work`` that it may cost."""
+    """Error of a contact for which nothing is left of the ``Work`` that it may cost."""
 
 
 @dataclasses.dataclass
 class Work:
-    """Effort that contacts may still cost, ``left``: the cube of the unknowns for each iteration of a solver."""
+    """Effort that contacts may still cost, ``left``: an iteration of a solver costs the cube of its unknowns."""
 
     left: float = np.inf
 
@@ -44,9 +44,9 @@ class Work:
 
 @dataclasses.dataclass(frozen=True)
 class Pressing:
-    """Solution of a contact's complementarity problem, see ``complement``.
-    pressing : (k,) N, 0 or more; active : (k,) bool, nodes that touch; step : m, by which the indenter goes deeper
-    factor : (j, j), Cholesky factor of the matrix among the active nodes"""
+    """Solution of a contact's complementarity problem (``complement``).
+    pressing : (k,) N, normal forces, 0 or more; active : (k,) bool, nodes that touch; step : m, the indenter's travel
+    factor : (j, j), Cholesky factor of the matrix among the j active nodes"""
 
     pressing: np.ndarray
     active: np.ndarray
@@ -63,12 +63,13 @@ def complement(
     *,
     factors: dict[bytes, np.ndarray] | None = None,
 ) -> Pressing:
-    """Find forces p >= 0 with gaps g = matrix p + gap - step along >= 0 and p g = 0 at every node.
+    """Find normal forces p >= 0 whose gaps g = matrix p + gap - step along are >= 0, with p g = 0, at every node.
     matrix : (k, k) m/N, symmetric, how forces open gaps; gap : (k,) m, without forces; active : (k,) bool, first guess
-    along : (k,), by how much each gap closes per metre of ``step``, which is then free so that ``along . p`` is
+    along : (k,), by how much each gap closes per metre of ``step``, which is then found so that ``along . p`` is
         ``force``, N; None: ``step`` is 0
     factors : Cholesky factors of this matrix by active set, used and added to; None to keep none
-    Raises UnsolvedError if the matrix is not positive definite, no node can carry the force, or exchanges go on."""
+    Raises UnsolvedError if the matrix is not positive definite, no node can carry the force, or exchanges do not end.
+    """
     fewest, patience = len(gap) + 1, _PATIENCE
     pressing, step = np.zeros(len(gap)), 0.0
     for _ in range(_MOST_EXCHANGES):
@@ -101,8 +102,8 @@ def complement(
 
 
 def _closed(matrix, active, index, right, factors) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN001
-    """Cholesky factor of the block of a matrix (n, n) at ``index`` (j,), where ``active`` is true, and its solution of
-    ``right`` (j, ...). factors : those found so far, by ``active``'s bytes; None to keep none"""
+    """Return the Cholesky factor of a matrix's (n, n) block at ``index`` (j,), where ``active`` is true, and the
+    block's solution of ``right`` (j, ...). factors : those found so far, by ``active``'s bytes; None to keep none"""
     from scipy.linalg import lapack
 
     known = factors.get(active.tobytes()) if factors is not None else None

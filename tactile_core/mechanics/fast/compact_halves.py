@@ -24,8 +24,8 @@ TILE = 256  # rows and columns transposed at a time: they fit in a processor's c
 
 
 class Segment(NamedTuple):
-    """Unknowns ``first`` to before ``last`` of a matrix, those of a point side by side, and the clusters of its points.
-    axes : unknowns per point; clusters : points (k,) and the transform of their motions (k, k), parts before wholes"""
+    """Unknowns ``first`` to ``last`` - 1 of a matrix, ``axes`` of them per point, side by side; and clusters of points.
+    clusters : each one's points (k,) and the transform (k, k) of their motions; parts come before wholes"""
 
     first: int
     last: int
@@ -35,7 +35,7 @@ class Segment(NamedTuple):
 
 class Basis(NamedTuple):
     """Unknowns of one half's matrix: first the touched nodes' axes, then loads, then the other nodes' axes.
-    touched : how many are axes of touched nodes; rows : how many are those or loads
+    touched : number of the axes of touched nodes; rows : number of these and the loads
     unknown : (n,) int, for each unknown its axis 3 i + k of the i-th kept node, or its load's number
     step : (n,) float32; the quantisation step of an entry is the product of its row's and its column's
     segments : stretches of unknowns that are transformed together"""
@@ -56,7 +56,7 @@ def turn(values: np.ndarray, segments: list[Segment], *, back: bool = False) -> 
 
 
 def unpack(path: Path, made_from: str) -> tuple[Half, Half] | None:
-    """Read the even and the odd half from a shipped file; None if there is none, or it is of another solid.
+    """Read the even and the odd half from a shipped file; return None if there is no file, or it is of another solid.
     made_from : name of the solid's cache entry (``compliance.cache_entry``), which the file states"""
     if not path.is_file():
         return None
@@ -85,7 +85,7 @@ def _read_basis(file: h5py.File) -> Basis:
 
 
 def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
-    """Matrix (rows, n) float32 from its quantised form (n, rows), whose symmetric part has its upper triangle only."""
+    """Return a half's matrix (rows, n) float32 from its quantised form (n, rows), symmetric part: upper triangle."""
     rows, step = basis.rows, basis.step
     turned = np.empty(packed.shape, np.float32)
     for start in range(0, len(turned), BLOCK):
@@ -104,7 +104,7 @@ def _matrix(packed: h5py.Dataset, basis: Basis) -> np.ndarray:
 
 
 def _half(basis: Basis, matrix: np.ndarray) -> Half:
-    """Cut a half's matrix (rows, n), in the basis's order of unknowns, into its parts, in the order of their nodes."""
+    """Return the half whose matrix (rows, n) is in the basis's order of unknowns; its parts are in node order."""
     touched, rows, unknown = basis.touched, basis.rows, basis.unknown
     surface = np.r_[:touched, rows : len(unknown)]
     columns = surface[np.argsort(unknown[surface])]

@@ -42,21 +42,22 @@ _BESIDE_GEL = 2.0e-3
 
 @dataclasses.dataclass(frozen=True)
 class Compliance:
-    """Answers of a sensor's surface to forces, SI units.
+    """Response of a sensor's surface to forces, SI units.
 
     name : of the sensor
     surface : the sensor's surface lattice, n nodes
     touchable : (m,) int, surface nodes that can carry contact force
-    move : (3 r, 3 n) float32, m/N; row 3 i + k is the surface displacement under 1 N along axis k at the i-th of the r
-        touchable nodes with z >= 0; mirrored, it is that under the mirrored force on the node's image (``answers``)
-    watch : (3 m, w) float32, m/N; motion of the inner sensing points along their watch directions (BioTac only:
-        first the electrode feet, then the inner skin under the pad and beside it; toward the core is negative)
+    move : (3 r, 3 n) float32, m/N; row 3 i + k is the displacement of all surface nodes under 1 N along axis k at the
+        i-th of r nodes with z >= 0, from which mirror symmetry gives all touchable ones (``answers``)
+    watch : (3 m, w) float32, m/N; motion of the w sensing points of the inner skin, each along its own direction
+        (negative toward the core), under 1 N along each axis at each touchable node. BioTac only: first the points
+        under the electrodes, then inner skin that faces the core, then inner skin beside it
     watch_gap : (w,) float64, m, their distance to electrode or core at rest
     pressure : (3 m,) float64, Pa/N, fluid pressure under the same forces (zero for the gel)
     inner_move : (w, 3 n) float32, m/N, surface displacement under 1 N at a sensing point along its direction
-    inner_watch : (w, w) float32, m/N, motion of the sensing points under the same forces
+    inner_watch : (w, w) float32, m/N, motion of the sensing points under the same forces at these points
     inner_pressure : (w,) float64, Pa/N, fluid pressure under them
-    feet : how many of the sensing points, the first ones, are electrode feet
+    feet : how many of the sensing points, the first ones, lie under electrodes
     facing : how many after them face the core, which may press on them
     """
 
@@ -75,8 +76,8 @@ class Compliance:
 
     @functools.cached_property
     def answers(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return, for each touchable node, the number i (m,) of the node whose rows of ``move`` it uses and whether
-        that is its mirror image, (m,) bool; and the mirror image (n,) of each surface node, as indices."""
+        """Return how ``move`` answers for each touchable node: the number i (m,) of the node whose rows apply, and true
+        (m,) if it is that node's mirror image; and the index (n,) of each surface node's mirror image."""
         image = mirror_nodes(self.surface.rest)
         answered = answered_nodes(self.surface, self.touchable, image)
         mirrored = self.surface.rest[self.touchable, 2] < -ON_PLANE
@@ -89,14 +90,14 @@ ARRAYS = ("move", "watch", "watch_gap", "pressure", "inner_move", "inner_watch",
 
 @functools.cache
 def compliance_of(sensor: str) -> Compliance:
-    """Return the compliance of a sensor, by its name; built in about a minute, then read from the cache."""
+    """Return the compliance of a sensor, by its name: read from the cache, or made and kept there at first use."""
     return _cached(solid_of(sensor))
 
 
 class Solid(NamedTuple):
     """Solid from which a compliance is computed.
-    name : of the sensor; lattice : its surface; mesh : of its volume
-    touchable : (m,), the lattice's nodes that may carry contact force"""
+    name : of the sensor; lattice : its surface; mesh : its volume
+    touchable : (m,), the surface's nodes that may carry contact force"""
 
     name: str
     lattice: Lattice
@@ -115,7 +116,7 @@ def solid_of(sensor: str) -> Solid:
 class Stored(NamedTuple):
     """Cache entry of a sensor's matrices: ``folder``, and ``bytes`` on disk, 0 before they are built.
 
-    surface, touchable, volume : number of the surface's nodes, of the touchable ones, of the solid's"""
+    surface, touchable, volume : numbers of nodes: on the surface, that may be touched, in the solid"""
 
     folder: pathlib.Path
     bytes: int
@@ -142,7 +143,7 @@ def _touchable_skin(sensor: str) -> np.ndarray:
 
 
 def cache_entry(solid: Solid) -> pathlib.Path:
-    """Return the folder, there or not, of a solid's matrices in the cache, named by a hash of all that decides them."""
+    """Return the cache folder of a solid's matrices, made or not; its name holds a hash of all that decides them."""
     name, lattice, touchable, mesh, material = solid
     digest = hashlib.sha256(json.dumps([_FORMAT, name, lattice.sha256, dataclasses.asdict(material)]).encode())
     sensing = sensing_points_of(name, mesh)
@@ -154,7 +155,7 @@ def cache_entry(solid: Solid) -> pathlib.Path:
 
 
 def _cached(solid: Solid) -> Compliance:
-    """Read the matrices, checked against the hashes of when they were built; build them where they are not there."""
+    """Read a solid's matrices from the cache, checked against their stored hashes; build them if that fails."""
     name, lattice, touchable, mesh, _ = solid
     folder = cache_entry(solid)
     try:
@@ -168,7 +169,7 @@ def _cached(solid: Solid) -> Compliance:
 
 
 def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
-    """Return what another process built while this one waited, or build it."""
+    """Return the matrices that another process built while this one waited for the lock, or build them."""
     try:
         return array_cache.load(folder, ARRAYS)
     except array_cache.DamagedError as damage:
@@ -183,14 +184,15 @@ def _built(solid: Solid, folder: pathlib.Path) -> dict[str, np.ndarray]:
 
 
 def compact_file(sensor: str) -> pathlib.Path:
-    """Path of a sensor's condensed halves, where they ship; `scripts/benchmarks/make/make_compliance.py` makes them."""
+    """Return the file of a sensor's condensed halves, if they ship; made by
+    `scripts/benchmarks/make/make_compliance.py`."""
     return shipped(f"compliance/{sensor}.h5")
 
 
 def condensed(solid: Solid) -> tuple[Half, Half]:
-    """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, last in a skin, the fluid at 1 Pa.
+    """Condense a solid's even and odd half to its surface, under ``kept_loads`` and, last, a skin's fluid at 1 Pa.
 
-    Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError where memory is too small.
+    Raises ValueError for a solid without mirror symmetry or held nowhere, TactileError if memory is too small.
     """
     from scipy import sparse
 
@@ -208,23 +210,23 @@ def condensed(solid: Solid) -> tuple[Half, Half]:
 
 
 def kept_nodes(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Return the surface nodes (k,) with z >= 0, and the indices (r,) among them of ``answered_nodes``."""
+    """Return the surface nodes (k,) with z >= 0, and the indices (r,) of ``answered_nodes`` in that list."""
     rest = solid.lattice.rest
     half = np.flatnonzero(rest[:, 2] >= -ON_PLANE)
     return half, np.searchsorted(half, answered_nodes(solid.lattice, solid.touchable, mirror_nodes(rest)))
 
 
 def kept_loads(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the sensing points (v,) whose unit loads are solved; and, for each of all w points, the index (w,) among
-    these of the one solved in its place (see `images`), and a sign (w,), -1 where that is its mirror image."""
+    """Return the sensing points (v,) whose unit loads are solved; and, for each of all w points, the index (w,) in that
+    list of the point whose answer it takes (`images`), and a sign (w,), -1 if it takes the mirror image of that."""
     source, mirrored = images(solid.name, solid.mesh, len(sensing_points_of(solid.name, solid.mesh).gap))
     kept = np.unique(source)
     return kept, np.searchsorted(kept, source), np.where(mirrored, -1.0, 1.0)
 
 
 def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.ndarray]]:
-    """Join the halves of a solid, of ``condensed``, and add the fluid; yield names and values of
-    ``Compliance``'s float arrays, one by one to save memory. Overwrites the halves."""
+    """Yield name and values of each float array of ``Compliance``, one by one to save memory: joins the halves that
+    ``condensed`` returns and adds the fluid. Overwrites the halves."""
     name, lattice, touchable, mesh, _ = solid
     (half, touched), gap = kept_nodes(solid), sensing_points_of(name, mesh).gap
     kept, column, sign = kept_loads(solid)
@@ -265,13 +267,13 @@ def assembled(solid: Solid, even: Half, odd: Half) -> Iterator[tuple[str, np.nda
 
 
 def _add_outer(rows: np.ndarray, factor: np.ndarray, line: np.ndarray) -> None:
-    """Add factor (r,) times line (n,) to rows (r, n) float32, one by one: the whole product would double the memory."""
+    """Add factor (r,) times line (n,) to rows (r, n) float32, row by row: the whole product would double the memory."""
     if line.any():
         for row, by in zip(rows, factor.astype(np.float32), strict=True):
             row += by * line
 
 
 def answered_nodes(lattice: Lattice, touchable: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """Return the nodes (r,) with z >= 0 to solve for touchable ones (m,): these themselves, or their mirror images.
-    image : (n,), each surface node's mirror image"""
+    """Return the nodes (r,) with z >= 0 that are solved: of the touchable ones (m,) each itself, or its mirror image.
+    image : (n,), index of each surface node's mirror image"""
     return np.unique(np.where(lattice.rest[touchable, 2] >= -ON_PLANE, touchable, image[touchable]))

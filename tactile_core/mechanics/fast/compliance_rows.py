@@ -22,19 +22,19 @@ class Rows(Protocol):
     near: np.ndarray  # sorted indices (n,): a touchable node's, or their count plus that of a point between
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N among points; numbers : (k,) sorted, some of ``near``"""
+        """Return the compliance (3 k, 3 k) float32 m/N among the points ``numbers`` (k,), sorted, some of ``near``."""
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        points; numbers : (k,) sorted, some of ``near``; inner : positions among all sensing points"""
+        """Return the motion (3 k, c) float32 m/N of sensing points ``inner`` (c,), by position among all of them, under
+        1 N on each axis of the points ``numbers`` (k,), sorted, some of ``near``."""
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return the points' displacements (n, 3) m by force (k, 3) N at sorted nodes (k,) and inner_force (c,) N at
-        sensing points ``inner`` (c,)."""
+        """Return the displacements (n, 3) m of all points ``near`` under force (k, 3) N at sorted nodes (k,) and
+        inner_force (c,) N at sensing points ``inner`` (c,)."""
 
 
 class ComplianceRows:
-    """Response of nodes near an indenter to forces on some of them. near : (n,) positions in ``touchable``, sorted"""
+    """Compliance among nodes near an indenter, read when asked for. near : (n,) positions in ``touchable``, sorted"""
 
     def __init__(self, compliance: Compliance, near: np.ndarray) -> None:
         self.compliance, self.near = compliance, near
@@ -56,25 +56,25 @@ class ComplianceRows:
         return self.compliance.watch[axes_of(nodes)].take(inner, axis=1)
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return ``near``'s displacements (n, 3) m: force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
+        """Return ``near``'s motion (n, 3) m by force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
         moved = self._under(nodes, force)
         if len(inner):
             moved += inner_force.astype(np.float32) @ self.compliance.inner_move[inner[:, None], self._columns]
         return moved.reshape(-1, 3).astype(float)
 
     def _under(self, nodes: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Return near nodes' displacements (3 n,) float32, m, by force (k, 3) N at sorted nodes (k,)."""
+        """Return the near nodes' displacements (3 n,) float32, m, under force (k, 3) N at sorted nodes (k,)."""
         at, (_, _, image) = self._gather(nodes), self.compliance.answers
         none, no_force, inner_move = np.empty(0, int), np.empty(0), self.compliance.inner_move
         straight = np.zeros(len(at), bool)
         return _sum_motion(self._entries_to_read, at, straight, image, force, inner_move, none, no_force)
 
     def _rows(self, nodes: np.ndarray) -> np.ndarray:
-        """Rows (3 k, 3 n) of nodes (k,)."""
+        """Return the compliance (3 k, 3 n) of nodes (k,) with all near ones."""
         return self._entries.take(axes_of(self._gather(nodes)), axis=0)
 
     def _gather(self, nodes: np.ndarray) -> np.ndarray:
-        """Gather the entries of nodes (k,) that are not known yet; returns the places (k,) of all among the near."""
+        """Read the rows of nodes (k,) that are not known yet; return the positions (k,) of all of them in ``near``."""
         at = np.searchsorted(self.near, nodes)
         new = at[~self._known[at]]
         if len(new):
@@ -90,9 +90,9 @@ class ComplianceRows:
 class ComplianceBlock:
     """Compliance of k surface nodes (three axes) and c points of the inner skin that may press on the core.
 
-    nodes : (k,) sorted, out of ``rows.near``, twice where one touches two faces of the indenter
+    nodes : (k,) sorted, some of ``rows.near``; a node stands twice if it touches two faces of the indenter
     inner : (c,) sorted indices of sensing points
-    rows : the entries of the nodes near an indenter, all of these among them
+    rows : compliance among all nodes near the indenter
     matrix : (3 k + c, 3 k + c) float32, m/N: x, y, z of each node in turn, then the inner points' motion off the core
     """
 
@@ -120,7 +120,7 @@ class ComplianceBlock:
         return _normal_compliance(self.matrix, np.ascontiguousarray(normals), self.c, RIDGE)
 
     def turned(self, matrix: np.ndarray, normals: np.ndarray, at: np.ndarray) -> np.ndarray:
-        """Return a copy of ``matrix`` (k + c, k + c), of ``normal``, updated where normals have turned.
+        """Return a copy of ``matrix`` (k + c, k + c), made by ``normal``, updated for normals that have turned.
         normals : (k, 3), all as they are now; at : (j,), positions among the block's nodes of those that turned"""
         k, size = self.k, 3 * self.k
         rows = self.matrix.take(axes_of(at), axis=0)
@@ -135,7 +135,7 @@ class ComplianceBlock:
 
 
 def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Contract sum over i, j of source[a, i] block[a i, b j] target[b, j]; by strides, faster than einsum here."""
+    """Return the sum over i, j of source[a, i] block[a i, b j] target[b, j]; by strides, faster than einsum here."""
     half = block[:, 0::3] * target[:, 0]
     half += block[:, 1::3] * target[:, 1]
     half += block[:, 2::3] * target[:, 2]
@@ -146,7 +146,7 @@ def _contract(block: np.ndarray, source: np.ndarray, target: np.ndarray) -> np.n
 def surface_motion(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray
 ) -> np.ndarray:
-    """Return the surface's motion (n, 3) float32 m by force (k, 3) N at nodes (k,), sorted positions in
+    """Return the displacement (n, 3) float32 m of the surface under force (k, 3) N at nodes (k,), sorted positions in
     ``touchable``, and inner_force (c,) N at sensing points ``inner`` (c,)."""
     rows, mirror, image = compliance.answers
     row, mirrored = rows[nodes], mirror[nodes]
@@ -157,8 +157,8 @@ def surface_motion(
 def sensing_gaps(
     compliance: Compliance, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray, count: int
 ) -> np.ndarray:
-    """Return the first ``count`` sensing points' gaps (count,) m, to electrode or core, under forces as in
-    ``surface_motion``: force (k, 3) N at sorted nodes (k,), inner_force (c,) N at ``inner`` (c,)."""
+    """Return the gaps (count,) m, to electrode or core, of the first ``count`` sensing points under force (k, 3) N at
+    sorted nodes (k,) and inner_force (c,) N at sensing points ``inner`` (c,)."""
     gaps = compliance.watch_gap[:count].astype(float)
     if not len(gaps):
         return gaps
@@ -170,7 +170,7 @@ def sensing_gaps(
 
 
 def _runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
-    """Find stretches of consecutive values in sorted ``indices``: (start, stop) there, and first value, last plus 1."""
+    """Return stretches of consecutive values in sorted ``indices``: start, stop there, first value, last plus 1."""
     cuts = np.flatnonzero(np.diff(indices) != 1) + 1
     starts, stops = np.r_[0, cuts], np.r_[cuts, len(indices)]
     return list(
@@ -180,10 +180,10 @@ def _runs(indices: np.ndarray) -> list[tuple[int, int, int, int]]:
 
 @Loop
 def _gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns):  # noqa: ANN001, ANN202
-    """Fill the rows (3 n) of ``entries`` (3 n, 3 n) that belong to near nodes ``at`` (k,).
-
-    move : (3 r, j) float32 m/N; rows : (n,), that answer each near node; mirrored : (n,) bool, by its image
-    columns, mirrored_columns : (3 n,) of ``move``, of the near nodes and of their images
+    """Fill in the rows (3 n) of ``entries`` (3 n, 3 n) m/N that belong to near nodes ``at`` (k,).
+    move : (3 r, j) float32 m/N, of ``Compliance``; rows : (n,), number in it of the node that answers for each near one
+    mirrored : (n,) bool, true if the near node is that one's mirror image
+    columns, mirrored_columns : (3 n,), columns of ``move`` of the near nodes, and of their mirror images
     """
     for each in at:
         flip = mirrored[each]
@@ -199,9 +199,9 @@ def _gather_rows(move, entries, at, rows, mirrored, columns, mirrored_columns): 
 
 @Loop
 def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_force):  # noqa: ANN001, ANN202
-    """Compute the displacement (3 n,) float32, m, of the whole surface; see ``surface_motion``.
-
-    rows : (k,) of ``move`` for each node; mirrored : (k,) bool; image : (n,), of every surface node
+    """Return the displacement (3 n,) float32, m, of the whole surface; other arguments as in ``surface_motion``.
+    rows : (k,), number in ``move`` of the node that answers for each; mirrored : (k,) bool, true if as its mirror image
+    image : (n,), index of each surface node's mirror image
     """
     size = move.shape[1]
     moved, there = np.zeros(size, np.float32), np.zeros(size, np.float32)
@@ -227,7 +227,7 @@ def _sum_motion(move, rows, mirrored, image, force, inner_move, inner, inner_for
 
 @Loop
 def _normal_compliance(matrix, normal, c, ridge):  # noqa: ANN001, ANN202
-    """Compute ``ComplianceBlock.normal`` in a loop; matrix, c : its own; ridge : relative, added to each point's own"""
+    """Compute ``ComplianceBlock.normal``; matrix, c : the block's; ridge : relative increase of the diagonal"""
     k = len(normal)
     size, gaps = 3 * k, np.empty((k + c, k + c))
     for a in range(k):

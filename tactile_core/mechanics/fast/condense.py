@@ -27,10 +27,10 @@ _MIRROR = np.array([1.0, 1.0, -1.0])
 
 @dataclasses.dataclass(frozen=True)
 class Half:
-    """The even (or odd) motion of a solid, by the nodes (k,) with z >= 0 that are kept, r of them touched.
+    """The even (or odd) motion of a solid, given at the k nodes with z >= 0 that are kept, r of which are touched.
 
-    answer : (3 r, 3 k) m/N, motion of the kept nodes under unit forces on touched ones; zero where nothing can move
-    under_loads : (3 k, w), their motion under the unit loads; among : (w, w), work of each load on another's motion"""
+    answer : (3 r, 3 k) m/N, motion of the kept nodes under unit forces on touched ones; 0 along axes that cannot move
+    under_loads : (3 k, w), their motion under w unit loads; among : (w, w), work of each load on another's motion"""
 
     answer: np.ndarray
     under_loads: np.ndarray
@@ -51,7 +51,7 @@ def condense(
     mesh: HexMesh, material: Material, keep: np.ndarray, touched: np.ndarray, loads: csc_array, parity: int
 ) -> Half:
     """Condense the even (``parity`` 1) or odd (-1) half of a solid to the nodes ``keep`` (k,) with z >= 0.
-    touched : (r,) indices, among ``keep``, of those that forces act on, sorted
+    touched : (r,) sorted positions, in ``keep``, of the nodes that forces act on
     loads : (3 n_nodes, w) sparse, unit loads on any nodes, one a column
     Raises ValueError for a solid that is not mirror symmetric in z, or is held nowhere."""
     tree = _Elimination(mesh, material, keep, loads, parity)
@@ -91,7 +91,7 @@ def mirror_upper(matrix: np.ndarray) -> None:
 
 
 class _Elimination:
-    """Elimination of one half of a solid down to nodes ``keep`` (k,); loads : (3 n, w); parity : 1 even, -1 odd"""
+    """Condenses half a solid to nodes ``keep`` (k,). loads : (3 n, w), unit; parity : 1 even half, -1 odd half"""
 
     def __init__(self, mesh: HexMesh, material: Material, keep: np.ndarray, loads: csc_array, parity: int) -> None:
         from scipy import sparse
@@ -131,7 +131,7 @@ class _Elimination:
         return self.dof[full[local]], self.sign[full[local]], local
 
     def group(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Unknowns (n,) that a group of cells shares with others, or keeps, and its stiffness among them (n, n)."""
+        """Return a group of cells' unknowns (n,) that others share or that are kept, and its stiffness (n, n)."""
         if len(cells) <= _LEAF:
             parts = []
             for c in cells:
@@ -147,7 +147,8 @@ class _Elimination:
         return self._eliminate(cells, parts)
 
     def _eliminate(self, cells: np.ndarray, parts: list) -> tuple[np.ndarray, np.ndarray]:
-        """Sum the parts of a group of cells, and eliminate unknowns that no other cell has (Schur complement)."""
+        """Add up the parts of a group of ``cells``, eliminate unknowns of no other cell (Schur complement); see
+        `group`."""
         from scipy.linalg import lapack, solve_triangular
 
         uses = np.zeros(self.free, int)
@@ -189,7 +190,7 @@ def axes_of(nodes: np.ndarray) -> np.ndarray:
 
 
 class MirrorSymmetry:
-    """Joins a motion's even and odd half. half : (k,) surface nodes, z >= 0; image : (n,) of each surface node"""
+    """Joins a motion's even and odd half. half : (k,) surface nodes, z >= 0; image : (n,) mirror image of each node"""
 
     def __init__(self, half: np.ndarray, image: np.ndarray) -> None:
         count = 3 * len(half)
@@ -199,8 +200,8 @@ class MirrorSymmetry:
         self._place[axes_of(half)] = np.arange(count)  # after the other: on the mirror plane this one is right
 
     def loads(self, even: np.ndarray, odd: np.ndarray, column: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return motions (w, 3 n) float32 of all surface nodes from the halves' even, odd (3 k, v) under v loads: the
-        i-th is under load column[i] of (w,), or its mirror image if sign[i] of (w,) is -1."""
+        """Return motions (w, 3 n) float32 of all surface nodes from their halves even, odd (3 k, v) under v loads: the
+        i-th is under load ``column[i]``, or under its mirror image if ``sign[i]`` is -1. column, sign : (w,)"""
         return self._joined(even.T, odd.T, column, sign.astype(np.float32))
 
     def forces(self, even: np.ndarray, odd: np.ndarray) -> np.ndarray:
@@ -209,7 +210,7 @@ class MirrorSymmetry:
         return self._joined(even, odd, np.arange(len(even)), np.ones(len(even), np.float32))
 
     def _joined(self, even: np.ndarray, odd: np.ndarray, rows: np.ndarray, sign: np.ndarray) -> np.ndarray:
-        """Return motions (w, 3 n) by rows (w,) of the halves: even + sign odd at z >= 0; below, even - sign odd."""
+        """Return motions (w, 3 n) from ``rows`` (w,) of even, odd: even + sign odd at z >= 0, below even - sign odd."""
         both = np.empty((2, len(self._sign)), np.float32)
         joined = np.empty((len(rows), len(self._place)), np.float32)
         for motion, row, mirrored in zip(joined, rows, sign, strict=True):

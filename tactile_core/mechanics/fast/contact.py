@@ -1,7 +1,7 @@
 """Contact of a rigid indenter with a sensor's surface, solved on its compliance; every result is checked.
 
-Only nodes that the indenter may touch enter a solve; all nodes near it are then displaced and looked at, and those that
-would go through it, or inner skin that would go through the core, are taken in and the solve goes on.
+Only nodes that the indenter may touch enter a solve. Then all nodes near it are displaced and checked: those that would
+go through it, and inner skin that would go through the core, are added, and the solve is repeated.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _LIKELY = 0.3  # nodes that overlap the indenter by this share of the deepest ov
 
 
 class _Around(NamedTuple):
-    """Effect of a contact on n nodes near it: moved (n, 3) m, gap (n,) m; core_gap (g,) m between skin and core."""
+    """Effect of a contact on n nodes near it: displacement moved (n, 3) m, gap (n,) m; core_gap (g,) m of the skin."""
 
     moved: np.ndarray
     gap: np.ndarray
@@ -44,11 +44,11 @@ class _Around(NamedTuple):
 
 
 class ContactProblem:
-    """An indenter in front of one sensor; solves for depths, for forces along the motion, and for other poses.
+    """An indenter in front of one sensor; solves contacts at depths, at forces along the motion, and at other poses.
 
-    Nodes are followed only where the indenter can reach them, ``reach`` m in from ``pose``, which is at depth 0.
-    friction : Coulomb's coefficient; with it a contact depends on the one it goes on from, and on the steps between.
-    work : what contacts may cost, None for as much as they take; a solve raises ExhaustedError where it is used up"""
+    pose : of the indenter at depth 0; reach : m, depth up to which nodes that it may touch are followed from the start
+    friction : Coulomb's coefficient; with it a contact depends on the one it starts from, and on the steps between
+    work : effort that contacts may cost, None for no limit; a solve raises ExhaustedError once nothing is left"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, friction: float = 0.0,
@@ -67,12 +67,12 @@ class ContactProblem:
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
-        """Solve the contact at a depth, m, going on from ``start`` (None: from rest); it may not have converged."""
+        """Solve the contact at a depth, m, from ``start`` (None: from rest). See ``converged`` of the result."""
         return self._walk(self.pose.moved(depth), None, start)
 
     def at_pose(self, pose: Pose, start: Contact | None = None, axial_force: float | None = None) -> Contact:
-        """Solve the contact at another pose, from ``start`` (None: from rest) in one step or, where that does not
-        converge, in several; it may not have converged.
+        """Solve the contact at another pose, from ``start`` (None: from rest), in one step or, if that does not
+        converge, in several. See ``converged`` of the result.
         axial_force : N; the indenter then moves on along its direction until it bears that force; None: it stays there
         """
         self._look_near(pose, start)
@@ -86,7 +86,7 @@ class ContactProblem:
         check_follows(where, grid, self.indenter, contact.pose, contact.depth, normals, closed=surface.closed)
 
     def _look_near(self, pose: Pose, start: Contact | None = None) -> None:
-        """Follow the nodes that the indenter may reach at a pose, and those that ``start`` touched."""
+        """Choose the nodes to follow: those that the indenter may reach at a pose, and those that ``start`` touched."""
         wanted = self._nodes_within(pose, _REACH)
         touched = np.empty(0, int) if start is None else start.nodes
         held = among(wanted, self.near).all() and among(touched, self.near).all()
@@ -98,7 +98,7 @@ class ContactProblem:
         return ComplianceRows(self.compliance, near)
 
     def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
-        """Sorted touchable indices (k,) of the resting nodes that lie less than ``reach`` m outside the indenter."""
+        """Return sorted positions (k,) in ``touchable`` of resting nodes less than ``reach`` m outside the indenter."""
         nodes, _ = self.compliance.surface.blocks.near(self.indenter, pose, reach)
         touchable = self.compliance.touchable
         return np.searchsorted(touchable, nodes[among(nodes, touchable)])
@@ -110,11 +110,11 @@ class ContactProblem:
 
     @property
     def nodes_near(self) -> np.ndarray:
-        """Followed nodes (n,), by position in ``touchable``: ``near`` without an edge contact's points between."""
+        """Followed nodes (n,), by position in ``touchable``: ``near`` without an ``EdgeContactProblem``'s points."""
         return self.near
 
     def _walk(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
-        """Solve in one step, or where that does not settle by a detour. axial_force : N, None for the pose's depth"""
+        """Solve in one step or, if that does not converge, in 4, 9 or 20. axial_force : N, None for the pose's depth"""
         contact = self._solve(pose, axial_force, start)
         for steps in _DETOURS:
             if contact.converged:
@@ -123,7 +123,7 @@ class ContactProblem:
         return contact
 
     def _steps(self, pose: Pose, axial_force: float | None, start: Contact | None, steps: int) -> Contact:
-        """Go from the start to the goal in steps. axial_force : N along the motion, None for the pose's depth"""
+        """Go from ``start`` (None: rest) to the goal in equal steps. axial_force : N, None for the pose's depth"""
         first = contact = start or self._nothing(self.pose)
         for share in np.arange(1, steps + 1) / steps:
             goal = None if axial_force is None else first.axial_force + share * (axial_force - first.axial_force)
@@ -134,7 +134,7 @@ class ContactProblem:
         return contact
 
     def _solve(self, pose: Pose, axial_force: float | None, start: Contact | None) -> Contact:
-        """Solve in one step, as ``_rounds``, from chosen nodes. axial_force : N, None for the pose's depth"""
+        """Solve in one step: choose nodes to begin with, run ``_rounds``. axial_force : N, None for the pose's depth"""
         before = start or self._nothing(self.pose)
         moved = self._moved(before)
         gap, _ = self._distance(pose, self.near, moved)
@@ -164,12 +164,12 @@ class ContactProblem:
         return pose.distance(self.indenter, self._rest[nodes] + moved)
 
     def _moved(self, contact: Contact) -> np.ndarray:
-        """Displacement (n, 3) m of the near nodes in a contact."""
+        """Return the displacement (n, 3) m of the near nodes in a contact."""
         return self._rows.moved(contact.nodes, contact.nodal_force, contact.core_nodes, contact.core_force)
 
     def _rounds(self, pose: Pose, axial_force: float | None, before: Contact, moved, candidates: Candidates) -> Contact:  # noqa: ANN001
-        """Solve, look at the whole surface, take in what it shows, until nothing more is found.
-        axial_force : N, None for the pose's depth; before : last contact; moved : (n, 3) m, near nodes in it"""
+        """Solve, and add the near nodes that the solution lets through the indenter or the core, until there are none.
+        axial_force : N, None for the pose's depth; before : last contact; moved : (n, 3) m, of the near nodes in it"""
         iterations, shift = 0, 0.0
         contact = self._nothing(pose)  # where every round found creases
         for _ in range(_MOST_ROUNDS):
@@ -220,8 +220,8 @@ class ContactProblem:
         return Frictionless(block, rest, core_gap, self.indenter, pose, candidates.probe, candidates.faced)
 
     def _spots(self, before: Contact, moved: np.ndarray, pose: Pose, nodes: np.ndarray) -> np.ndarray:
-        """Return sticking points (k, 3) m of nodes (k,) in the indenter's frame: the old ones, or where they first meet
-        it. moved : (n, 3) m, displacement of all near nodes in the contact before"""
+        """Return the points (k, 3) m, in the indenter's frame, that nodes (k,) stick to: those of before, or where they
+        first meet it. moved : (n, 3) m, displacement of all near nodes in the contact before"""
         points = self._rest[nodes] + moved[np.searchsorted(self.near, nodes)]
         spots, new = before.pose.to_own(points), ~among(nodes, before.nodes)
         if pose is not before.pose:
@@ -229,7 +229,7 @@ class ContactProblem:
         return spots
 
     def _take_in(self, candidates: Candidates, around: _Around) -> bool:
-        """Add the nodes that the contact lets through the indenter or the core; returns true if there are any."""
+        """Make candidates of nodes that the contact lets through indenter or core; return true if there are any."""
         outside = np.ones(len(self.near), bool)
         outside[np.searchsorted(self.near, candidates.nodes)] = False
         found = bool(around.gap[outside].min(initial=0.0) < -_CLOSED)
@@ -244,7 +244,7 @@ class ContactProblem:
         return found
 
     def _nothing(self, pose: Pose, *, converged: bool = True, iterations: int = 0) -> Contact:
-        """Return a result without contact, or, not converged, one that was not found after some iterations."""
+        """Return a contact without force at a pose; ``converged`` false: none was found, after so many iterations."""
         none, depth = np.empty(0, int), float((pose.apex - self.pose.apex) @ pose.direction)
         return Contact(
             self.compliance, pose, depth, np.zeros(3), 0.0, none, np.zeros((0, 3)), np.zeros(0, bool), converged,
@@ -272,18 +272,18 @@ class ContactProblem:
         return contact, _Around(moved, gap, core)
 
     def _on_nodes(self, touching: np.ndarray, force: np.ndarray, slipping: np.ndarray) -> Loads:
-        """Return the nodes (k,) that carry what is touching (j,), force on them (k, 3) N, and whether they are slipping
-        (k,). Here these are the same."""
+        """Return the nodes (j,) that carry force (k, 3) N on points ``touching`` (k,), the forces (j, 3) N, and which
+        are slipping (j,). Here they are the points themselves."""
         return touching, force, slipping
 
     def _place(self, touching: np.ndarray, force: np.ndarray, moved: np.ndarray) -> np.ndarray:
-        """Return the displacement (n, 3) m of all that may touch. moved : (n, 3) m, that of the surface there
-        touching, force : indices (k,), as in ``near``, and forces (k, 3) N on them; used by ``EdgeContactProblem``"""
+        """Return the displacement (n, 3) m of all points near, given the surface's there, moved (n, 3) m. Here it is
+        that; ``EdgeContactProblem`` adds how force (k, 3) N compresses springs at points ``touching`` (k,)."""
         return moved
 
 
 def _single(nodes: np.ndarray, state: Try) -> Loads:
-    """Return those of nodes (k,) that carry force in a state, each once, forces (j, 3) N, which of them slip (j,)."""
+    """Return those of nodes (k,) that carry force, each once, their forces (j, 3) N, and which of them slip (j,)."""
     force, slipping = state.force, state.slipping
     if (nodes[1:] == nodes[:-1]).any():
         first = np.flatnonzero(np.diff(nodes, prepend=-1))
@@ -293,7 +293,7 @@ def _single(nodes: np.ndarray, state: Try) -> Loads:
 
 
 def _way_in(before: Contact, axial_force: float | None) -> float:
-    """Estimate how much deeper, m, an indenter stands when its force grows from ``before`` to axial_force N (Hertz)."""
+    """Estimate how much deeper, m, an indenter goes as its force grows from ``before`` to axial_force N (Hertz)."""
     if axial_force is None or before.axial_force <= 0 or before.depth <= 0:
         return 0.0
     return min(before.depth * max((axial_force / before.axial_force) ** (2 / 3) - 1, 0.0), _REACH / 2)

@@ -1,6 +1,6 @@
-"""States of an indenter's contact with a sensor's surface: the solved one, and the candidates that it is sought among.
+"""States of an indenter's contact with a surface: the solved contact, and the candidates among which it is sought.
 
-Candidates are the nodes that enter a solve; here is where they start, and what must be added to them.
+Candidates are the nodes that enter a solve; functions here place them at its start and add those that are missing.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ Loads = tuple[np.ndarray, np.ndarray, np.ndarray]  # nodes (k,) that carry force
 @dataclasses.dataclass(frozen=True)
 class Contact:
     """Solved contact. Lengths m, forces N, exerted by the indenter on the sensor.
-
-    pose : where the indenter stands; depth : how far that is along the motion from the problem's pose
+    pose : of the indenter; depth : its distance along the motion from the problem's pose
     force : (3,); axial_force : its part along the motion
-    nodes : (k,) positions in ``touchable`` of nodes that carry force; nodal_force : (k, 3). Forces between nodes are
-        spread over the nodes whose cubic interpolation gives their places: some nodes then have a small outward force
+    nodes : (k,) positions in ``touchable`` of nodes that carry force; nodal_force : (k, 3). Forces on points between
+        nodes are spread over the nodes they are interpolated from: some of these then have a small outward force
     slipping : (k,) bool, nodes whose friction is at its limit; without friction all
     converged : false if the solve ended early: do not use it; iterations : linearised problems solved for it
     core_nodes : (c,) inner sensing points that press on the core; core_force : (c,), on the skin, away from the core
     penetration : m, the largest depth of a node in the indenter or of the inner skin in the core
-    sideways : nodal forces across the indenter's normals over the whole force: 0 without friction"""
+    sideways : norm of nodal forces' parts across the indenter's normals, over the whole force; 0 without friction
+    """
 
     compliance: Compliance = dataclasses.field(repr=False)
     pose: Pose
@@ -53,7 +53,7 @@ class Contact:
         return surface_motion(self.compliance, self.nodes, self.nodal_force, self.core_nodes, self.core_force)
 
     def at_depth(self, depth: float) -> Contact:
-        """Return this contact with its ``depth``, m, restated: counted from first touch at another place."""
+        """Return this contact with another ``depth``, m, as counted from first touch at another place."""
         moved = dataclasses.replace(self, depth=depth)
         if "displacement" in vars(self):  # is known already, and does not depend on it
             vars(moved)["displacement"] = self.displacement
@@ -66,7 +66,7 @@ class Contact:
 
     @property
     def sensing_gaps(self) -> np.ndarray:
-        """Gaps (w,) m of the sensing points: the electrodes, then inner skin over the core, then beside it."""
+        """Gaps (w,) m of the sensing points: inner skin under the electrodes, then facing the core, then beside it."""
         return self._gaps(len(self.compliance.watch_gap))
 
     @property
@@ -121,11 +121,11 @@ _SPOT_STEPS = 20  # where a node sticks matters, so its spot is found to well be
 
 @dataclasses.dataclass
 class Candidates:
-    """Nodes that may carry force, sorted; a node stands twice where it touches two faces of a concave crease.
+    """Nodes that may carry force, sorted; a node stands twice if it touches both faces of a concave crease.
     nodes : (k,) positions in ``Compliance.touchable``; displacement : (k, 3) m, first guess
-    probe : (k, 3) m, offset beside a node in a crease at which its face's distance is measured, else 0
+    probe : (k, 3) m, offset from a node in a crease to where the distance of its face is measured, else 0
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points that may press on the core
-    looks : (k,) how often ``split`` looked for a node's faces; once a node stands twice they are known"""
+    looks : (k,) number of times that ``split`` searched for a node's second face; once found, the most (``faced``)"""
 
     nodes: np.ndarray
     displacement: np.ndarray
@@ -141,11 +141,11 @@ class Candidates:
         return self.looks >= _MOST_LOOKS
 
     def go_on(self, displacement: np.ndarray, active: np.ndarray) -> None:
-        """Take displacement (k, 3) m and the first k of active (k + c,) bool as the new first guess."""
+        """Make displacement (k, 3) m and the first k of active (k + c,) bool the new first guess."""
         self.displacement, self.active = displacement, active[: len(self.nodes)]
 
     def add(self, nodes: np.ndarray, displacement: np.ndarray, probe: np.ndarray) -> None:
-        """Let nodes (j,) enter, at first touching; displacement, probe : (j, 3) m, first guess and measured offset"""
+        """Add nodes (j,), which at first touch; displacement, probe : (j, 3) m, as in the class"""
         self.looks = np.concatenate([self.looks, np.where(np.isin(nodes, self.nodes), _MOST_LOOKS, 0)])
         every = np.concatenate([self.nodes, nodes])
         order = np.argsort(every, kind="stable")
@@ -157,8 +157,8 @@ class Candidates:
     def split(
         self, at: np.ndarray, left: np.ndarray, normals: np.ndarray, indenter: Indenter, pose: Pose, rest: np.ndarray
     ) -> None:
-        """Double the nodes at positions ``at`` (j,) that lie in a crease of the indenter, which stands at ``pose``:
-        they touch the face that they are at and the one they left.
+        """Let the nodes at positions ``at`` (j,), if they lie in a concave crease of the indenter at ``pose``, touch
+        both of its faces, the one that they are at and the one that they left: each then stands twice.
         left, normals : (j, 3), a point m of the face that each left, and the normal there
         rest : (k, 3) m, of all candidates
         At the crease both faces are equally near, so each face's distance is measured a little beside it (``probe``).
@@ -181,16 +181,17 @@ class Candidates:
 
 
 def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Points (j, 3) m where planes meet, nearest to ``points`` of the first one; ``others`` lie in the second one."""
+    """Return the points (j, 3) m where two planes meet that are nearest to ``points``, in the first plane; ``others``
+    lie in the second. first, second : the planes' unit normals"""
     across = second - np.einsum("ai,ai->a", second, first)[:, None] * first
     way = np.einsum("ai,ai->a", others - points, second) / np.einsum("ai,ai->a", across, second)
     return points + way[:, None] * across
 
 
 def project(indenter: Indenter, pose: Pose, points: np.ndarray, far: float) -> np.ndarray:
-    """Return displacements (n, 3) m, along the motion, that bring points (n, 3) m to the front of an indenter at
-    ``pose``.
-    far : m, how deep points may lie in the indenter. Points that lie in front of the indenter already stay."""
+    """Return the displacements (n, 3) m, along the motion, that bring points (n, 3) m in an indenter at ``pose`` to its
+    front; points in front of it stay.
+    far : m, the most that a point may lie in the indenter"""
     own, travel, on_way = pose.to_own(points), np.full(len(points), far), np.arange(len(points))
     ahead = pose.own_direction
     for _ in range(_TRACE_STEPS):

@@ -1,9 +1,9 @@
-"""Stiffness of the points that touch: the forces under which they move by given ways, the inverse of their compliance.
+"""Stiffness of the points that touch, the inverse of their compliance: it gives the forces that move them.
 
 From one iteration to the next, and from one step of a path to the next, few points come or go. The inverse is then
-changed in place (the Schur complement: W. Hager, SIAM Review 31, 1989, 221-239), where a new factor would cost a
-multiple. Compliances among touching points are well conditioned (30 for 300 nodes of the DIGIT, 200 for 140 of the
-BioTac), so that single precision resolves the inverse to 1e-6; what it misses, Newton's method makes good.
+changed in place (the Schur complement: W. Hager, SIAM Review 31, 1989, 221-239), which costs a fraction of a new one.
+Compliances among touching points are well conditioned (30 for 300 nodes of the DIGIT, 200 for 140 of the BioTac), so
+that single precision resolves the inverse to 1e-6; Newton's method corrects the rest.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ _STRIP = 64  # rows that are mirrored at a time, so that they stay in the proces
 
 
 class ContactStiffness:
-    """Keeps the inverse of the compliance, the stiffness, among the points that touch, and changes it as points come
-    and go. A point that has left may keep its rows and columns, as zeros: to take them out would cost a copy."""
+    """Inverse of the compliance among the points that touch, updated as points come and go. A point that has left may
+    keep its rows and columns, as zeros: to take them out would cost a copy."""
 
     def __init__(self) -> None:
         self._forget()
@@ -35,11 +35,11 @@ class ContactStiffness:
         self._updates = 0
 
     def among(self, block: ComplianceBlock, active: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the stiffness (j, j) float32 N/m among a block's ``active`` (k + c,) bool points, and the place (j,)
-        of each of its rows among the block's 3 k + c degrees of freedom.
+        """Return the stiffness (j, j) float32 N/m among a block's ``active`` (k + c,) bool points, and the position
+        (j,) of each of its rows among the block's 3 k + c degrees of freedom.
 
-        The three rows of a node follow each other; rows of points that are not active are zero. The next call changes
-        the stiffness in place. Raises UnsolvedError where the compliance is not positive definite."""
+        A node has three successive rows; rows of points that are not active are zero. The next call changes the array
+        in place. Raises UnsolvedError if the compliance is not positive definite."""
         wanted = np.concatenate([np.repeat(active[: block.k], 3), active[block.k :]])
         if not len(wanted):
             self._forget()  # no row is one of the block's
@@ -61,7 +61,8 @@ class ContactStiffness:
 
     def _is_quick(self, gone: int, new: np.ndarray, wanted: np.ndarray) -> bool:
         """Return true if changing the inverse costs less than making it anew, and adds up little rounding.
-        gone : how many rows go; new, wanted : (m,) bool, the block's degrees of freedom that come, and all wanted"""
+        gone : number of rows to take out; new, wanted : (m,) bool, the block's unknowns to add, and all wanted
+        """
         size, most = int(wanted.sum()), len(self._inverse) + int(new.sum())
         effort = _GOES * gone * len(self._inverse) ** 2 + _COMES * int(new.sum()) * most**2
         return size >= _SMALL and effort <= _FEW * size**3 and self._updates <= _MOST_UPDATES
@@ -69,9 +70,9 @@ class ContactStiffness:
     def _change(
         self, block: ComplianceBlock, gone: np.ndarray, new: np.ndarray, at: np.ndarray, there: np.ndarray
     ) -> bool:
-        """Let rows ``gone`` (i,) leave, and the block's ``new`` (m,) bool ones come; false where rounding has added up.
+        """Take rows ``gone`` (i,) out, add the block's unknowns ``new`` (m,) bool; false if rounding has added up.
 
-        at : (j,), places of the rows in the block; there : (j,) bool, which of them it has
+        at : (j,), positions of the inverse's rows in the block; there : (j,) bool, which of them the block has
         """
         try:
             _release(self._inverse, gone)
@@ -92,14 +93,14 @@ class ContactStiffness:
 
 
 def _among(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return the part (j, j) of a compliance matrix (s, s) at rows (j,), its diagonal stiffened by the ridge."""
+    """Return the part (j, j) of a compliance matrix (s, s) at rows (j,), its diagonal times 1 + ``RIDGE``."""
     part = matrix.take(rows, 0).take(rows, 1)
     part.reshape(-1)[:: len(rows) + 1] *= 1 + RIDGE
     return part
 
 
 def _add_product(matrix: np.ndarray, factor: float, first: np.ndarray, second: np.ndarray) -> None:
-    """Add ``factor`` first.T @ second, a symmetric product of (i, j) float32 each, to a matrix (j, j) in place."""
+    """Add ``factor`` first.T @ second, symmetric, to a matrix (j, j) in place; first, second : (i, j) float32"""
     from scipy.linalg import blas
 
     blas.sgemm(factor, second.T, first.T, 1.0, matrix.T, trans_b=1, overwrite_c=1)
@@ -116,8 +117,8 @@ def _release(inverse: np.ndarray, gone: np.ndarray) -> None:
 
 
 def _admit(inverse: np.ndarray, matrix: np.ndarray, at: np.ndarray, new: np.ndarray) -> None:
-    """Take rows ``new`` (i,), zero so far, into an inverse (j, j) in place.
-    matrix : (s, s), the compliance; at : (j,), places in it of the inverse's rows"""
+    """Add rows ``new`` (i,), zero so far, to an inverse (j, j) in place.
+    matrix : (s, s), the compliance; at : (j,), positions in it of the inverse's rows"""
     if not len(new):
         return
     across = matrix.take(at[new], 0).take(at, 1)
@@ -131,7 +132,7 @@ def _admit(inverse: np.ndarray, matrix: np.ndarray, at: np.ndarray, new: np.ndar
 
 
 def _inverted(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric matrix (j, j) float32, which is overwritten. Raises UnsolvedError: it is not definite."""
+    """Return the inverse of a symmetric matrix (j, j) float32, overwriting it. UnsolvedError if it is not definite."""
     from scipy.linalg import lapack
 
     # LAPACK stores by columns: what it takes for the lower half is the upper one here.

@@ -1,8 +1,8 @@
 """Correct the fast tier's linear model by the full tier: a learned factor of force and a field of shape.
 
-Both are smooth functions of what a fast contact looks like (depth, patch, place, lean, fluid), found by kernel ridge
-regression; nothing depends on which indenter it was. The field is a sum of a few learned fields in a frame that moves
-with the contact and is scaled by its size. See ``learn_correction`` for how they are made.
+Both are smooth functions of features of the fast contact (depth, patch, place, lean, fluid), found by kernel ridge
+regression; the indenter's shape is no input. The field is a sum of a few learned fields in a frame that moves with the
+contact and is scaled by its size. ``scripts/benchmarks/make/learn_correction.py`` learns both.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ FILE = "mechanics_correction.npz"
 
 @dataclasses.dataclass(frozen=True)
 class PatchFrame:
-    """A frame that moves with a contact: centre (2,) = (x, z) m, unrolled, and radius m of its patch."""
+    """Frame of a contact's patch: its centre (2,) = (x, z) m on the unrolled surface, and its radius m."""
 
     centre: np.ndarray
     radius: float
@@ -45,14 +45,14 @@ class PatchFrame:
 
 @dataclasses.dataclass(frozen=True)
 class Learned:
-    """A sensor's correction, with friction or without: kernel ridge regression from f features of a contact, by its
-    likeness to n supports (contacts learned from), to a factor and k fields on a grid of g = 33 x 33 places.
-    shift, scale : (f,); a scaled feature is (feature - shift) / scale; supports : (n, f) scaled features
-    support_rubs : (n,), friction of the supports, 0 without to 1
+    """A sensor's correction, without friction or with: a force factor, and a displacement field that is a sum of k
+    learned ones on a grid of g = 33 x 33 places. Both by kernel ridge regression on f features of a contact.
+    shift, scale : (f,); a scaled feature is (feature - shift) / scale; supports : (n, f), of the contacts learned from
+    support_rubs : (n,), amount of friction in these, 0 to 1 (``rubs``)
     widths : (3,), of the kernels of force on all features, on 7 of them (depth, force, radius, ...), and of fields
     force_weights : (2, n), of two estimates of the log of the force factor, then averaged; field_weights : (n, k)
-    fields : (k, g, 3), per metre of depth, in the surface's own frames
-    trust : (bins, 3), depth over thickness, and how much of the predicted logarithm and field is applied there, 0 to 1
+    fields : (k, g, 3), per metre of depth, in each surface node's own axes (``node_frames``)
+    trust : (bins, 3), depth over thickness, and how much of the predicted log and field is applied there, 0 to 1
     """
 
     shift: np.ndarray
@@ -72,7 +72,7 @@ class Learned:
         return self._trusted(features, 1) * float(every + few) / 2
 
     def field(self, features: np.ndarray) -> np.ndarray:
-        """Return the correction on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
+        """Return the displacement to add on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
         near = self._near(features, ALL, self._all, self.widths[2])
         return self._trusted(features, 2) * np.tensordot(near @ self.field_weights, self.fields, 1)
 
@@ -95,7 +95,7 @@ class Learned:
 
 @dataclasses.dataclass(frozen=True)
 class Correction:
-    """Correction of one sensor, interpolated from ``still``, without friction, to ``rubbing``, coefficient 0.78."""
+    """Correction of one sensor, interpolated by friction from ``still`` (none) to ``rubbing`` (coefficient 0.78)."""
 
     still: Learned
     rubbing: Learned
@@ -105,7 +105,7 @@ class Correction:
         return float(np.exp(self._blend(features, Learned.log_factor)))
 
     def field(self, features: np.ndarray) -> np.ndarray:
-        """Return the correction on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
+        """Return the displacement to add on the grid (g, 3), per metre of depth; features : (f,), not scaled"""
         return self._blend(features, Learned.field)
 
     def _blend(self, features: np.ndarray, of: Callable[[Learned, np.ndarray], _Answer]) -> _Answer:
@@ -123,7 +123,7 @@ class _Supports(NamedTuple):
 
 
 def squares(features: np.ndarray) -> np.ndarray:
-    """Sums (n,) of the squares of scaled features (n, f), which ``kernel`` takes."""
+    """Return the sums (n,) of the squares of scaled features (n, f), which ``kernel`` takes."""
     return (features**2).sum(axis=1)
 
 
@@ -136,12 +136,12 @@ def kernel(a: np.ndarray, b: np.ndarray, b_squares: np.ndarray, width: float) ->
 
 
 def rubs(features: np.ndarray) -> np.ndarray:
-    """Amount of friction in contacts of features (..., f): 0 without friction, 1 with the largest one learned from."""
+    """Return how much friction contacts with features (..., f) have: 0 none, 1 as much as was learned from."""
     return np.clip((features[..., _SIDEWAYS] - _STILL) / (_RUBS - _STILL), 0.0, 1.0)
 
 
 def alike(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a kernel's factor for amounts of friction a and b, 0 to 1: larger where both have some, or none."""
+    """Return the kernel's factor for amounts of friction a and b, 0 to 1: larger if both have some, or none."""
     return 1 + _ALIKE * (a * b + (1 - a) * (1 - b))
 
 
@@ -156,7 +156,7 @@ def plane(sensor: str) -> np.ndarray:
 
 @functools.cache
 def node_frames(sensor: str) -> np.ndarray:
-    """Axes (n, 3, 3) of each surface node as columns: along the finger, outward, across."""
+    """Return each surface node's axes (n, 3, 3), unit vectors in columns: along the finger, outward, across."""
     if sensors.is_gel(sensor):
         axes = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
         return np.broadcast_to(axes, (len(sensors.sensor_surface(sensor).rest), 3, 3))
@@ -205,7 +205,7 @@ MIRRORED = np.array([1, 1, 1, 1, 1, 1, 1, -1, 1, -1, 1, 1, -1, 1, -1, 1, 1, 1, 1
 
 
 def grid_places() -> np.ndarray:
-    """Return places (33, 33, 2) of the fields' grid, along and across the finger from the patch, in its radii."""
+    """Return places (33, 33, 2) of the fields' grid, along and across the finger from the patch's centre, in radii."""
     line = np.sinh(np.linspace(-np.arcsinh(REACH), np.arcsinh(REACH), LINES))
     return np.stack(np.meshgrid(line, line, indexing="ij"), -1)
 
@@ -267,8 +267,8 @@ def add_field(sensor: str, displacement: np.ndarray, at: PatchFrame, field: np.n
 
 @Loop
 def _add_field(displacement, plane, frames, centre, radius, field, scale):  # noqa: ANN001, ANN202
-    """Return displacement (n, 3) plus scale times a field (g, 3) on a grid, float64: bilinear, 0 beyond it.
-    plane : (n, 2) m, nodes' places; frames : (3, 3, n), of ``node_frames``; centre, radius : (2,) m, m, the grid's"""
+    """Return displacement (n, 3) plus scale times a field (g, 3) on a grid, float64: bilinear, 0 beyond the grid.
+    plane : (n, 2) m, nodes' places; frames : (3, 3, n), ``node_frames``; centre : (2,) m, radius : m, of the patch"""
     moved, per_line = np.empty(displacement.shape), (LINES - 1) / 2 / np.arcsinh(REACH)
     middle = (LINES - 1) / 2
     for node in range(len(plane)):

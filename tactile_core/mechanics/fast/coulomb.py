@@ -28,8 +28,8 @@ WAVERS = 2  # times that a node has stuck again before it may pass its limit by 
 
 
 class Law(NamedTuple):
-    """Coulomb's law. friction : its coefficient; gap_tolerance : m, of touching points
-    spare : N of friction by which a node that keeps changing between stick and slip may pass its limit"""
+    """Coulomb's law. friction : its coefficient; gap_tolerance : m, gap up to which a point counts as touching
+    spare : N by which friction may exceed its limit on a node that keeps changing between stick and slip"""
 
     friction: float
     spare: float
@@ -37,11 +37,12 @@ class Law(NamedTuple):
 
 
 class Points(NamedTuple):
-    """Points of an iterate: what they bear and where they stand.
+    """Points of an iterate: their forces and places.
     force : (k, 3) N, on the nodes; core : (c,) N, of the points that press on the core
     active : (k + c,) bool, which touch; slips : (k,) bool
     normal, lean : (k, 3), unit, of the indenter, and along friction (0 where nodes stick): f = p (normal + mu lean)
-    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, offset of nodes from the spots of the indenter where they stick"""
+    gap : (k,) m; core_gap : (c,) m; off : (k, 3) m, offset of nodes from the indenter's spots they stick to
+    """
 
     force: np.ndarray
     core: np.ndarray
@@ -55,8 +56,8 @@ class Points(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """State in which a Newton step begins: moves (k, 3) m, of the nodes since ``motion_from``'s ``place``; slip (k, 3)
-    m, from where they stuck to the indenter; gap (k,) m."""
+    """Start of a Newton step. moves : (k, 3) m, of nodes from ``motion_from``'s ``place``; gap : (k,) m, after that
+    slip : (k, 3) m, after that, sideways from the spots of the indenter that they stick to"""
 
     moves: np.ndarray
     slip: np.ndarray
@@ -64,10 +65,10 @@ class Motion(NamedTuple):
 
 
 class Slipping(NamedTuple):
-    """Slipping nodes ``at`` (s,), and how their forces may change.
-    normal, lean : (k, 3) of all nodes, as in ``Points``; across : (s, 3), unit, normal x lean
-    pressing, limit : (s,) N, of the normal force and of friction
-    against : (s,) m/N, slip along friction over its limit: how far a node moves across friction under 1 N
+    """The s slipping nodes, and how their forces may change.
+    at : (s,), their indices; normal, lean : (k, 3) of all nodes, as in ``Points``; across : (s, 3), unit, normal x lean
+    pressing, limit : (s,) N, normal force and the most that friction can be
+    against : (s,) m/N, slip against friction over ``limit``: how far a node moves across friction under 1 N
     curved : (q,), positions in ``at`` of those whose normals turn; bend : (q, 3, 3) 1/m, second derivatives of the
         distance there; turning : (q, 3, 3) N/m, change of their forces with their motion, at the same normal forces
     friction : Coulomb's coefficient"""
@@ -86,10 +87,9 @@ class Slipping(NamedTuple):
 
 
 class Sorted(NamedTuple):
-    """Points sorted after a step, and how far from Coulomb's law it is.
-
-    active : (k + c,) bool, which touch; slips : (k,) bool; changed : whether either has; touched : whether any node did
-    deepest : m, least gap of all nodes; widest, slid : m, largest gap and slip of those that touched
+    """Points sorted after a step, and how far the step is from Coulomb's law.
+    active : (k + c,) bool, which touch; slips : (k,) bool; changed : true if either has; touched : true if any node did
+    deepest : m, least gap of all nodes; widest, slid : m, largest gap and forbidden slip of nodes that touched
     tilted : N, by which forces turn with their normals; size : N, of the whole force
     """
 
@@ -106,9 +106,9 @@ class Sorted(NamedTuple):
 
 @Loop
 def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001, ANN201
-    """Reduce a guessed force and core to Coulomb's law, in place: f = p (n + mu t), p >= 0, where a node slips.
+    """Reduce a guessed force and core to Coulomb's law, in place: f = p (n + mu t), p >= 0, on a node that slips.
 
-    Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; nodes without one stick from now on.
+    Returns unit directions t (k, 3) of friction, elsewhere called ``lean``; slipping nodes without one stick then.
     force : (k, 3) N; core : (c,) N; active : (k + c,), slips : (k,), bool; normal : (k, 3); friction : mu"""
     k = force.shape[0]
     lean = np.zeros((k, 3))
@@ -137,8 +137,8 @@ def reduce_to_law(force, core, active, slips, normal, friction):  # noqa: ANN001
 
 @Loop
 def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
-    """Compute the ``Motion`` of nodes from ``place`` (k, 3) m to ``moved`` (k, 3) m, by their gap (k,) m, normal (k, 3)
-    and off (k, 3) m, their offset from the spots where they stick, all at ``place``."""
+    """Return the ``Motion`` of nodes from ``place`` (k, 3) m to ``moved`` (k, 3) m. At ``place`` are known their gap
+    (k,) m, normal (k, 3) and off (k, 3) m, offset from the spots that they stick to."""
     moves, slip, gap_then = np.empty(place.shape), np.empty(place.shape), np.empty(len(gap))
     for a in range(place.shape[0]):
         onto, along = 0.0, 0.0
@@ -154,7 +154,7 @@ def motion_from(place, moved, off, gap, normal):  # noqa: ANN001, ANN201
 
 @Loop
 def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001, ANN201
-    """Compute ``Slipping``, which describes curved, bend and friction too, of nodes ``at`` (s,) of ``points``."""
+    """Return the ``Slipping`` of the nodes ``at`` (s,) of ``points``; curved, bend, friction : as described there"""
     s = len(at)
     across, pressing, limit, against = np.empty((s, 3)), np.zeros(s), np.empty(s), np.zeros(s)
     turning = np.empty((len(curved), 3, 3))
@@ -181,8 +181,7 @@ def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001,
 
 @Loop
 def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001, ANN201
-    """Prescribed motion (3 k + c, columns) m of touching points, 0 of others; slipping nodes are free along friction.
-
+    """Return the prescribed motion (3 k + c, columns) m of touching points; it is 0 along friction that slips.
     The first column closes gaps and takes sticking nodes back to their spots, the second is a metre of ``direction``.
     """
     k, normal, lean = len(motion.slip), points.normal, points.lean
@@ -207,7 +206,7 @@ def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001,
 
 @Loop
 def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
-    """Sort points into touching and slipping ones after a step: see ``Sorted``.
+    """Return which points touch and which slip after a step, as ``Sorted``.
     points : after the step, but active, slips, normal and lean of before it; turned : (k, 3), normals where nodes are
         now
     stuck_again : (k,) int, how often each node went from slip to stick, counted on in place"""
@@ -269,11 +268,11 @@ def sort_points(points, turned, stuck_again, law):  # noqa: ANN001, ANN201
 
 @Loop
 def come_back(points, after, turned, left, friction):  # noqa: ANN001, ANN201
-    """Let nodes that return to the contact slip instead of stick, since sticking is what pulled them off.
+    """Let nodes that touch again slip instead of stick, since sticking is what pulled them off. Return the largest gap,
+    m, of the nodes that touch now.
     points, after : argument and result of ``sort_points``; turned : (k, 3), new normals; friction : Coulomb's
         coefficient
-    left : (k,) bool, nodes that have left so far. Updates it, the nodes' forces and ``after.slips`` in place.
-    Returns the largest gap, m, of the nodes that touch now."""
+    left : (k,) bool, nodes that have left so far. Updates it, the nodes' forces and ``after.slips`` in place."""
     force, _, active, _, normal, _, gap, _, off = points
     wrong = 0.0
     for a in range(len(left)):

@@ -2,7 +2,7 @@
 
 Without friction nodes slide off edges and round wires, which then sink in between them (``penetration``). Here points
 halfway between nodes touch as well, each through a spring much stiffer than the surface, so that there are never more
-forces than motions to find. It costs a hundred times as much, and is for contacts that nodes alone do not hold.
+forces than motions to find. It costs a hundred times as much, and is for indenters that nodes let through.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ _DETOUR = 9  # steps, where that does not settle
 
 
 class _Sprung(Frictionless):
-    """Contact whose points may lie in the indenter by ``slack`` (k,) m before they push."""
+    """Contact whose points push once they lie in the indenter by ``slack`` (k,) m."""
 
     most_curved = 10_000  # all of them: along wires every point feels the turn of its normal
     slack: np.ndarray
 
     def distance(self, displacement: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return signed distances (k,) m, each larger by the slack, and normals (k, 3), as ``Frictionless.distance``:
-        of points under a displacement (k, 3) m, the indenter moved by shift m."""
+        """Return ``slack`` plus the signed distances (k,) m, and the normals (k, 3), of points under a displacement (k,
+        3) m, the indenter moved by shift m along its motion."""
         gap, normal = super().distance(displacement, shift)
         return gap + self.slack, normal
 
 
 class EdgeContactProblem(ContactProblem):
-    """Contact problem without friction whose candidates are the m touchable nodes and, numbered from m on, points
-    between them. pose : at depth 0; reach : m, how far in nodes are followed; work : what contacts may cost, or None"""
+    """Contact problem without friction on the m touchable nodes and, numbered from m on, points between them.
+    pose : at depth 0; reach : m, depth up to which nodes are followed; work : effort that it may cost, or None"""
 
     def __init__(
         self, compliance: Compliance, indenter: Indenter, pose: Pose, reach: float, work: Work | None = None
@@ -71,8 +71,8 @@ class EdgeContactProblem(ContactProblem):
         return self.near[self.near < self._m]
 
     def check_follows(self, contact: Contact) -> None:
-        """Raise PenetrationError if in a solved contact the indenter is over 0.1 mm deep between nodes, or has some
-        behind it, in spite of the points."""
+        """Raise PenetrationError if in a solved contact, in spite of the points, the indenter is over 0.1 mm deep
+        between nodes or has nodes behind it."""
         surface, deformed = self.compliance.surface, contact.deformed
         gap, normals = contact.pose.distance(self.indenter, deformed[self.compliance.touchable])
         normals = normals[np.abs(gap) < _ON_BODY]
@@ -87,7 +87,7 @@ class EdgeContactProblem(ContactProblem):
 
     def _nodes_within(self, pose: Pose, reach: float) -> np.ndarray:
         """Return the indices of surface nodes, and of the points between them (``_m`` + point), that lie inside the
-        indenter or less than ``reach`` m outside; the nodes that such a point lies between are among them."""
+        indenter or less than ``reach`` m outside; the nodes that such a point is interpolated from are included."""
         near = np.zeros(self._m, bool)
         near[super()._nodes_within(pose, reach + _MARGIN)] = True
         points = np.flatnonzero(near[self._points.nodes].all(axis=1))
@@ -134,18 +134,18 @@ class EdgeContactProblem(ContactProblem):
 
 
 class InterpolatedPoints(NamedTuple):
-    """v points between nodes, each a sum of 16. nodes : (v, 16), positions in ``touchable``; weights : (v, 16)"""
+    """v points, weighted means of 16 nodes each. nodes : (v, 16), positions in ``touchable``; weights : (v, 16)"""
 
     nodes: np.ndarray
     weights: np.ndarray
 
     def interpolate(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate the values (v, 3) at the points from those at all touchable nodes (m, 3)."""
+        """Return the values (v, 3) at the points, interpolated from ``values`` (m, 3) at all touchable nodes."""
         return np.einsum("vs,vsi->vi", self.weights, values[self.nodes])
 
 
 def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> InterpolatedPoints:
-    """Return the points halfway along the lattice's lines and amid its cells, if all their nodes are touchable."""
+    """Return the points amid the lattice's edges and cells whose 16 nodes are all touchable."""
     rows, columns = lattice.shape
     halves = np.mgrid[: 2 * rows - 1, : 2 * columns - (not lattice.closed)].reshape(2, -1)
     between = halves[:, (halves % 2).any(axis=0)] / 2
@@ -157,10 +157,10 @@ def interpolated_points(lattice: Lattice, touchable: np.ndarray) -> Interpolated
 
 
 class SpringRows:
-    """Compliance among nodes near an indenter and points between them: see ``ComplianceRows``.
+    """Compliance among nodes near an indenter and points between them, as ``ComplianceRows`` among nodes alone.
 
-    near : (n,) sorted: nodes by position in ``touchable``, then points, numbered on from its end, with all their nodes
-    softness : m/N, of the springs, all alike
+    near : (n,) sorted: nodes by position in ``touchable``, points numbered on from its end, and all nodes of points
+    softness : m/N, of each point's spring
     """
 
     def __init__(self, compliance: Compliance, near: np.ndarray, points: InterpolatedPoints, softness: float) -> None:
@@ -172,7 +172,7 @@ class SpringRows:
         self._weights = np.concatenate([_alone(np.ones(len(nodes))), points.weights[number]])
 
     def block(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the compliance (3 k, 3 k) float32 m/N with springs; numbers : (k,) sorted, some of ``near``"""
+        """Return the compliance (3 k, 3 k) float32 m/N, springs included, among numbers (k,), sorted, in ``near``."""
         used, sums = self._sums(numbers)
         among = self._rows.block(used)
         block = np.empty((3 * len(numbers), 3 * len(numbers)), np.float32)
@@ -185,20 +185,20 @@ class SpringRows:
         return block
 
     def sensing_motion(self, numbers: np.ndarray, inner: np.ndarray) -> np.ndarray:
-        """Return the motion (3 k, c) float32 m/N of sensing points inner (c,) under 1 N on each axis of
-        points; numbers : (k,) sorted, some of ``near``"""
+        """Return the motion (3 k, c) float32 m/N of sensing points ``inner`` (c,) under 1 N on each axis of ``numbers``
+        (k,), sorted, some of ``near``."""
         used, sums = self._sums(numbers)
         felt = self._rows.sensing_motion(used, inner)
         return (sums @ felt.reshape(len(used), -1)).reshape(3 * len(numbers), len(inner))
 
     def moved(self, nodes: np.ndarray, force: np.ndarray, inner: np.ndarray, inner_force: np.ndarray) -> np.ndarray:
-        """Return ``near``'s displacements (n, 3) m: force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
+        """Return ``near``'s motion (n, 3) m by force (k, 3) N on nodes (k,), inner_force (c,) N on inner (c,)."""
         moved = self._rows.moved(nodes, force, inner, inner_force)
         return np.einsum("ns,nsi->ni", self._weights, moved[self._nodes])
 
     def on_nodes(self, numbers: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Share force (k, 3) N on nodes and points out to nodes: return those (j,), sorted, and forces (j, 3) N on
-        them.
+        """Share force (k, 3) N on nodes and points out to nodes alone: return those (j,), sorted, and the forces (j, 3)
+        N on them.
         numbers : (k,), where force acts, distinct and sorted, some of ``near``"""
         at = np.searchsorted(self.near, numbers)
         loads = np.zeros((len(self._rows.near), 3))
@@ -207,7 +207,7 @@ class SpringRows:
         return self._rows.near[carries], loads[carries]
 
     def _sums(self, numbers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Nodes (u,), sorted, that points depend on, with weights (k, u) float32; numbers : (k,) indices in ``near``"""
+        """Return nodes (u,), sorted, that ``numbers`` (k,), in ``near``, depend on; with weights (k, u) float32."""
         at = np.searchsorted(self.near, numbers)
         sums = np.zeros((len(at), len(self._rows.near)), np.float32)
         np.add.at(sums, (np.arange(len(at))[:, None], self._nodes[at]), self._weights[at])

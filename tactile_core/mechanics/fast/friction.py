@@ -27,10 +27,10 @@ _MOST_CURVED, _FEELS_CURVATURE = 20, 0.1  # most nodes, least curvature x force 
 
 
 class Friction:
-    """Solves for the k nodes and c points over the core of one ``ComplianceBlock``.
+    """Solver for the k nodes and c points over the core of one ``ComplianceBlock``.
     rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
-    spots : (k, 3) m, where nodes stick, in the indenter's frame; friction : Coulomb's coefficient
-    stiffness : inverse of the previous solve, of whatever block, which this one updates"""
+    spots : (k, 3) m, points that nodes stick to, in the indenter's frame; friction : Coulomb's coefficient
+    stiffness : inverse that the previous solve, of any block, left behind; this one updates it"""
 
     def __init__(
         self, block: ComplianceBlock, rest: np.ndarray, core_gap: np.ndarray, indenter: Indenter, pose: Pose,
@@ -40,9 +40,9 @@ class Friction:
         self.indenter, self.pose, self.spots, self.friction = indenter, pose, spots, friction
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from the first guess ``begin``: the contact where ``pose`` and its shift stand, or, if not None, that
-        at ``axial_force``, N along the motion.
-        The result is not ``settled`` where iterations run out or stall. Raises UnsolvedError where a step fails."""
+        """Solve from the first guess ``begin``: the contact at ``pose``, moved by the guess's shift, or, if
+        ``axial_force`` is given, at that force, N along the motion.
+        The result is not ``settled`` if iterations run out or stall. Raises UnsolvedError if a step fails."""
         k = self.block.k
         force, core, shift = np.ascontiguousarray(begin.force), begin.core_force, begin.shift
         active, slips = begin.active.copy(), begin.slipping.copy()
@@ -89,14 +89,15 @@ class Friction:
         return state
 
     def _look(self, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Gaps (k,) m, normals (k, 3) and offsets (k, 3) m from the spots of nodes displaced to ``place`` (k, 3) m."""
+        """Return gaps (k,) m, normals (k, 3), offsets (k, 3) m from spots, of nodes displaced by place (k, 3) m."""
         points = self.rest + place
         gap, normal = there.distance(self.indenter, points)
         return gap, normal, points - there.from_own(self.spots)
 
     def _bend(self, points: coulomb.Points, place: np.ndarray, there: Pose) -> tuple[np.ndarray, np.ndarray]:
-        """Find the slipping nodes (q,) most affected by the indenter's curvature, and that curvature (q, 3, 3) 1/m.
-        place : (k, 3) m, the nodes' displacement; there : the indenter's pose"""
+        """Find the slipping nodes most affected by the indenter's curvature: (q,) positions among these, and the
+        distance's second derivatives (q, 3, 3) 1/m. place : (k, 3) m, nodes' displacement; there : the indenter's pose
+        """
         at = np.flatnonzero(points.slips & points.active[: self.block.k])
         if not len(at):
             return FLAT
@@ -110,8 +111,8 @@ class Friction:
         self, points: coulomb.Points, motion: coulomb.Motion, curves: tuple[np.ndarray, np.ndarray],
         axial_force: float | None,
     ) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
-        """Return forces (k, 3), (c,) N with which gaps close and sticking nodes stay, and the indenter's travel, m.
-        curves : of ``_bend``; axial_force : N to reach, None where the indenter stays"""
+        """Return forces (k, 3), (c,) N that close gaps and hold sticking nodes, and the indenter's travel, m.
+        curves : of ``_bend``; axial_force : N to reach, None if the indenter stays"""
         at = np.flatnonzero(points.slips & points.active[: self.block.k])
         slipping = coulomb.slipping_nodes(at, points, motion, *curves, self.friction)
         stiffness, direction = self.stiffness.among(self.block, points.active), self.pose.direction
@@ -121,9 +122,9 @@ class Friction:
         return force, core, step
 
     def _step_for(self, change: np.ndarray, force: np.ndarray, axial_force: float) -> float:
-        """Return the indenter's travel, m, in a step to axial_force N. Raises UnsolvedError.
+        """Return the indenter's travel, m, in a step to axial_force, N. UnsolvedError if travel does not raise it.
 
-        change : (3 k + c, 2) N, of forces without motion, and per metre of it; force : (k, 3) N before the step"""
+        change : (3 k + c, 2) N, of forces without travel, and per metre of it; force : (k, 3) N before the step"""
         changed = change[: force.size].reshape(-1, 3, 2).sum(axis=0)
         carried, per_step = self.pose.direction @ changed
         if not per_step > 0:

@@ -62,8 +62,8 @@ class Try:
 
 
 class _Model(NamedTuple):
-    """Compliance ``matrix`` (k + c, k + c) m/N of the gaps along ``normal`` (k, 3), and Cholesky factors by active
-    set."""
+    """Compliance ``matrix`` (k + c, k + c) m/N of the gaps, along ``normal`` (k, 3) at nodes, and its Cholesky factors
+    by active set."""
 
     normal: np.ndarray
     matrix: np.ndarray
@@ -71,7 +71,7 @@ class _Model(NamedTuple):
 
 
 class Pace:
-    """Lengths of a solver's steps: shorter while errors hardly fall, as nodes at edges swing from side to side."""
+    """Step lengths of a solver: shorter while errors hardly fall, as when nodes at edges swing from side to side."""
 
     def __init__(self) -> None:
         self._trust, self._last, self._calls = 1.0, np.inf, 0
@@ -101,10 +101,10 @@ class Pace:
 
 
 class Frictionless:
-    """Solves for the k nodes and c points over the core of one ``ComplianceBlock``.
-
+    """Solver for the k nodes and c points over the core of one ``ComplianceBlock``.
     rest : (k, 3) m, the nodes at rest; core_gap : (c,) m, without forces; pose : of the indenter at shift 0
-    probe : (k, 3) m, offset at which a node in a crease is measured; faced : (k,) bool, nodes whose faces are known
+    probe : (k, 3) m, offset from a node in a crease to where its face's distance is measured, else 0
+    faced : (k,) bool, nodes that need no search for a second face
     most_curved : most tangent directions in the Newton step; more of them cost more time than they save"""
 
     most_curved = 20
@@ -128,8 +128,9 @@ class Frictionless:
         return gap - np.einsum("ai,ai->a", self.probe, normal), normal
 
     def solve(self, begin: Try, axial_force: float | None) -> Try:
-        """Solve from the guess ``begin`` the contact at ``pose``, shifted, or at ``axial_force``, N along the motion.
-        The result is not ``settled`` if iterations run out or faces flip. Raises UnsolvedError where a step fails."""
+        """Solve from the first guess ``begin``: the contact at ``pose``, moved by the guess's shift, or, if
+        ``axial_force`` is given, at that force, N along the motion.
+        The result is not ``settled`` if iterations run out or faces flip. Raises UnsolvedError if a step fails."""
         state, place, pace, model, solved = begin, begin.displacement, Pace(), None, None
         gap, normal = self.distance(place, state.shift)
         flips = np.zeros(len(gap), int)
@@ -158,7 +159,7 @@ class Frictionless:
         return state
 
     def _model(self, normal: np.ndarray, older: _Model | None) -> _Model:
-        """Return the model at unit vectors ``normal`` (k, 3), or the older one if they have hardly turned."""
+        """Return the model at unit vectors ``normal`` (k, 3): the older one, updated where these have turned far."""
         if older is None:
             return _Model(normal, self.block.normal(normal), {})
         stale = np.flatnonzero(np.abs(normal - older.normal).max(axis=1) > _STALE)
@@ -181,7 +182,7 @@ class Frictionless:
         return now - model.matrix @ solved.pressing
 
     def _complement(self, model, offset, normal, active, axial_force) -> Pressing:  # noqa: ANN001
-        """Solve the linearised problem; for a force, with at most ``_LARGEST_STEP`` of depth in this iteration."""
+        """Solve the linearised problem; for a given axial_force, N, go deeper by ``_LARGEST_STEP`` at most."""
         matrix = model.matrix
         if axial_force is None:
             return complement(matrix, offset, active, factors=model.factors)
@@ -207,11 +208,10 @@ class Frictionless:
         return Try(displacement, force, core_force, state.shift + solved.step, solved.active)
 
     def _turn(self, matrix, normal, solved: Pressing, travel, place, shift, threshold):  # noqa: ANN001, ANN202
-        """Newton's change of force (k, 3), (c,) N as normals turn with the nodes' motion; None if none turns enough.
-
+        """Return Newton's change of force (k, 3), (c,) N as normals turn with nodes; None if none turns enough.
         With t a principal direction of the indenter's surface at a node, weighted by sqrt(force x curvature), the
-        turned force is p n + t y, y = t . travel: (1 - S) y = t . travel, S the compliance among the t with the gaps
-        held shut.
+        turned force is p n + t y, where (1 - S) y = t . travel, and S is the compliance among the t, the gaps held
+        shut.
         """
         from scipy.linalg import lapack
 
@@ -265,16 +265,15 @@ class Frictionless:
 
 
 def _stiffness(mode: np.ndarray) -> np.ndarray:
-    """Newton's divisor 1 - mode, limited; a mode above 1 is unstable, and the step goes the way it leaves."""
+    """Return Newton's divisor 1 - mode, limited; a mode above 1 is unstable, and the step goes the way it leaves."""
     away = np.minimum(mode - 1, _SLOPE_STIFFNESS)
     return np.maximum(np.where(mode < 1, 1 - mode, away), _LEAST_STIFFNESS)
 
 
 @Loop
 def _tangent_response(matrix, k, nodes, tangent, normal, touching, core):  # noqa: ANN001, ANN202
-    """Compute what unit forces along weighted tangents, ``tangent`` (q, 3), at ``nodes`` (q,) move; normal : (k, 3).
-
-    Returns the motion along them (q, q), and of the gaps (q, t + d) of the touching nodes (t,) and of the points
+    """Return the motion (q, q) along weighted tangents, ``tangent`` (q, 3), at ``nodes`` (q,) under unit forces along
+    them; and the change (q, t + d) of the gaps of the touching nodes (t,), along ``normal`` (k, 3), and of the points
     ``core`` (d,) that press on the core. matrix, k : of the block"""
     q, t, d = len(nodes), len(touching), len(core)
     among, onto_gaps = np.empty((q, q)), np.empty((q, t + d))

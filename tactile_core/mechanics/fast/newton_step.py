@@ -16,10 +16,11 @@ from .coulomb import LARGEST_TILT, LARGEST_TURN, Motion, Points, Slipping, known
 
 
 class Change(NamedTuple):
-    """Change of forces in a Newton step in r columns: with the indenter at rest and, if it may move, per metre of that.
+    """Change of forces in a Newton step, in r columns: with a resting indenter and, if it may move, per metre of
+    travel.
     forces : (3 k + c, r) N, on all points; bearing : (s, 3, r) N, of slipping nodes, without the turn of normals
     moved : (q, 3, r) m, motion of the nodes ``Slipping.curved``, relative to the indenter
-    turns : (s, r) N, change of friction across itself"""
+    turns : (s, r) N, change of friction across its direction"""
 
     forces: np.ndarray
     bearing: np.ndarray
@@ -32,9 +33,9 @@ def change_of(
     direction: np.ndarray, *, deepens: bool,
 ) -> Change:  # fmt: skip
     """Solve the linear Newton step: gaps close, sticking nodes go back to their spots, slipping ones obey friction.
-    stiffness : ``ContactStiffness.among``'s: (j, j) N/m, and its rows (j,) among all 3 k + c unknowns
+    stiffness : from ``ContactStiffness.among``: (j, j) N/m, and its rows' positions (j,) among all 3 k + c unknowns
     direction : (3,), in which the indenter moves if it ``deepens``
-    Raises UnsolvedError where no motion of the slipping nodes balances their forces."""
+    Raises UnsolvedError if no motion of the slipping nodes balances their forces."""
     inverse, rows = stiffness
     known = known_motion(points, motion, slipping, direction, 2 if deepens else 1)
     forces = moving_forces(inverse, rows, known)
@@ -51,7 +52,7 @@ def change_of(
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve the system (j, j) for ``right`` (j, r); overwrites the matrix. Raises UnsolvedError."""
+    """Solve the system (j, j) for ``right`` (j, r); overwrites the matrix. Raises UnsolvedError if it is singular."""
     from scipy.linalg import lapack
 
     # LAPACK stores by columns: what it takes for the transposed matrix needs no copy.
@@ -62,7 +63,7 @@ def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Forces (m, r) N that move the points of ``rows`` (j,) by their ``motion`` (m, r) m; inverse : (j, j) float32."""
+    """Return forces (m, r) N that move the unknowns ``rows`` (j,) by ``motion`` (m, r) m; inverse : (j, j) N/m"""
     forces = np.zeros(motion.shape)
     forces[rows] = (motion[rows].T.astype(np.float32) @ inverse).T
     return forces
@@ -70,9 +71,9 @@ def moving_forces(inverse: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> 
 
 @Loop
 def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
-    """Find forces (s, 3, r) N of slipping nodes, without the turn of normals, and moves (q, 3, r) m of curved ones.
+    """Return forces (s, 3, r) N of slipping nodes, without the turn of normals, and motion (q, 3, r) m of curved ones.
 
-    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the moves returned are relative to the indenter, which moves
+    forces, known : (3 k + c, r) N, m; moves : (k, 3) m; the motion returned is relative to the indenter, which moves
         along the unit vector ``direction`` (3,)"""
     at, curved, columns = slipping.at, slipping.curved, forces.shape[1]
     bearing, moved = np.empty((len(at), 3, columns)), np.empty((len(curved), 3, columns))
@@ -94,10 +95,10 @@ def borne(forces, known, moves, slipping, direction):  # noqa: ANN001, ANN201
 
 @Loop
 def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
-    """Build the system (2 s, 2 s) and right side (2 s, r) of slipping nodes: slip along friction, m, and its turn, N.
+    """Return the system (2 s, 2 s) and right side (2 s, r) for s nodes' slip along friction, m, and its turn, N.
 
     Its rows demand that no force is left along t - mu n (``lean``, ``normal``), and that t turns as its slip does.
-    inverse : (j, j) N/m, of the compliance; rows : (j,), among ``size`` unknowns; bearing : (s, 3, r), of ``borne``
+    inverse : (j, j) N/m, of the compliance; rows : (j,), among ``size`` unknowns; bearing : (s, 3, r) N, of ``borne``
     """
     s, columns, curved = len(slipping.at), bearing.shape[2], slipping.curved
     system, right = np.empty((2 * s, 2 * s), np.float32), np.zeros((2 * s, columns))
@@ -134,8 +135,8 @@ def slip_system(inverse, rows, size, slipping, bearing):  # noqa: ANN001, ANN201
 
 @Loop
 def slide(known, answer, slipping):  # noqa: ANN001, ANN201
-    """Add the slip of s nodes to the prescribed motion ``known`` (3 k + c, r) m, in place; answer : (2 s, r), solution
-    of ``slip_system``: each node's slip along friction, m, then the turn of its friction, N; slipping : those nodes"""
+    """Add the motion of slipping nodes to the prescribed one, ``known`` (3 k + c, r) m, in place. answer : (2 s, r),
+    from ``slip_system``: each node's slip along friction, m, then the turn of its friction, N"""
     s, lean, across, against = len(slipping.at), slipping.lean, slipping.across, slipping.against
     for a in range(s):
         node = slipping.at[a]
@@ -147,9 +148,8 @@ def slide(known, answer, slipping):  # noqa: ANN001, ANN201
 
 @Loop
 def advance(force, core, change, step, slipping):  # noqa: ANN001, ANN201
-    """Compute the forces (k, 3) N on nodes and (c,) N on the core's points from force and core, those before, after a
-    ``Change``, turning those of slipping nodes by at most 1 rad (friction) and 0.3 rad (normals). step : m, the
-    indenter's motion"""
+    """Return the forces (k, 3) N on nodes and (c,) N on core points after a ``Change``, from force and core before it.
+    Those of slipping nodes turn by at most 1 rad (friction) and 0.3 rad (normals). step : m, the indenter's travel"""
     forces, bearing, moved, turns = change
     k, new, new_core, last = len(force), force.copy(), core.copy(), forces.shape[1] - 1
     for a in range(k):

@@ -1,4 +1,4 @@
-"""A press in the fast tier, with corrected forces and shapes."""
+"""Press an indenter into a sensor in the fast tier, with corrected forces and shapes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class FastContact:
     """A contact of the linear model with its correction. Forces N, by the indenter on the sensor.
     linear : contact before the correction; corrected : corrected shape, and factor of force
     force : (3,), corrected; axial_force : its part along the motion; pressure : Pa, corrected rise of the fluid's
-    depth : m, from first touch at the place that the indenter has slid to"""
+    depth : m, from first touch at the place to which the indenter has slid"""
 
     linear: Contact
     corrected: Corrected
@@ -47,10 +47,10 @@ _Found = TypeVar("_Found", FastContact, FastContact | None)
 
 
 class CorrectedPress:
-    """An indenter in front of one sensor; contacts follow each other, at depths or at corrected forces.
+    """An indenter in front of one sensor; solves contacts at depths or at corrected forces, each from the one before.
 
     pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
-    work : what contacts may cost, None for as much as they take; what is used up ends a solve with ExhaustedError
+    work : effort that contacts may cost, None for no limit; a solve raises ExhaustedError once nothing is left
     """
 
     @in_one_thread
@@ -66,8 +66,8 @@ class CorrectedPress:
 
     @in_one_thread
     def at_depth(self, depth: float, pose: Pose | None = None, *, touches: bool = False) -> FastContact:
-        """Solve the contact at a depth, m, past first touch, along the motion of ``pose`` (None: the press's own). The
-        result may not have converged (``linear.converged``).
+        """Solve the contact at a depth, m, past first touch, along the motion of ``pose`` (None: the press's own). See
+        ``linear.converged`` of the result.
         touches : true if ``pose`` is known to be at first touch; if false, first touch is found from it
         Raises PenetrationError for an indenter that sinks in between the surface's nodes, as ``at_force`` does."""
         there = pose or self.pose
@@ -87,9 +87,9 @@ class CorrectedPress:
 
     @in_one_thread
     def nearest(self) -> FastContact | None:
-        """Return the last contact within the limit that the last ``at_force`` met; the next solve goes on from it.
+        """Return the last contact within the limit that ``at_force``'s search met; the next solve starts from it.
 
-        None if there is none. Raises PenetrationError as ``at_depth`` does.
+        None if there is none. Raises PenetrationError if the indenter sinks in between the surface's nodes.
         """
         if self._on_the_way is None:
             return None
@@ -97,9 +97,9 @@ class CorrectedPress:
         return self._with_correction(self.last, fall)
 
     def _guarded_if_needed(self, solve: Callable[[], _Found]) -> _Found:
-        """Solve; if the indenter sinks in between frictionless nodes, solve again with points between them.
+        """Call ``solve``; if the indenter sinks in between frictionless nodes, call it again with points between them.
 
-        That solve starts from rest, and the points stay for all contacts that follow.
+        The second time it starts from rest, and the points stay for all contacts that follow.
         """
         try:
             found = solve()
@@ -129,7 +129,7 @@ class CorrectedPress:
         return self._with_correction(contact, fall)
 
     def _at_force(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Solve for a corrected force N, by secants in the logarithms of linear and corrected force, nearly a line.
+        """Find the contact at a corrected force N by secants in the logs of linear and corrected force, nearly a line.
 
         fall : m, how much deeper first touch is than at the press's own pose
         None beyond the limit; raises UnsolvedError if none is found."""
@@ -160,8 +160,8 @@ class CorrectedPress:
         raise UnsolvedError(f"{force:g} N not found in {_SEARCH_STEPS} steps")
 
     def _by_depths(self, force: float, pose: Pose, fall: float) -> FastContact | None:
-        """Solve for a force N by a search over depth, faster with points between nodes; fall and errors as in
-        ``_at_force``."""
+        """Find the contact at a force N by a search over depth, faster with points between nodes; fall, result and
+        errors are ``_at_force``'s."""
 
         def move(depth: float, before: FastContact) -> FastContact:
             """Return the corrected contact at a depth m from first touch, starting from the contact before."""
@@ -182,8 +182,8 @@ class CorrectedPress:
         return found
 
     def _power(self, before: tuple[float, float] | None, found: tuple[float, float]) -> float:
-        """Return the power by which the corrected force grows with the linear one, between contacts before and found,
-        each (linear, corrected) N; kept for the next."""
+        """Return the power by which the corrected force grows with the linear one from contact ``before`` to ``found``,
+        each (linear, corrected) N; the last power if they hardly differ."""
         if before is not None and min(*before, *found) > 0:
             linear, corrected = np.log(found) - np.log(before)
             if abs(linear) > _POWER_FROM:
@@ -201,7 +201,7 @@ class CorrectedPress:
         return None
 
     def _surface_drop(self, pose: Pose, *, touches: bool) -> float:
-        """Return how much deeper, m, first touch is at a pose than at the press's own; touches : the pose is there"""
+        """Return how much deeper, m, first touch is at a pose than at the press's own; touches : true if it is there"""
         if touches:
             return float((pose.apex - self.pose.apex) @ pose.direction)
         return surface_drop(self.compliance.surface, self.problem.indenter, self.pose, pose)
@@ -216,7 +216,7 @@ class CorrectedPress:
 
 
 def _from_touch(contact: Contact, fall: float) -> Contact:
-    """Return a contact with its depth counted from first touch at the place slid to, which lies ``fall`` m deeper; the
-    correction expects that."""
+    """Return a contact with its depth counted from first touch at the place slid to, ``fall`` m deeper than at the
+    press's own, as the correction expects."""
     depth = max(contact.depth - fall, _LEAST_DEPTH)
     return contact if depth == contact.depth else contact.at_depth(depth)

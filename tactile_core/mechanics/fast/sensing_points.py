@@ -1,4 +1,4 @@
-"""Sensing points of a skin's inner side: the feet over electrodes, nodes over the core, and nodes beside it."""
+"""Sensing points on a skin's inner side: nearest to electrodes (feet), nodes that face the core, nodes beside it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SensingPoints(NamedTuple):
     gap: np.ndarray
 
     def matrix(self, size: int, points: np.ndarray) -> sparse.csc_array:
-        """Return columns ``points`` (p,), sorted, of the matrix (size, p); size : 3 n_nodes"""
+        """Return columns ``points`` (p,), sorted, of the map's sparse matrix (size, p); size : 3 n_nodes"""
         from scipy import sparse
 
         chosen = np.isin(self.columns, points)
@@ -55,15 +55,15 @@ def sensing_points_of(sensor: str, mesh: HexMesh) -> SensingPoints:
 
 
 def sensing_nodes(sensor: str = sensors.SOURCE) -> np.ndarray:
-    """Return the inner skin's free nodes (f,), numbered on its lattice, in the order of their sensing points: over the
-    core, then beside it. In the list of all points the electrodes' feet come before them."""
+    """Return the inner skin's free nodes (f,), numbered on its lattice, in the order of their sensing points: facing
+    the core, then beside it. In the list of all sensing points those of the electrodes come before them."""
     mesh = skin_mesh(sensor)
     return np.r_[facing_nodes(sensor, mesh), _beside(sensor, mesh)]
 
 
 @dataclasses.dataclass(frozen=True)
 class ElectrodeFeet:
-    """Points of the inner skin nearest to each of e electrodes: there the fluid film over the electrode ends.
+    """Point of the inner skin nearest to each of e electrodes: there the fluid film over the electrode ends.
     face : (e,) triangle in the inner surface's ``faces``; weights : (e, 3) of its nodes
     outward : (e, 3) unit, from the electrode; gap : (e,) m"""
 
@@ -83,8 +83,8 @@ def electrode_feet(sensor: str = sensors.SOURCE) -> ElectrodeFeet:
 
 
 def _free_nodes(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free inner nodes, those that face the core before those beside it: node (n,), direction from the core's nearest
-    point (n, 3), gap (n,) m; even in z."""
+    """Return the inner nodes that can move, (n,), those that face the core before those beside it, the direction (n, 3)
+    from the core's nearest point to each, and its gap (n,) m; all mirror symmetric in z."""
     facing = facing_nodes(sensor, mesh)
     nodes = np.r_[facing, _beside(sensor, mesh)]
     mirrored, right = _right_images(sensor, nodes)
@@ -95,19 +95,19 @@ def _free_nodes(sensor: str, mesh: HexMesh) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _inner(sensor: str) -> np.ndarray:
-    """Resting inner skin (n, 3) m."""
+    """Return the resting inner skin's nodes (n, 3) m."""
     return sensors.skin_of(sensor).skin_surface("inner").rest
 
 
 def _right_images(sensor: str, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mark inner-skin nodes (n,) with z < 0, (n,) bool, and return each node (n,), or its mirror image for these."""
+    """Return which inner-skin nodes (n,) have z < 0, (n,) bool, and the nodes (n,), for these their mirror images."""
     rest = _inner(sensor)
     mirrored = rest[nodes, 2] < -ON_PLANE
     return mirrored, np.where(mirrored, mirror_nodes(rest)[nodes], nodes)
 
 
 def _beside(sensor: str, mesh: HexMesh) -> np.ndarray:
-    """Free inner nodes that do not face the core, each with its mirror image."""
+    """Return the inner nodes that can move and do not face the core; with each its mirror image is among them."""
     free = ~mesh.clamped[mesh.inner]
     free &= free[mirror_nodes(_inner(sensor))]
     free[facing_nodes(sensor, mesh)] = False
