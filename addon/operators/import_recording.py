@@ -1,4 +1,4 @@
-"""File > Import > BioTac Recording, and the same by drag and drop; of other sensors by weights that read them."""
+"""Import recordings by File > Import > BioTac Recording or by drag and drop; of other sensors with their weights."""
 
 import functools
 import os
@@ -23,7 +23,7 @@ _LABEL = "BioTac Recording (.csv, .h5, .npz, .mat, .json, .bag, .mcap)"
 
 
 def _fingers(operator: bpy.types.Operator, context: bpy.types.Context) -> list[tuple[str, str, str]]:
-    """List the recordings of the operator's file for a menu; while a browser is open, of the file chosen there."""
+    """List the recordings of a file as a menu's items: the operator's file, or the one selected in an open browser."""
     path, chosen = bpy.path.abspath(operator.filepath), getattr(context.space_data, "params", None)
     if not os.path.isfile(path) and hasattr(chosen, "filename"):
         path = os.path.join(os.fsdecode(chosen.directory), chosen.filename)
@@ -74,7 +74,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     )
 
     def _work(self, context: bpy.types.Context) -> None:
-        """Import the files; of several, the good ones are imported, and each bad one is reported."""
+        """Import the files. A bad one is reported and the others are imported; raise Refused if all are bad."""
         done, paths, timed = 0, self._paths(), False
         for path in paths:
             try:
@@ -94,7 +94,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         return [os.path.join(folder, name) for name in names] or [bpy.path.abspath(self.filepath)]
 
     def _import(self, context: bpy.types.Context, path: str) -> int:
-        """Import one recording; returns its last frame in the scene. Raises TactileError."""
+        """Import one recording; return the scene's frame of its last. Raises TactileError for one that cannot be."""
         held, finger = recording_data.fingers(path), int(self.finger or 0)
         if finger >= len(held):
             raise TactileError(path, f"{len(held)} recordings", f"a finger {finger}", "Import it by itself")
@@ -134,7 +134,8 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         return int(frames[-1])
 
     def _keep_scene(self, scene: bpy.types.Scene) -> str:
-        """Keep units and frame rate of a scene that is not empty, unless asked to set them; returns what was kept."""
+        """Set the scene's units, but keep those and the frame rate of a scene that is not empty, unless the user chose
+        to set them. Return words on what was kept, to end a sentence."""
         if self._in_millimetres(scene):
             axes.use_millimetres(scene)
         if view.is_new(scene) and properties.of_role(scene, "BIOTAC") is None:
@@ -147,7 +148,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
         return self.millimetres and (view.is_new(scene) or self.properties.is_property_set("millimetres"))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Open a small popup for a file that was dropped; the menu opens the file browser."""
+        """Open a small popup for a file that was dropped; else, from the menu, open the file browser."""
         if not self.filepath and not self.files:
             return super().invoke(context, event)
         several = len(self.files) > 1
@@ -172,7 +173,8 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
 
 def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> str:
-    """Let a skin and its electrodes play ``found`` at frames (T,) of the scene; returns a sentence on how they play."""
+    """Animate a skin and its electrodes by the recording ``found`` at frames (T,) of the scene; return a sentence on
+    what plays them."""
     rows = unit_rows(found.signals) or [("unit", "nothing is known of it by this recording")]
     skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in rows)
     if table_of(properties.sensor_name(skin)).is_file():
@@ -182,7 +184,7 @@ def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.nd
 
 
 def plays(skin: bpy.types.Object, found: recording_data.Translated) -> bool:
-    """Return true if an imported skin's signals and forces are those found; false once another unit or tare is set."""
+    """Return true if a skin has the signals and forces of ``found``; false if its unit or tare has been changed."""
     values = found.columns()
     shown = {name: values[name].astype(np.float32).T for name in ("electrodes", "force")}
     return all(np.array_equal(curves.values_of(skin, f'["{name}"]', k), row) for name, rows in shown.items()

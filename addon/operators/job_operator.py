@@ -13,8 +13,8 @@ _STEP = 0.1  # s between polls of the worker
 
 
 class JobOperator(TactileOperator):
-    """Base of operators that do a job in another process: ``begin`` starts it, if any; ``finish`` takes its result.
-    stopped : what is reported after Esc"""
+    """Base of operators that do a job in another process: ``begin`` starts the job, ``finish`` takes its result.
+    stopped : text that is reported after Esc"""
 
     stopped: ClassVar[str] = "Stopped; the scene is as it was"
     _job: Job | None = None
@@ -23,7 +23,7 @@ class JobOperator(TactileOperator):
     _scene = 0  # the session_uid of the one that it began in
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Start the job: set ``_folder`` and ``_job``, or leave both None without work to do. Raises TactileError."""
+        """Start the job: set ``_folder`` and ``_job``, or leave both None if no job is needed. Raises TactileError."""
         raise NotImplementedError
 
     def finish(self, context: bpy.types.Context) -> None:
@@ -31,7 +31,7 @@ class JobOperator(TactileOperator):
         raise NotImplementedError
 
     def _work(self, context: bpy.types.Context) -> None:
-        """Run the job and wait for its end: without a window, or from a script."""
+        """Run the job and wait for its end. Blender calls this without a window or from a script, else ``invoke``."""
         try:
             self.begin(context)
             if self._job is not None:
@@ -59,7 +59,7 @@ class JobOperator(TactileOperator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Handle an event: Esc stops the job, timers poll it; Blender calls it."""
+        """Handle an event: Esc stops the job, the timer's polls it; Blender calls this."""
         if event.type == "ESC":
             self._close(context)
             self.report({"WARNING"}, self.stopped)

@@ -1,4 +1,4 @@
-"""The picture of a gel as the scene has it now: its dent, and its LEDs, coating and camera as they stand."""
+"""Draw a gel's picture as the scene has it now: with its dent, LEDs, coating and camera."""
 
 from __future__ import annotations
 
@@ -43,12 +43,13 @@ def draw(
     better: Callable[[np.ndarray], None] = lambda picture: None,
     warn: Callable[[str], None] = lambda words: None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draw a gel's picture (H, W, 3) uint8 and heights (H, W) m by a preset; size : (width, height) px, None for the
-    calibration's.
+    """Draw a gel's picture by a preset; return it, (H, W, 3) uint8, and the gel's heights (H, W) m.
 
-    The fast preset draws LEDs, coating and camera; bodies beside them need Mitsuba and are reported to warn().
-    Pictures that get better, up to the one that is returned, are given to better(). Raises TactileError, and
-    ``tracer_process.Stopped`` once stopped(), which is asked again and again, returns true.
+    size : (width, height) px, None for the calibration's
+    stopped : called again and again; once it returns true, ``tracer_process.Stopped`` is raised
+    better : called with pictures that come before the returned one and are less exact
+    warn : called with a sentence on bodies that reach into the housing and that the fast preset leaves out
+    Raises TactileError if no picture can be drawn.
     """
     shown, moved = shown_state(gel, depsgraph, size)
     if preset == FAST and shown.around.occluders:
@@ -59,7 +60,8 @@ def draw(
 def shown_state(
     gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int] | None = None
 ) -> tuple[digit_unit.ShownUnit, np.ndarray]:
-    """Return the unit that the scene shows, at a picture's size (see ``draw``), and the gel's displacement (n, 3) m."""
+    """Return the unit that the scene shows, for a picture of the ``size``, and the gel's displacement (n, 3) m.
+    size : (width, height) px, None for the calibration's"""
     moved = digit_objects.displacement_of(gel, depsgraph)  # first: it says what else would be a wrong camera
     unit = render_settings.calibration_of(depsgraph.scene, properties.sensor_name(gel), size)
     return digit_unit.shown_unit(gel, depsgraph, unit), moved
@@ -79,9 +81,10 @@ def _drawn_of(
 
 
 def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Compute what pixels see of a gel, float32 (H, W, channels) by name; size : (width, height) px; raises as ``draw``
+    """Compute what pixels see of a gel: name -> float32 (H, W, channels). size : (width, height) px
 
-    Height (1), Displacement (3), mm; Normal (3); Contact (1), share touched, 0 to 1; in the gel object's axes
+    Names are Height (1 channel) and Displacement (3), mm, Normal (3), all in the gel object's axes, and Contact (1),
+    the share that is touched, 0 to 1. Raises TactileError if no picture can be drawn.
     """
     shown, moved = shown_state(gel, depsgraph, size)
     unit = shown.unit
@@ -100,9 +103,9 @@ def fields(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, size: tuple[in
 
 
 def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Start the worker of a scene's Mitsuba preset, to compile before its first picture; not without a window.
+    """Start the worker of a scene's Mitsuba preset, which compiles before its first picture; not without a window.
 
-    Raises nothing where no picture can be drawn: ``draw`` will.
+    If no picture can be drawn, this does nothing: ``draw`` will raise the error.
     """
     gel = properties.gel_of(scene)
     if bpy.app.background or gel is None or reports.missing("mitsuba"):
@@ -118,12 +121,12 @@ def prepare(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def update(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, preset: str = FAST) -> bpy.types.Image:
-    """Draw picture and height map by a preset into their datablocks; returns the picture's. Raises as ``draw`` does."""
+    """Draw picture and height map by a preset into the gel's images; return the picture's. Raises TactileError."""
     return _show(gel, *shown_state(gel, depsgraph), preset)
 
 
 def follow(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Draw the fast picture where the scene shows something else than it was drawn of. Raises as ``draw`` does."""
+    """Draw the fast picture again if the scene has changed what it shows. Raises TactileError."""
     shown, moved = shown_state(gel, depsgraph)
     image = images.image_of(gel, "picture")
     name, before, unit = _drawn.get("" if image is None else image.name, ("", moved, ""))
@@ -141,7 +144,7 @@ def _show(gel: bpy.types.Object, shown: digit_unit.ShownUnit, moved: np.ndarray,
 
 
 def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: bpy.types.Object) -> None:
-    """Show a gel's fast picture after an operator's work, which is kept where drawing fails: that is a warning."""
+    """Show a gel's fast picture after an operator's work; report a warning if it fails, since the work is done."""
     try:
         view.show_picture(context, update(gel, context.evaluated_depsgraph_get()))
     except (TactileError, OSError) as error:
@@ -149,5 +152,5 @@ def show_result(operator: bpy.types.Operator, context: bpy.types.Context, gel: b
 
 
 def forget() -> None:
-    """Forget the states that pictures were drawn of, so that ``follow`` draws again: another file was opened."""
+    """Forget what pictures were drawn of, so that ``follow`` draws them again, as for a newly opened file."""
     _drawn.clear()

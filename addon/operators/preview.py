@@ -1,6 +1,6 @@
-"""The gel's picture follows the scene: each change of frame, dent, LED, coating or camera draws it again, fast.
+"""Draw the gel's picture again at each change of the scene: of frame, dent, LED, coating or camera.
 
-While Live Picture is on, by the scene's preset, and without a window too.
+It is drawn by the fast preset. While Live Picture is on, it is drawn by the scene's preset, and without a window too.
 """
 
 import bpy
@@ -25,12 +25,12 @@ def is_on() -> bool:
 
 
 def failure() -> str:
-    """Return why the last picture could not be drawn, "" where it was."""
+    """Return why pictures could not be drawn at the last change; "" if they could."""
     return _failed
 
 
 def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Draw each gel's picture again where the scene shows something else than it was drawn of."""
+    """Draw each gel's picture again: by the preset while Live Picture is on, else fast, and only if it has changed."""
     global _failed, _drawing
     if _drawing:
         return
@@ -53,7 +53,7 @@ def follow(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 @persistent
 def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None = None) -> None:
-    """Called at each change of the frame."""
+    """Draw pictures again; Blender calls this at each change of the frame."""
     seen = _live or not (bpy.app.background or bpy.app.is_job_running("RENDER"))
     if depsgraph is not None and seen:
         follow(scene, depsgraph)
@@ -61,21 +61,22 @@ def _frame_changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph | None
 
 @persistent
 def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Called at each change of the scene: one of what the picture shows draws it again."""
+    """Draw pictures again if something that they show has changed; Blender calls this at each change of the scene."""
     if any(isinstance(update.id, SEEN) for update in depsgraph.updates):
         _frame_changed(scene, depsgraph)
 
 
 @persistent
 def _opened(*_: object) -> None:
-    """Called when another file is open, or after an undo: the picture may be of another frame, or gone."""
+    """Draw pictures again, as they may be of another frame, or gone; Blender calls this after it opened a file."""
     pictures.forget()
     _frame_changed(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
 
 
 @persistent
 def _undone(*_: object) -> None:
-    """Called after an undo or redo, which empties the Image Editor whose picture is not there on its other side."""
+    """Draw pictures again after an undo or redo, and show the gel's in Image Editors that Blender emptied: it does so
+    if the picture did not exist before."""
     _opened()
     gel = properties.gel_of(bpy.context.scene)
     image = None if gel is None else images.image_of(gel, "picture")
@@ -87,13 +88,13 @@ def _undone(*_: object) -> None:
 
 @persistent
 def _end(*_: object) -> None:
-    """End the toggle and its worker before another file is opened; called by Blender."""
+    """Switch Live Picture off; Blender calls this before it opens another file."""
     switch_off()
 
 
 @persistent
 def _keep_images(*_: object) -> None:
-    """Called before a file is saved."""
+    """Pack pictures into the file; Blender calls this before it saves."""
     images.pack()
 
 
@@ -113,7 +114,7 @@ class TACTILE_OT_live_picture(TactileOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a gel to look at, or the picture is on: it can always be switched off."""
+        """Return true if there is a gel to look at, or if Live Picture is on: it can always be switched off."""
         return is_on() or properties.can(cls, lambda: properties.needed_gel(context.scene))
 
     def _work(self, context: bpy.types.Context) -> None:

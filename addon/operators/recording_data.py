@@ -1,4 +1,4 @@
-"""A recording file as ``tactile_core`` reads and translates it, kept for the next operator that asks."""
+"""Read and translate a recording file by ``tactile_core``, and keep the last result for the next operator that asks."""
 
 from __future__ import annotations
 
@@ -36,9 +36,10 @@ _MOVED = "displacement_biotac", "displacement_digit"  # of skin and gel
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Translated:
-    """A recording, the indices (T,) of its ``chosen`` frames, their signals and translation, and the translator.
+    """A recording and its translation, with the networks that made it.
 
-    skin, gel : their movements; if files hold these, the translation's displacements are empty, (T, 0, 3)"""
+    chosen : (T,) indices of the recording's frames that were translated; signals : theirs, ready for the networks
+    skin, gel : their movements; if these are in files, the translation's displacements are empty, (T, 0, 3)"""
 
     translator: Translator
     recording: Recording
@@ -49,7 +50,8 @@ class Translated:
     gel: Motion
 
     def fits(self, motion: str) -> bool:
-        """Return true if the movements are stored as ``in_files`` asks: in files that still exist, or in memory."""
+        """Return true if the movements are where ``in_files`` wants them for a ``motion``: in memory, or in files that
+        still exist."""
         files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 
@@ -77,19 +79,21 @@ def _in_blender_axes(force: np.ndarray) -> np.ndarray:
 
 
 def in_files(motion: str, frames: int) -> bool:
-    """Return true if a movement of this number of frames is held in files; motion : "" for files above LONG."""
+    """Return true if a movement of this number of frames belongs in files.
+    motion : "MESH_CACHE" for files, "SHAPE_KEYS" for none, "" for files above ``LONG`` frames"""
     return motion == MESH_CACHE or (not motion and frames > LONG)
 
 
 @functools.lru_cache(maxsize=2)
 def _translator(weights: str, source: str | None, answer: Answer, _changed: int) -> Translator:
-    """Load networks once, for an empty text those that ship for a sensor, whichever gel they lead to."""
+    """Load networks and keep them: those in the folder ``weights`` or, for "", those that ship for ``source``.
+    _changed : when the folder's card was changed, so that new weights are loaded again"""
     return load_translator(weights or None, answer, None, source)
 
 
 def translator_of(asked: RecordingOptions, path: str) -> Translator:
-    """Return the networks in the folder of the options `asked`, else those that ship for the recording `path`. Raises
-    TactileError without networks."""
+    """Return the networks in the folder that the options ``asked`` name, else those that ship for the sensor of the
+    recording ``path``. Raises TactileError if there are none."""
     folder = _absolute(asked.weights)
     source = None if folder else readers.sensor_of_first([path])
     answer = Answer(frames_apart=asked.apart, contacts=2 if asked.two else 1)
@@ -105,12 +109,13 @@ def _fingers(path: str, _changed: int) -> list[str]:
 
 
 def fingers(path: str) -> list[str]:
-    """List the recordings that a file holds, as ``hand.mat#1``; the path itself for a file of one, and for no file."""
+    """List the recordings in a file, such as ``hand.mat#1``; the path itself if it holds one, or is no file."""
     return _fingers(path, _changed(path)) if os.path.isfile(path) else [path]
 
 
 def write_columns(path: str, asked: RecordingOptions) -> str:
-    """Write a guessed map to asked.columns where that file is missing; return a sentence, "" if nothing was written."""
+    """Guess which columns of the recording ``path`` are what, and write that map to the file asked.columns if it is
+    missing; return a sentence that says so, "" if nothing was written."""
     file = _absolute(asked.columns)
     if not file or os.path.lexists(file):
         return ""
@@ -124,7 +129,7 @@ def _absolute(path: str) -> str:
 
 
 def _changed(path: str) -> int:
-    """Return when a file was changed, ns; 0 if it cannot be read, which its reader then reports."""
+    """Return when a file was last changed, ns; 0 if it cannot be read, which its reader will report."""
     try:
         return os.stat(path).st_mtime_ns
     except OSError:
@@ -134,11 +139,11 @@ def _changed(path: str) -> int:
 def load(
     path: str, asked: RecordingOptions, progress: Callable[[float], None], motion: str, per_metre: float
 ) -> Translated:
-    """Read, tare and translate a recording; repeats return the result kept.
+    """Read, tare and translate a recording, or return the last result again if the same is asked for.
 
     progress : called with the share done, 0 to 1
-    motion : "SHAPE_KEYS", "MESH_CACHE" (displacements in files), or "" for the latter above ``LONG`` frames
-    per_metre : Blender units per metre of such files. Raises TactileError for unreadable files and missing frames."""
+    motion : "MESH_CACHE" (displacements in files), "SHAPE_KEYS" (in memory), or "" for files above ``LONG`` frames
+    per_metre : Blender units in a metre, of such files. Raises TactileError for unreadable files and missing frames."""
     path = os.path.normpath(path)  # a .blend's relative path has another form
     per_metre = float(f"{per_metre:.6g}")  # Blender holds float32
     known = translator_of(asked, path)
@@ -191,7 +196,7 @@ def _translated(
 def _with_progress(
     parts: Iterator[Translation], frames: int, progress: Callable[[float], None]
 ) -> Iterator[Translation]:
-    """Yield the parts, and call ``progress`` with the share of ``frames`` that is done, 0 to 1."""
+    """Yield the parts, and after each call ``progress`` with the share of all ``frames`` that is done, 0 to 1."""
     done = 0
     for part in parts:
         yield part
@@ -202,9 +207,12 @@ def _with_progress(
 def _in_files(
     pair: tuple[str, str], parts: Iterator[Translation], frames: int, name: str, key: tuple
 ) -> tuple[Translation, Motion, Motion]:
-    """Join a translation and write its displacements into files part by part; returns the movements of skin and gel.
+    """Write the displacements of a translation's parts into files; return the joined rest, and the movements of skin
+    and gel.
 
-    name : of the recording; key : all that the files depend on; both make the files' names, so that none is replaced
+    pair : names of the two sensors; frames : number in all parts; name : of the recording
+    key : all that the files depend on, at its end Blender units in a metre and the folder; it and the name make the
+    files' names, so that no other file is replaced
     """
     token, folder = hashlib.sha256(repr(key[:-1]).encode()).hexdigest()[:8], kept_files.folder(kept_files.CACHE)
     # A file's name holds 255 bytes, of which a letter takes up to four.

@@ -23,7 +23,7 @@ _OWN_KIND = ("eevee", "cycles", "freestyle", "hair", "grease", "motion_blur", "s
 
 
 class TactileRenderEngine(bpy.types.RenderEngine):
-    """Pictures of a gel as its sensor's camera sees it: that of the scene's camera, else the first"""
+    """Engine that renders what the camera of a sensor sees: of the gel with the scene's camera, else of the first"""
 
     bl_idname = ID
     bl_label = "Tactile DIGIT (Mitsuba)"
@@ -71,10 +71,10 @@ class TactileRenderEngine(bpy.types.RenderEngine):
         self.update_progress(1.0)
 
     def _show(self, found: dict[str, np.ndarray], render: bpy.types.RenderSettings, layer: str) -> None:
-        """Put passes ``found``, by name (H, W, channels), first row first, into the result: into the region that is
-        rendered, each eye's. layer : its name
+        """Put the region that is rendered of each pass into the render result.
 
-        The sensor has one camera, which is both eyes'."""
+        found : name -> pass (H, W, channels), top row first; layer : the view layer's name
+        In stereo both eyes get the same, as the sensor has one camera."""
         left, low = 0, 0
         if render.use_border:  # as Blender rounds it, in float32
             left, low = (int(np.float32(share) * np.float32(whole)) for share, whole in (
@@ -98,10 +98,10 @@ def _describe_error(error: Exception) -> str:
 
 
 def to_linear(picture: np.ndarray, raw: bool = False) -> np.ndarray:
-    """Convert a picture (H, W, 3) uint8 to Blender's scene-linear float32 (H, W, 4).
+    """Convert a picture (H, W, 3) uint8 to scene-linear RGBA, float32 (H, W, 4), so that Blender writes files with the
+    same 8-bit values.
 
-    By the inverse of sRGB's curve, so that the view transform Standard writes the same 8-bit values again; raw : as
-    the view transform Raw does, without a curve
+    raw : true for the view transform Raw, which has no curve; false for Standard, whose sRGB curve is undone
     """
     curve = np.arange(256) / 255
     if not raw:
@@ -112,7 +112,7 @@ def to_linear(picture: np.ndarray, raw: bool = False) -> np.ndarray:
 
 
 def _panels() -> list[type]:
-    """Panels of the Properties editor that every engine shares: output, resolution, colour management."""
+    """List the panels of the Properties editor that every engine shares: output, resolution, colour management."""
     found = []
     for panel in bpy.types.Panel.__subclasses__():
         engines, module = getattr(panel, "COMPAT_ENGINES", ()), panel.__module__.rsplit(".", 1)[-1]
@@ -123,20 +123,20 @@ def _panels() -> list[type]:
 
 
 def _end_idle_workers() -> float:
-    """Called by a timer; returns the seconds to the next call."""
+    """End workers that have nothing to do; Blender's timer calls this and waits as many seconds as it returns."""
     tracer_process.close_idle()
     return _LOOK
 
 
 def register() -> None:
-    """Let idle workers end, and show Blender's own panels for this engine too."""
+    """Start the timer that ends idle workers, and show Blender's own panels for this engine too."""
     bpy.app.timers.register(_end_idle_workers, first_interval=_LOOK, persistent=True)
     for panel in _panels():
         panel.COMPAT_ENGINES.add(ID)
 
 
 def unregister() -> None:
-    """Take the engine off Blender's own panels, and stop looking for idle workers."""
+    """Take the engine off Blender's own panels, and stop the timer that ends idle workers."""
     for panel in _panels():
         panel.COMPAT_ENGINES.discard(ID)
     bpy.app.timers.unregister(_end_idle_workers)

@@ -1,7 +1,7 @@
-"""Set Up Render: all that makes a rendered file hold the camera's own 8-bit values; the scene's settings, their panel;
-and LEDs, coating and camera reset to a calibration, or saved as one.
+"""Set up a scene so that rendered files hold the camera's own 8-bit values; define its settings and their panel; reset
+LEDs, coating and camera to a calibration, or save them as one.
 
-A choice of preset or calibration acts on the gels and workers at once.
+Choosing a preset or a calibration acts on the gels and workers at once.
 """
 
 import dataclasses
@@ -49,7 +49,7 @@ class TactileRender(bpy.types.PropertyGroup):
 
 
 def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> None:
-    """Put LEDs, coating and camera to those of the file that was chosen; a bad file is reported by a render."""
+    """Set the gels' LEDs, coating and camera by the file that was just chosen; if it is bad, a render will say so."""
     scene = settings.id_data
     for gel in [thing for thing in scene.objects if thing.tactile.role == "DIGIT"]:
         if digit_body.leds_of(gel) and gel.library is None:
@@ -60,7 +60,7 @@ def _take_calibration(settings: TactileRender, _context: bpy.types.Context) -> N
 
 
 def _prepare(settings: TactileRender, context: bpy.types.Context) -> None:
-    """Let the worker of the preset that was chosen get ready."""
+    """Let the worker of the preset that was just chosen get ready."""
     if settings.id_data == context.scene:
         pictures.prepare(context.scene, context.evaluated_depsgraph_get())
 
@@ -165,7 +165,7 @@ class TACTILE_PT_render(bpy.types.Panel):
 
 
 def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the bound on the toolkit's own error, of simulations and pictures."""
+    """Draw the field for the largest error of simulations and pictures, and which preset keeps it."""
     scene = context.scene
     layout.prop(scene.tactile_render, "error", placeholder="50um,0.6levels")
     try:
@@ -178,7 +178,7 @@ def draw_error(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the settings, for this panel and the sidebar's; the preset is grey beside a largest error."""
+    """Draw the settings, in this panel and in the sidebar's; the preset is grey if a largest error chooses it."""
     settings = context.scene.tactile_render
     layout.use_property_split = True
     layout.operator(TACTILE_OT_set_up_render.bl_idname, icon="RESTRICT_RENDER_OFF")
@@ -192,7 +192,7 @@ def draw_settings(layout: bpy.types.UILayout, context: bpy.types.Context) -> Non
 
 
 def draw_parts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the gel's LEDs and coating, and buttons to reset and save them, in a panel; nothing without a gel."""
+    """Draw fields for a gel's LEDs and coating, and buttons to reset and save them; nothing if there is no gel."""
     gel = properties.gel_of(context.scene, context.object)
     if gel is None:
         return

@@ -1,4 +1,4 @@
-"""A Blender scene as a ``tactile_core`` scene: which indenter, where it goes, how hard it presses."""
+"""Turn a Blender scene into a ``tactile_core`` scene: which indenter presses, where it goes, how hard it presses."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ DIGITS_S, DIGITS_MM, DIGITS_N = 6, 5, 7  # decimals kept of float32 keyframes
 class Authored:
     """Scene made from Blender's objects.
 
-    scene : of ``tactile_core.simulation.scene``; meshes : file name -> content; apexes : (P, 3) m, where the
-    indenter stood at each point, or None where the scene's forces say how hard it presses.
+    scene : a ``tactile_core.simulation.scene.Scene``; meshes : file name -> content of each mesh that it names
+    apexes : (P, 3) m, where the indenter's tip stood at each point of its path; None if forces say how hard it presses
     """
 
     scene: Any
@@ -47,8 +47,8 @@ def indenter_of(context: bpy.types.Context) -> bpy.types.Object:
 
 
 def sensors_for(scene: bpy.types.Scene, near: bpy.types.Object | None) -> list[bpy.types.Object]:
-    """List the sensors that an indenter ``near`` them presses, one of each name, skins before gels: those of its
-    collections first, and an imported recording's only without others."""
+    """List the sensors that the indenter ``near`` presses, one of each name, skins before gels. One in its collections
+    is preferred; one elsewhere that plays an imported recording counts only if there is no other."""
     homes = () if near is None else {*near.users_collection, *(near.parent or near).users_collection}
     beside = {thing for group in homes for thing in group.objects}
     there = [thing for role in ("BIOTAC", "DIGIT") for thing in scene.objects if thing.tactile.role == role]
@@ -64,15 +64,15 @@ def _plays_recording(sensor: bpy.types.Object) -> bool:
 
 
 def check_free(*pressed: bpy.types.Object) -> None:
-    """Raise TactileError for a sensor of an imported recording, whose electrodes, trust and flags would stay."""
+    """Raise TactileError for a sensor that plays an imported recording: its electrodes, trust and flags would stay."""
     for thing in filter(_plays_recording, pressed):
         found, advice = "plays an imported recording", "Use a scene for each"
         raise TactileError(thing.name, found, "a sensor of its own to press", advice)
 
 
 def sensor_of(context: bpy.types.Context, near: bpy.types.Object | None) -> bpy.types.Object:
-    """Return the sensor that places of an indenter ``near`` it refer to: the gel (of several the scene camera's), else
-    the skin. Raises TactileError."""
+    """Return the sensor in whose frame places of the indenter ``near`` are: the gel (of several, the one with the
+    scene's camera), else the skin. Raises TactileError if there is none, or if it is edited."""
     there = sensors_for(context.scene, near)
     if not there:
         raise TactileError("Tactile", "no sensor", "a BioTac or a DIGIT in the scene", "Add > Tactile > a sensor")
@@ -84,7 +84,7 @@ def sensor_of(context: bpy.types.Context, near: bpy.types.Object | None) -> bpy.
 
 
 def authored(context: bpy.types.Context) -> Authored:
-    """Return the scene as Blender has it now. Raises TactileError for what cannot be simulated."""
+    """Return the scene as Blender has it now. Raises TactileError if it cannot be simulated."""
     from ...tactile_core.simulation.scene import Scene
 
     thing, scene = indenter_of(context), context.scene
@@ -119,7 +119,7 @@ def authored(context: bpy.types.Context) -> Authored:
 
 
 def _press(thing: bpy.types.Object) -> dict[str, float]:
-    """Friction and tilt, rounded from Blender's float32; of a former file's indenter, which lacks them, nothing."""
+    """Return an indenter's friction and tilt, rounded from Blender's float32; {} if its file is too old for them."""
     about = thing.tactile
     values = {"friction": round(about.friction, 5), "tilt_deg": round(math.degrees(about.tilt), 4)}
     return values if about.format >= 2 else {}
@@ -136,7 +136,8 @@ def _scene(kind: type, document: dict, specs: list, recording: dict) -> Any:
 
 
 def _specs(things, sensor, context, meshes: dict[str, bytes]) -> list:  # noqa: ANN001
-    """List the specs of indenters; those of one name, as duplicates have, by the names of their objects."""
+    """List the specs of the indenters ``things``; specs of the same name, as duplicates have, get their objects' names.
+    meshes : gets file name -> content of each mesh that a spec names"""
     import msgspec
 
     specs = [_spec(thing, sensor, context, meshes) for thing in things]
@@ -159,7 +160,7 @@ def _sampled(scene: bpy.types.Scene) -> np.ndarray:
 
 
 def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
-    """The frames of the keys where all curves are straight lines between them, else every frame."""
+    """Return the frames of an indenter's keys if its curves are straight lines between them, else every frame."""
     animation = thing.animation_data
     free = thing.parent in (None, sensor) and not thing.constraints
     if not free or animation is None or animation.action is None or animation.nla_tracks:
@@ -173,8 +174,8 @@ def _key_frames(scene: bpy.types.Scene, thing: bpy.types.Object, sensor: bpy.typ
 
 
 def motion_of(context, thing, sensor, frames: np.ndarray) -> dict[str, np.ndarray]:  # noqa: ANN001
-    """Return "apex" (P, 3) m, where the indenter ``thing`` touches, in the sensor's frame, and "force" (P,) N at frames
-    (P,), fractional ones too; the scene keeps its current frame."""
+    """Return the path of the indenter ``thing`` at frames (P,), fractional ones too: "apex" (P, 3) m, its tip in the
+    sensor's frame, and "force" (P,) N. The scene keeps its current frame."""
     scene, now = context.scene, (context.scene.frame_current, context.scene.frame_subframe)
     apex, force = [], []
     try:
@@ -200,7 +201,7 @@ def _points(scene: bpy.types.Scene, frames: np.ndarray, values: dict, originals:
 
 
 def _same(points: list[dict], originals: list[dict]) -> bool:
-    """Return true if the points are ``originals``, those of the file, up to the rounding of float32 keyframes."""
+    """Return true if points equal ``originals``, the imported file's, up to the rounding of float32 keyframes."""
     if len(points) != len(originals):
         return False
     found, wanted = ([list(point.values()) for point in each] for each in (points, originals))

@@ -57,7 +57,8 @@ class TACTILE_OT_import_scene(TactileOperator, ImportHelper):
 
 
 def _set_motion(scene: bpy.types.Scene, found, things: list[bpy.types.Object]) -> bpy.types.Object:  # noqa: ANN001
-    """Keyframe the recording's indenter; returns it, or the first where the scene holds no recording."""
+    """Keyframe the indenter of the recording that the scene file ``found`` describes, one of ``things``; return it, or
+    the first if there is no recording."""
     import msgspec
 
     document = msgspec.to_builtins(found)

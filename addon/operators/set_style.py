@@ -52,8 +52,8 @@ class TACTILE_OT_set_style(TactileOperator):
 
 
 def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: float) -> None:
-    """Give a sensor a style that it can show. largest : mm, or counts, at the colours' end; 0 for the animation's;
-    exaggeration : how many times the dent is drawn"""
+    """Give a sensor a style and its legend; remove both if the style does not suit it.
+    largest : value at the colours' upper end, mm or counts, 0 for the animation's; exaggeration : the dent's factor"""
     style = style if styles.can_show(thing, style) else "NONE"
     unit = thing.tactile.per_metre * 1e-3
     if style == "ELECTRODES":
@@ -72,17 +72,17 @@ def _give(thing: bpy.types.Object, style: str, largest: float, exaggeration: flo
 
 
 def take_over(thing: bpy.types.Object, other: bpy.types.Object) -> None:
-    """Give a new sensor the style of another sensor, if it suits; colours cover the new sensor's own values."""
+    """Give a new sensor the style of another sensor, if it suits; the colours' range is that of its own values."""
     style = styles.style_of(other)
     if style != "NONE" and styles.can_show(thing, style):
         _give(thing, style, 0.0, 1.0)
 
 
 def follow(thing: bpy.types.Object, before: float) -> None:
-    """Fit a sensor's style of displacement or contact patch to a new animation: its range, unless that was set by hand,
-    its legend, and the error below which colours fade.
+    """Renew a sensor's displacement or contact patch style for a new animation: its legend, the error below which
+    colours fade, and the colours' range unless the user had set that.
 
-    before : m, largest displacement of the animation that it replaces, 0 for none; another range was set by hand
+    before : m, largest displacement of the animation that was replaced, 0 for none; any other range was the user's
     """
     style = styles.style_of(thing)
     if style not in ("DISPLACEMENT", "CONTACT_PATCH"):
@@ -94,9 +94,10 @@ def follow(thing: bpy.types.Object, before: float) -> None:
 
 
 def animate(thing: bpy.types.Object, moved: Motion, frames: np.ndarray, how: str, values: dict[str, np.ndarray]) -> str:
-    """Let a sensor play a movement at frames (T,), its contact patch, style and properties with it.
+    """Let a sensor play a movement at frames (T,), with its contact patch, style and custom properties; return a
+    sentence for the user.
 
-    how : "SHAPE_KEYS" or "MESH_CACHE"; values : (T,) or (T, k) by name of ``curves.PROPERTIES``. Returns a sentence.
+    how : "SHAPE_KEYS" or "MESH_CACHE"; values : name in ``curves.PROPERTIES`` -> (T,) or (T, k)
     """
     before = thing.tactile.largest
     summary = motion.animate(thing, moved, frames, how)
@@ -109,17 +110,17 @@ def animate(thing: bpy.types.Object, moved: Motion, frames: np.ndarray, how: str
 
 
 def _largest_mm(largest: float) -> float:
-    """Return the colours' upper end for a largest displacement, m; 1 mm where nothing has moved yet."""
+    """Return the value at the colours' upper end, mm, for a ``largest`` displacement, m; 1 mm if nothing has moved."""
     return 1e3 * largest or 1.0
 
 
 def _two_digits(value: float) -> str:
-    """Write a positive value with two digits or more: "1.0", as a legend's 1 alone looks like an l."""
+    """Return a positive value as text with two digits or more, such as "1.0": a legend's 1 alone looks like an l."""
     return f"{value:.{max(0, 1 - math.floor(math.log10(value)))}f}"
 
 
 def _counts(thing: bpy.types.Object) -> float:
-    """Largest change of a recording's electrodes, counts; 0 where there is none, or a file of a former version."""
+    """Return the largest change of a sensor's electrodes, counts; 0 if it has none, or its file is too old for them."""
     if frame_attribute.modifier_of(thing, frame_attribute.COUNTS) is None:
         return 0.0
     known = range(len(thing.get("electrodes", ())))

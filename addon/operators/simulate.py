@@ -1,4 +1,4 @@
-"""The button "Simulate": contact mechanics over the frame range, in another process; its result put into the scene."""
+"""The button "Simulate": solve contacts over the frame range in another process, and put the result into the scene."""
 
 import dataclasses
 import json
@@ -28,11 +28,10 @@ _BOUNDS = {"sphere": "SPHERE", "cylinder": "CYLINDER"}  # Blender's outlines; th
 class Result:
     """Result of a simulation, in the sensor's frame.
 
-    seconds (T,); force (T, 3) N, on the sensor
-    apex (T, 3) m, turn (T, 3, 3), columns the indenter's axes: where the indenter stood, on the gel if any
-
-    moved : displacement (T, n, 3) m of each sensor that was solved, by their names
-    picked : which tiers, in words, where a bound was given
+    seconds : (T,); force : (T, 3) N, on the sensor
+    apex : (T, 3) m, the indenter's tip; turn : (T, 3, 3), its axes as columns; on the gel, else on the skin
+    moved : name -> displacement (T, n, 3) m, of each sensor that was solved
+    picked : sentences on the tier that was chosen for each sensor; none without a largest error
     """
 
     seconds: np.ndarray
@@ -52,8 +51,8 @@ def read(folder: Path) -> Result:
 
 
 def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result, frames: np.ndarray, rate: float) -> str:
-    """Bake a result, with the indenter ``thing``, onto frames (F,) of the scene; returns a sentence for the user.
-    rate : frames per second"""
+    """Animate the sensors by a result at frames (F,) of the scene, and the indenter's twin; return a sentence for the
+    user. thing : the indenter; rate : frames per second"""
     scene, seconds = context.scene, result.seconds - result.seconds[0]
     # The mechanics run at the sensor's 100 Hz: each frame shows the nearest of its samples.
     sample = np.abs((frames - frames[0])[:, None] / rate - seconds[None, :]).argmin(axis=1)
@@ -73,8 +72,8 @@ def bake(context: bpy.types.Context, thing: bpy.types.Object, result: Result, fr
 
 
 def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarray) -> None:  # noqa: ANN001
-    """Add a solid twin of the indenter that stands where the mechanics had it; the one to move by hand turns to wires.
-    frames : (F,) of the scene; sample : (F,) int, the moment of the result that each shows"""
+    """Add a solid twin of the indenter ``thing`` where the simulation had it, and show the indenter itself as wires.
+    frames : (F,) of the scene; sample : (F,) int, index of the result's moment that each frame shows"""
     sensor = sensor_of(context, thing)
     name = STANDING.format(thing.name)
     twin = context.scene.objects.get(name)
@@ -112,7 +111,7 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
 
 
 def _outputs(pressed: list[bpy.types.Object]) -> list[str]:
-    """List the outputs for the sensors that are pressed: one that is not there is not solved."""
+    """List the outputs to simulate for the sensors that are pressed; sensors without an output are not solved."""
     from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 
     there = list(map(properties.sensor_name, pressed))
@@ -129,13 +128,13 @@ class TACTILE_OT_simulate(JobOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there are a sensor and what presses it."""
+        """Return true if there are a sensor and an indenter."""
         return properties.can(cls, lambda: sensor_of(context, scene_bridge.indenter_of(context)))
 
     stopped = "Simulation stopped; the scene is as it was"
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Write the authored scene and start its simulation as a job; see ``JobOperator``."""
+        """Write the scene as the user has set it up, and start its simulation as a job."""
         require("h5py", "msgspec", "scipy")
         from ...tactile_core.simulation.scene import write_scene
 
@@ -159,7 +158,7 @@ class TACTILE_OT_simulate(JobOperator):
                         first_frame=context.scene.frame_start, rate=self._rate)  # fmt: skip
 
     def finish(self, context: bpy.types.Context) -> None:
-        """Bake the simulation into the scene; see ``JobOperator``."""
+        """Animate sensors and indenter by the simulation's result, and keep its recording."""
         thing = properties.found_again(context.scene, *self._thing, "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result, self._frames, self._rate)
@@ -175,7 +174,7 @@ class TACTILE_OT_simulate(JobOperator):
     def _keep(self, context: bpy.types.Context, thing: bpy.types.Object) -> None:
         """Save the simulated recording beside the .blend, so that it can be translated like a real one.
 
-        Of a file that was never saved it is kept by Blender until the file is, see ``kept_files``.
+        If the .blend was never saved, the recording is kept in Blender's own folder until it is (``kept_files``).
         """
         from ...tactile_core.simulation.scene_recording import ELECTRODES_OF
 

@@ -20,9 +20,9 @@ from .scene_bridge import indenter_of, sensor_of
 
 
 def depth_of(context: bpy.types.Context, thing: bpy.types.Object) -> float | None:
-    """Compute how far an indenter stands below its point of first touch, m; negative above it.
+    """Return how far an indenter stands below its point of first touch, m; negative above it.
 
-    None for a mesh of the user's, whose distances take too long for a panel, and where it meets no sensor.
+    Return None for a mesh of the user's, whose distances take too long for a panel, and if it meets no sensor.
     """
     if not thing.tactile.spec:
         return None
@@ -43,8 +43,8 @@ def _place(thing: bpy.types.Object, sensor: bpy.types.Object, depsgraph: bpy.typ
 
 @functools.lru_cache(maxsize=64)  # a panel asks at each redraw
 def _touch(sensor: str, spec: str, x: float, z: float, tilt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the point of first touch (3,) m and the direction of the press (3,) of the body of ``spec``, a JSON text.
-    x, z : m, on the sensor; tilt : rad, see ``Placement``"""
+    """Return the point (3,) m where a body first touches a sensor at rest, and the direction (3,) in which it presses.
+    spec : of the body, a JSON text; x, z : m, place on the sensor; tilt : rad, of the press against the normal"""
     import msgspec
 
     from ...tactile_core.simulation.indenter_specs import IndenterSpec

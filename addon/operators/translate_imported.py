@@ -1,4 +1,4 @@
-"""Translate the imported recording to a gel's at the press of one button."""
+"""Translate the imported recording to a gel's movement at the press of one button."""
 
 import bpy
 import numpy as np
@@ -30,7 +30,7 @@ class TACTILE_OT_translate(JobOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a skin with a recording."""
+        """Return true if there is a skin with a recording."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         if skin is None or not skin.tactile.recording:
             cls.poll_message_set("Import a BioTac recording first, or simulate one")
@@ -38,7 +38,7 @@ class TACTILE_OT_translate(JobOperator):
         return True
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Translate; start a job only for a gel that no networks lead to, whose contacts are solved."""
+        """Translate the recording; start a job only for a gel that networks do not lead to, to solve its contacts."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin, skin.data)  # an override's mesh is linked
@@ -67,7 +67,7 @@ class TACTILE_OT_translate(JobOperator):
             self._job = Job("solve_gel", self._folder.path, gel=self._target, found_on=own)
 
     def finish(self, context: bpy.types.Context) -> None:
-        """Add the gel, or animate the one that is there, with the translation; see ``JobOperator``."""
+        """Animate the gel by the translation; add a gel if there is none."""
         if self._job is not None:
             with np.load(self._folder.path / "gel.npz") as stored:
                 self._moved = mesh_cache.in_memory(stored["displacement"], self._target)
@@ -96,9 +96,9 @@ class TACTILE_OT_translate(JobOperator):
 
 
 def _gel_beside(skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
-    """Return the skin's gel of a sensor, and whether it is new.
+    """Return the gel of the kind ``sensor`` beside a skin, and true if it was missing and has been added.
 
-    One that is there keeps its LEDs, coating and camera as the user set them.
+    An old gel keeps its LEDs, coating and camera as the user set them.
     """
     group = properties.home_of(skin)
     there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")

@@ -1,5 +1,5 @@
-"""The window, set so that what was imported can be seen: 3D views, the sidebar's tab, and a place for the picture;
-and the scene's time."""
+"""Set the window so that what was imported can be seen: 3D views, the sidebar's tab, a place for the picture; and the
+scene's time."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def _add_sun(light: bpy.types.Object) -> None:
 
 
 def is_new(scene: bpy.types.Scene) -> bool:
-    """Return true for a scene that holds nothing of the user's own: its units and frame rate may be set."""
+    """Return true if a scene holds nothing of the user's own, so that its units and frame rate may be set."""
     known = _untouched(scene)
     return all(thing.hide_viewport or thing.tactile.role != "NONE" or thing in known for thing in scene.objects)
 
 
 def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """Show an image in the window's Image Editor, which is made beside the largest 3D view where there is none."""
+    """Show an image in the window's Image Editor; if there is none, split one off the largest 3D view."""
     screen = context.window.screen if context.window else None
     if screen is None:
         return
@@ -79,13 +79,13 @@ def show_picture(context: bpy.types.Context, image: bpy.types.Image) -> None:
 
 
 def look_again(context: bpy.types.Context, pictures_alone: bool = False) -> None:
-    """Frame pictures and, unless ``pictures_alone``, the selection, once the window is drawn and views have a size."""
+    """Frame pictures and, unless ``pictures_alone``, the selection a moment later, when views have their size."""
     look = functools.partial(_look_at_selected, context.window_manager, context.window, pictures_alone)
     bpy.app.timers.register(look, first_interval=DRAWN)
 
 
 def _look_at_selected(windows: bpy.types.WindowManager, window: bpy.types.Window, pictures_alone: bool) -> None:
-    """Look once more at pictures and, unless ``pictures_alone``, at what is selected, an indenter with its sensor."""
+    """Frame pictures and, unless ``pictures_alone``, selected objects with their parents, as an indenter's sensor."""
     if window not in windows.windows[:]:
         return
     selected = [] if pictures_alone else bpy.context.selected_objects
@@ -124,7 +124,7 @@ class TACTILE_PT_first(bpy.types.Panel):
 
 
 def _stand_first() -> None:
-    """Let the tab be the first until the sidebar is drawn."""
+    """Put the tab "Tactile" before all others until the sidebar is drawn."""
     if not TACTILE_PT_first.is_registered:
         bpy.utils.register_class(TACTILE_PT_first)
         bpy.app.timers.register(_stand_back, first_interval=_FIRST, persistent=True)
@@ -194,14 +194,14 @@ def look_at(context: bpy.types.Context, things: Sequence[bpy.types.Object]) -> N
 
 
 def colour_by(context: bpy.types.Context, kind: str) -> None:
-    """Colour Solid views by object ("OBJECT"), or by the surfaces' own colours where they have some ("VERTEX")."""
+    """Let Solid views colour by object (``kind`` "OBJECT"), or by a surface's style if it has one ("VERTEX")."""
     for area in context.window.screen.areas if context.window else ():
         if area.type == "VIEW_3D":
             area.spaces.active.shading.color_type = kind
 
 
 def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> None:
-    """Play a recording of ``rate`` Hz in its own time, from the scene's frame ``first`` to ``last``."""
+    """Set a scene's frame rate and range to play a recording of ``rate`` Hz in real time from ``first`` to ``last``."""
     scene.render.fps = max(1, round(rate))
     scene.render.fps_base = scene.render.fps / rate
     scene.frame_start, scene.frame_end = first, last
@@ -209,7 +209,8 @@ def set_timeline(scene: bpy.types.Scene, rate: float, first: int, last: int) -> 
 
 
 def mark_low_confidence(scene: bpy.types.Scene, confidence: np.ndarray, frames: np.ndarray) -> int:
-    """Mark stretches where confidence (T,), 0 to 1, of frames (T,) is below 0.5, replacing its own; return how many."""
+    """Mark stretches of frames (T,) whose confidence (T,), 0 to 1, is below 0.5, in place of earlier such marks; return
+    how many stretches there are."""
     for marker in [marker for marker in scene.timeline_markers if marker.name.startswith(MARKER)]:
         scene.timeline_markers.remove(marker)
     edges = np.diff(np.concatenate([[0], confidence < LOW_CONFIDENCE, [0]]).astype(int))

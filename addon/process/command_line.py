@@ -112,7 +112,7 @@ def _folder(out: Path, path: Path) -> Path:
 
 
 def _claimed(folder: Path, options: argparse.Namespace) -> Path:
-    """The folder of a result, made; raises TactileError where it holds something and may not."""
+    """Make the folder of a result and return it; raises TactileError if it holds files, unless they may go."""
     if folder.exists() and any(folder.iterdir()) and not options.overwrite:
         raise TactileError(folder, "already holds something", "a new folder", "Add --overwrite, or another --out")
     folder.mkdir(parents=True, exist_ok=True)
@@ -120,7 +120,7 @@ def _claimed(folder: Path, options: argparse.Namespace) -> Path:
 
 
 def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
-    """Write the recording ``path`` as a .blend into a folder, by the command line's options."""
+    """Translate the recording ``path`` and write it as a .blend into a folder. options : of the command line"""
     _fresh()
     words = {
         "tare": options.tare,

@@ -1,4 +1,4 @@
-"""A job in another process, seen from Blender: progress comes as lines, and it can be cancelled."""
+"""Start and follow a job in another process: its progress comes as lines, and it can be cancelled."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ _PATIENCE = 5.0  # s that a cancelled job has to end by itself
 class Job:
     """A worker process that does one job, and the folder of its files.
 
-    ``done`` of ``total`` is its reported progress, in the ``stage`` of that name; ``finished`` : whether it ended well
-    ``drawn`` : pictures that could be shown so far
+    stage : name of the step that it reports; done, total : progress within that step
+    finished : true once it has ended well; drawn : number of pictures that could be shown so far
     """
 
     def __init__(self, kind: str, folder: Path, *, listening: bool = False, **options: object) -> None:
-        """Start the worker. kind : of job, a key of ``worker.JOBS``, such as "simulate"; folder : of its input
-        and output; options : what else job.json says; listening : true if it waits for what ``tell`` sends"""
+        """Start the worker. kind : a key of ``worker.JOBS``, such as "simulate"; folder : holds its input and output
+        options : other entries of job.json; listening : true if the job waits for messages of ``tell``"""
         self.folder, self.done, self.total, self.finished, self.stage = folder, 0, 1, False, ""
         self.drawn = 0
         (folder / "job.json").write_text(json.dumps({"kind": kind} | options), encoding="utf-8")
@@ -61,7 +61,8 @@ class Job:
             self._process.stdin.flush()
 
     def poll(self, wait: float = 0.0) -> bool:
-        """Read the worker's messages, waiting up to ``wait`` s; return true if it ended. TactileError if it failed."""
+        """Read the worker's messages, waiting up to ``wait`` s; return true once it has ended. Raises TactileError if
+        it failed."""
         error = None
         for message in self._messages(wait):
             error = message.get("error", error)
@@ -136,7 +137,7 @@ class JobFolder:
 
 @contextlib.contextmanager
 def _alive_on_broken_pipe() -> Iterator[None]:
-    """Hold SIGPIPE back: Python ignores it, but not inside a Blender, which it would end."""
+    """Block the signal SIGPIPE, which would end Blender if the worker has died; Python alone would ignore it."""
     if not hasattr(signal, "SIGPIPE"):  # Windows
         yield
         return
@@ -158,7 +159,7 @@ def _message(line: str) -> dict:
 
 
 def _environment() -> dict[str, str]:
-    """The worker finds ``tactile_core`` in the extension, and Blender's own packages and the extension's wheels."""
+    """Return the worker's environment: it finds ``tactile_core``, Blender's packages and the extension's wheels."""
     packages = [entry for entry in sys.path if Path(entry).name in ("site-packages", "dist-packages")]
     path = os.pathsep.join([os.fspath(Path(__file__).parents[2]), *packages])
     return os.environ | {"PYTHONPATH": path, "PYTHONIOENCODING": "utf-8"}

@@ -1,4 +1,4 @@
-"""Recordings, read here or, where HDF5 does not work in Blender's own process, in another one.
+"""Read recordings, here or, if HDF5 does not work in Blender's own process, in another one.
 
 Blenders of Linux distributions are linked against the system's HDF5, whose functions then take the place of those that
 h5py's wheel brings: importing it fails (measured: Debian's 4.3.2). A plain Python process is free of that.
@@ -22,7 +22,8 @@ from .jobs import Job, JobFolder
 
 
 def read(path: str | os.PathLike, sensor: str = SOURCE, columns: str = "") -> Recording:
-    """Read a recording of ``sensor`` as ``recordings.read`` does; columns : file that maps its columns, or empty"""
+    """Read a recording of ``sensor`` by ``recordings.read``; raises TactileError.
+    columns : file that says what the recording's columns are, "" for none"""
     if _is_hdf5(path) and not _hdf5_works():
         return _read_elsewhere(os.fspath(path), sensor, columns)
     return recordings.read(path, column_map.read(columns) if columns else None, sensor)
@@ -38,7 +39,7 @@ def _is_hdf5(path: str | os.PathLike) -> bool:
 
 @functools.cache
 def _hdf5_works() -> bool:
-    """Return true if h5py can be imported, or is missing altogether, which the reader reports."""
+    """Return false if importing h5py fails; true if it works, or if h5py is missing, which the reader will report."""
     try:
         import h5py  # noqa: F401
     except ModuleNotFoundError:
@@ -49,7 +50,7 @@ def _hdf5_works() -> bool:
 
 
 def _read_elsewhere(path: str, sensor: str = SOURCE, columns: str = "") -> Recording:
-    """Raise TactileError as the reader does."""
+    """Read a recording in another process; raises TactileError with the reader's message."""
     with JobFolder() as folder:
         Job("read", folder, path=path, sensor=sensor, columns=columns).wait()
         about = json.loads((folder / "about.json").read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Mitsuba's presets in a process of their own: a native library that aborts there leaves Blender alive."""
+"""Draw by Mitsuba's presets in another process, so that Blender lives on if a native library aborts there."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _IDLE = 60.0  # s
 
 
 def write_unit(folder: Path, unit: Calibration) -> None:
-    """Write a unit into a job's folder, beside it the photograph that its calibration names."""
+    """Write a unit's calibration into a job's folder, and beside it the photograph that it names."""
     calibration_file.write_calibration(folder / "unit.toml", unit)
     if unit.photograph:
         shutil.copyfile(unit.photograph, folder / Path(unit.photograph).name)
@@ -35,7 +35,8 @@ class Stopped(Exception):
 
 
 class Tracer:
-    """A worker that draws pictures of height maps by one preset, until closed; unit and surroundings may change."""
+    """A worker that draws pictures of height maps by one preset until it is closed. Each picture may be of another unit
+    and of other surroundings, the scene's other lamps and bodies."""
 
     def __init__(self, preset: str) -> None:
         self._folder, self._count, self._unit = JobFolder(), 0, ""
@@ -54,9 +55,10 @@ class Tracer:
         stopped: Callable[[], bool],
         better: Callable[[np.ndarray], None],
     ) -> np.ndarray:
-        """Draw the picture (H, W, 3) uint8 of heights (H, W) m; those before it, noisier, are given to ``better``.
+        """Draw the picture (H, W, 3) uint8 of heights (H, W) m.
 
-        Raises TactileError, or Stopped once stopped() returns true, which is asked again and again.
+        stopped : called again and again; once it returns true, Stopped is raised
+        better : called with noisier pictures, which come before the one that is returned. Raises TactileError.
         """
         self._count += 1
         drawn = self._job.drawn
@@ -77,7 +79,7 @@ class Tracer:
         return np.load(self._folder.path / "picture.npy", allow_pickle=False)
 
     def _tell_unit(self, unit: Calibration, around: Surroundings) -> None:
-        """Write unit and surroundings, where they are other ones."""
+        """Write unit and surroundings for the worker, unless it has them already."""
         bodies = [(body.vertices.tobytes(), body.faces.tobytes()) for body in around.occluders]
         key = hashlib.sha256(repr((unit, around.lamps, bodies)).encode()).hexdigest()
         if key == self._unit:
@@ -109,7 +111,8 @@ def draw(
     stopped: Callable[[], bool],
     better: Callable[[np.ndarray], None],
 ) -> np.ndarray:
-    """Draw a picture (H, W, 3) uint8 by a preset's worker, which stays for the next one; see ``Tracer.draw``."""
+    """Draw a picture (H, W, 3) uint8 of heights (H, W) m by a preset's worker, which is kept for the next picture.
+    stopped, better : of ``Tracer.draw``, which also says what is raised"""
     global _last_used
     with _in_use:
         if preset not in _kept:
@@ -125,7 +128,7 @@ def draw(
 
 
 def prepare(preset: str, unit: Calibration, around: Surroundings) -> None:
-    """Start a preset's worker, get it ready for its first picture and end others; do nothing while one draws."""
+    """Start a preset's worker, get it ready for its first picture and end other workers; nothing if one is drawing."""
     global _last_used
     if preset in _kept or not _in_use.acquire(blocking=False):
         return

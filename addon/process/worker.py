@@ -1,9 +1,9 @@
-"""The other process: long jobs run here, so that Blender lives on when they stall, are stopped or abort.
+"""Run long jobs in a process of their own, so that Blender lives on if they stall, are stopped or abort.
 
 Started by ``jobs.Job`` as `python worker.py FOLDER` with ``tactile_core`` on its path. FOLDER/job.json says what to do;
 each line on stdout is a JSON object: {"stage": "..."}, {"done": 3, "total": 10}, {"drawn": true} for a picture that
 can be shown, {"error": "..."} or {"finished": true}. No bpy here.
-A job is a function of FOLDER, job.json's content, and progress, to be called with (done, total).
+A job is a function of FOLDER, job.json's content, and ``progress``, a function that it calls with (done, total).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Progress = Callable[[int, int], None]
 
 
 def main(folder: Path) -> int:
-    """Run the job in a folder; returns the exit status: 0, or 2 where it has reported an error."""
+    """Run the job in a folder; return the exit status: 0, or 2 if it has reported an error."""
     from tactile_core.errors import TactileError
 
     job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
@@ -47,12 +47,12 @@ def say(**message: Any) -> None:
 
 
 def simulate(folder: Path, job: dict, progress: Progress) -> None:
-    """Simulate FOLDER/scene.toml into recording.h5 and result.npz: true forces and displacements, indenter's places.
+    """Simulate FOLDER/scene.toml; write recording.h5 and result.npz: true forces and displacements, indenter's places.
 
-    job["keep"] : outputs, so that a sensor that is not in the scene is not solved; job["um"] : largest error, or None;
-    job["seed"] : of the noise; job["placed_on"] : sensor that places refer to; job["first_frame"], job["rate"] : of the
-    scene, frames per second, to name the frame in errors
-    With heights.npz in the folder the scene's forces are first found from how deep the indenter has been moved.
+    job["keep"] : outputs to write; only sensors that they need are solved; job["seed"] : of the noise
+    job["um"] : largest error of a surface, um, or None; job["placed_on"] : sensor whose frame places are in
+    job["first_frame"], job["rate"] : of Blender's scene, and its frames per second, to name the frame in errors
+    If the folder has heights.npz, the scene's forces are first found from how deep the indenter stands.
     """
     from tactile_core.errors import TactileError
     from tactile_core.mechanics.fast.compliance import compliance_of
@@ -81,7 +81,7 @@ def simulate(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def _stages(used: tuple[str, ...], by_height: bool, um: float | None) -> Iterator[None]:
-    """Name each stage of a simulation at each step, with its number: "Solving the contacts, 3 of 3".
+    """Report the next stage of a simulation at each step, such as "Solving the contacts, 3 of 3".
     used : sensors; by_height : true if heights are given in place of forces; um : largest error asked for, or None"""
     names = [_preparing(sensor) for sensor in used if um is None]
     names += ["Finding the forces of the heights"] * by_height + ["Choosing the tiers"] * (um is not None)
@@ -98,7 +98,8 @@ def _preparing(sensor: str) -> str:
 
 
 def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[float]:
-    """Replace the scene's forces by those that job["placed_on"] answers at each depth; returns the depths, m."""
+    """Write into scene.toml the forces with which the sensor job["placed_on"] resists the indenter at each point of its
+    path, by how deep it stands there (heights.npz); return these depths, m."""
     import msgspec
 
     from tactile_core.errors import TactileError
@@ -137,7 +138,7 @@ def _forces_from_heights(folder: Path, job: dict, progress: Progress) -> list[fl
 
 
 def _too_deep(depth: float, error: Any) -> str:
-    """Write how deep, m, an indenter stands, and why that is not solved where it is not the depth itself."""
+    """Return words on how deep, m, an indenter stands, and why that is not solved if not for the depth itself."""
     from tactile_core.mechanics.force_search import UnreachableError
 
     why = "" if isinstance(error, UnreachableError) else f" ({error.found})"
@@ -145,15 +146,15 @@ def _too_deep(depth: float, error: Any) -> str:
 
 
 def _at_frame(indenter: str, job: dict, k: int, found: str, expected: str, advice: str) -> Exception:
-    """A TactileError in the words of the scene: the object ``indenter``, at frame job["first_frame"] + k."""
+    """Return a TactileError that names the object ``indenter`` and the scene's frame, job["first_frame"] + k."""
     from tactile_core.errors import TactileError
 
     return TactileError(f"{indenter}, frame {job['first_frame'] + k:g}", found, expected, advice)
 
 
 def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -> Exception:
-    """Return the same error in the words of the scene in a folder, where it is of a moment.
-    depths : m, by the scene's points, where heights were given in place of forces; else None"""
+    """Return an error of one moment with the indenter and frame of the scene in a folder; other errors as they are.
+    depths : m, at the scene's points, if heights were given in place of forces; else None"""
     from tactile_core.simulation.scene import load_scene
 
     if error.second is None:
@@ -167,9 +168,8 @@ def _in_scene(error: Any, folder: Path, job: dict, depths: list[float] | None) -
 
 
 def _result(folder: Path, sensor: str, picked: list[str]) -> None:
-    """Write result.npz: seconds (T,), force (T, 3) N, "moved SENSOR" (T, n, 3) m; tiers picked, in words; apex (T, 3) m
-    and axes (T, 3, 3) of the indenter, which
-    is lowered until it touches the dented surface of the sensor on which it is placed."""
+    """Write result.npz: seconds (T,); force (T, 3) N; "moved SENSOR" (T, n, 3) m; ``picked``, sentences on tiers; apex
+    (T, 3) m and axes (T, 3, 3) of the indenter, lowered until it touches the dented surface of the ``sensor``."""
     from tactile_core import sensors
     from tactile_core.mechanics.placement import Placement, pose_at
     from tactile_core.recordings.simulated import read_truth
@@ -199,10 +199,10 @@ def _result(folder: Path, sensor: str, picked: list[str]) -> None:
 
 
 def render(folder: Path, job: dict, progress: Progress) -> None:
-    """Render, for each line on stdin, FOLDER/heights.npy (H, W) m -> picture.npy (H, W, 3) uint8.
+    """Draw FOLDER/heights.npy (H, W) m to picture.npy (H, W, 3) uint8, for each line on stdin.
 
     A line is {"unit": name, "picture": number}; without a number the renderer only gets ready. Unit and surroundings
-    are read from the folder when "unit" changes. Noisier pictures come first, where the preset has some.
+    are read from the folder when "unit" changes. Some presets write noisier pictures first.
     """
     renderer, known = None, None
     for line in sys.stdin:
@@ -233,8 +233,8 @@ def _renderer(folder: Path, preset: str) -> Any:
 
 
 def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
-    """Write Mitsuba's scene of FOLDER/unit.toml and heights.npy, (H, W) m, to job["path"] (.xml). Done here, as it
-    crashes inside a Blender that brings its own OpenEXR. progress : not used"""
+    """Write a scene for Mitsuba of FOLDER/unit.toml and heights.npy, (H, W) m, to job["path"] (.xml). It is done here
+    because it crashes inside a Blender that brings its own OpenEXR. progress : not used"""
     from tactile_core.pictures.mitsuba.scene_file import write_scene
     from tactile_core.sensors.calibration_file import load_calibration
 
@@ -243,9 +243,10 @@ def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
-    """Solve contacts that networks found on the gel job["found_on"], on the gel job["gel"], from FOLDER/frames.npz, a
-    translation's displacement_digit, contact_center, force, flags.
-    FOLDER/gel.npz then holds displacement (T, n, 3) m and flags (T,).
+    """Solve on the gel job["gel"] the contacts that networks found on the gel job["found_on"].
+
+    Reads FOLDER/frames.npz: a translation's displacement_digit, contact_center, force, flags
+    Writes FOLDER/gel.npz: displacement (T, n, 3) m, flags (T,)
     """
     from tactile_core.jobs import solved_gel
 
@@ -265,7 +266,7 @@ def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def variant(folder: Path, job: dict, progress: Progress) -> None:
-    """Write FOLDER/variant.txt: which variant of Mitsuba this machine runs, and why, in a sentence."""
+    """Write to FOLDER/variant.txt a sentence on which variant of Mitsuba this machine runs, and why."""
     from tactile_core.pictures.mitsuba.variant import LLVM, OLDEST_LLVM, choose_variant
 
     choice = choose_variant()
@@ -277,9 +278,9 @@ def variant(folder: Path, job: dict, progress: Progress) -> None:
 
 
 def read(folder: Path, job: dict, progress: Progress) -> None:
-    """Read the recording job["path"] of job["sensor"] into arrays.npz and about.json, for ``recording_reader``.
+    """Read a recording and write it as FOLDER/arrays.npz and about.json, for ``recording_reader``.
 
-    job["columns"] : file of a map of its columns, or empty
+    job["path"] : its file; job["sensor"] : its sensor; job["columns"] : file that says what its columns are, or ""
     """
     from tactile_core import recordings
     from tactile_core.recordings.tables import column_map

@@ -1,4 +1,4 @@
-"""Files that belong to a .blend: in folders beside it, and where Blender keeps them until it is saved."""
+"""Keep the files that belong to a .blend: in folders beside it, or in Blender's own until the .blend is saved."""
 
 import filecmp
 import itertools
@@ -21,8 +21,8 @@ _DAYS = 30  # that files of a .blend which was never saved are kept (assumed)
 
 
 def folder(name: str) -> Path:
-    """Return the folder ``name``, CACHE or SIMULATIONS, beside the .blend, or Blender's own where that was never saved;
-    it may not exist. Mesh caches that lie in Blender's own for over _DAYS are removed."""
+    """Return the folder ``name``, CACHE or SIMULATIONS, beside the .blend, which may not exist. For a .blend that was
+    never saved, return Blender's own folder, and remove mesh caches in it that are older than _DAYS."""
     if bpy.data.is_saved:
         return Path(bpy.path.abspath(f"//{name}"))
     for old in _own(name).glob("*.pc2"):
@@ -32,19 +32,20 @@ def folder(name: str) -> Path:
 
 
 def _own(name: str) -> Path:
-    """Return where files of a .blend that was never saved are: mesh caches outlast Blender, for its recovered files."""
+    """Return the folder for files of a .blend that was never saved. Mesh caches must outlast Blender there, as a .blend
+    that is recovered after a crash needs them."""
     if name == SIMULATIONS:
         return Path(bpy.app.tempdir) / name
     return Path(bpy.utils.extension_path_user(preferences.ID, path=name))
 
 
 def shown(file: Path) -> str:
-    """Return a file's path as a .blend holds it: relative, where that is saved."""
+    """Return a file's path as the .blend holds it: relative to the .blend if that was saved."""
     return bpy.path.relpath(os.fspath(file)) if bpy.data.is_saved else os.fspath(file)
 
 
 def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
-    """Yield what holds a path, by which name, and which folder it belongs in."""
+    """Yield, for each path in the .blend, the owner, the name of its property, and the name of the folder it is for."""
     for thing in bpy.data.objects:
         for name in _PATHS:
             if getattr(thing.tactile, name):
@@ -56,7 +57,7 @@ def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
 
 @persistent
 def _copy_beside(file: str, *_: object) -> None:
-    """Copy the files of a .blend to where it is saved, and name files elsewhere from there; Blender calls it before."""
+    """Copy a .blend's files to where it is being saved, and make paths relative to there; Blender calls it before."""
     _named.clear()
     here, there = Path(bpy.data.filepath).parent if bpy.data.is_saved else None, Path(file).parent
     moves = file and not (here and there.exists() and here.samefile(there))
@@ -74,9 +75,9 @@ def _copy_beside(file: str, *_: object) -> None:
 
 
 def _copied(path: Path, folder: Path) -> Path:
-    """Put a file into a folder, under a free name where another .blend's has its own; returns where it is.
+    """Put a file into a folder and return its path there. It gets a new name if another .blend's file has its own.
 
-    A link will do: all that the add-on writes replaces a file and leaves its former bytes to whoever else names them.
+    A hard link will do: the add-on never changes a file but replaces it, so that another link keeps the old bytes.
     """
     folder.mkdir(exist_ok=True)
     names = itertools.chain([path.name], (f"{path.stem}_{n}{path.suffix}" for n in itertools.count(2)))
@@ -102,7 +103,8 @@ def _relative(path: Path, start: Path) -> str:
 
 @persistent
 def _let_go(file: str, *_: object) -> None:
-    """Remove what lies beside the .blend now; after saving a copy, name the files of the open one again."""
+    """Remove files from Blender's own folder that now lie beside the .blend, or, after a copy was saved, give the open
+    .blend its paths back; Blender calls it after a save."""
     copied = not bpy.data.is_saved or Path(file) != Path(bpy.data.filepath)
     for holder, name, value, own in _named:
         if copied:
@@ -115,7 +117,7 @@ def _let_go(file: str, *_: object) -> None:
 
 @persistent
 def _find_again(*_: object) -> None:
-    """Name files again that are elsewhere now: an undo or a .blend named their former place."""
+    """Correct paths of files that have moved: an undo or an opened .blend brings their former paths back."""
     for holder, name, kind in _held():
         path = Path(bpy.path.abspath(getattr(holder, name)))
         if path.is_file() and (bpy.data.is_saved or path.is_absolute()):
@@ -129,7 +131,7 @@ def _find_again(*_: object) -> None:
 
 @persistent
 def _name_from_there(context: bpy.types.BlendImportContext) -> None:
-    """Name the files of what was appended by their whole paths: from this .blend, another may have the same one."""
+    """Make appended objects' paths absolute: relative to this .blend, they could mean another file."""
     for item in context.import_items:
         if item.id_type == "OBJECT" and item.id is not None and item.id.library is None and item.source_library:
             for name in _PATHS:

@@ -56,7 +56,7 @@ def _llvm_changed(preferences: bpy.types.AddonPreferences, _context: bpy.types.C
 
 
 def _tell(preferences: bpy.types.AddonPreferences) -> None:
-    """Name LLVM's library and the folder of sensors to this process and its workers; empty ones leave what is set."""
+    """Tell this process and its workers the paths of LLVM's library and the user's sensors, unless they are empty."""
     for variable, path in ((LLVM_VARIABLE, preferences.llvm), (OWN, preferences.sensors)):
         if path:
             os.environ[variable] = bpy.path.abspath(path)

@@ -1,4 +1,5 @@
-"""Properties in a .blend: each object's role, a key of ROLES ("BIOTAC": any skin, "DIGIT": any gel), its recording."""
+"""Define what the add-on stores with each object: its role, a key of ROLES ("BIOTAC": any skin, "DIGIT": any gel), and
+how its recording was read."""
 
 import functools
 import math
@@ -135,7 +136,7 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
 
 
 def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "") -> TactileObject:
-    """Set an object's role, ``per_metre`` units a metre and, of a skin or gel, its sensor; return its properties."""
+    """Set an object's role and, for a skin or gel, its sensor; return its properties. per_metre : units in a metre"""
     about = thing.tactile
     about.role, about.per_metre, about.sensor, about.format = role, per_metre, sensor, FORMAT
     return about
@@ -149,7 +150,7 @@ def set_up_part(thing: bpy.types.Object, parent: bpy.types.Object, role: str) ->
 
 
 def sensor_name(thing: bpy.types.Object) -> str:
-    """Return the sensor of a skin or a gel; an object of an older version names none: BioTac or DIGIT by its role."""
+    """Return the sensor of a skin or a gel. An object of an older version names none: it is a BioTac or a DIGIT."""
     return thing.tactile.sensor or OF_ROLE[thing.tactile.role]
 
 
@@ -164,7 +165,7 @@ def role_of(sensor: str) -> str:
 
 
 def sensor_items(gels_only: bool = False) -> list[tuple[str, str, str]]:
-    """List the sensors with a descriptor, or (gels_only) those with a gel, as a menu's items, the usual pair first."""
+    """List the sensors with a descriptor as a menu's items, BioTac and DIGIT first. gels_only : leaves others out"""
     return _items(descriptor.names(), gels_only)
 
 
@@ -182,7 +183,7 @@ def _items(names: tuple[str, ...], gels_only: bool) -> list[tuple[str, str, str]
 
 
 def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """Return the object of a role: ``near`` itself, else one in its collections, else the scene's first, else None."""
+    """Return an object of a role: ``near`` itself, else one in its collections, else the scene's first, else None."""
     return _beside(scene, role, near) or next((thing for thing in scene.objects if thing.tactile.role == role), None)
 
 
@@ -193,8 +194,8 @@ def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) ->
 
 
 def found_again(scene: bpy.types.Scene, uid: int, was: str, what: str) -> bpy.types.Object:
-    """Return the object of a ``session_uid``, whatever it is called now. Raises TactileError, of what it `was` called
-    and `what` it was, where the scene has it no longer."""
+    """Return the object with a ``session_uid``, even if it was renamed. Raises TactileError if the scene has it no
+    longer. was, what : its former name, and what it was, for the message"""
     found = next((thing for thing in scene.objects if thing.session_uid == uid), None)
     if found is None:
         raise TactileError(was, "no longer in the scene", what)
@@ -202,14 +203,15 @@ def found_again(scene: bpy.types.Scene, uid: int, was: str, what: str) -> bpy.ty
 
 
 def gel_of(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """Return the gel by ``near`` as in ``of_role``, else the scene camera's, else the scene's first, else None."""
+    """Return a gel: ``near`` or one in its collections, else the one with the scene's camera, else the scene's first,
+    else None."""
     seen = None if scene.camera is None else scene.camera.parent
     seen = seen if seen is not None and seen.tactile.role == "DIGIT" and seen.name in scene.objects else None
     return _beside(scene, "DIGIT", near) or seen or of_role(scene, "DIGIT")
 
 
 def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> bpy.types.Object:
-    """Return the gel that ``gel_of`` finds. Raises TactileError where the scene has none, or only an instance."""
+    """Return the gel that ``gel_of`` finds. Raises TactileError if the scene has none, or only an instance of one."""
     gel = gel_of(scene, near)
     if gel is not None:
         return gel
@@ -222,7 +224,7 @@ def needed_gel(scene: bpy.types.Scene, near: bpy.types.Object | None = None) -> 
 
 
 def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
-    """Return true if ``need()`` raises no TactileError; else its text is what the grey button of ``kind`` shows."""
+    """Return true if ``need()`` raises no TactileError; else show its text as why the button of ``kind`` is grey."""
     try:
         need()
     except TactileError as error:
@@ -232,7 +234,7 @@ def can(kind: type[bpy.types.Operator], need: Callable[[], object]) -> bool:
 
 
 def home_of(thing: bpy.types.Object) -> bpy.types.Collection:
-    """Return an object's first collection that is in a scene, as those that Blender keeps for light linking are not."""
+    """Return an object's first collection that is in a scene: those that Blender makes to link light are in none."""
     shown = {group for scene in bpy.data.scenes for group in (scene.collection, *scene.collection.children_recursive)}
     return next((group for group in thing.users_collection if group in shown), thing.users_collection[0])
 
@@ -257,7 +259,7 @@ def check_own(*things: bpy.types.Object | bpy.types.Mesh | None) -> None:
 
 
 def check_absent(scene: bpy.types.Scene, *names: str) -> None:
-    """Raise TactileError where a scene has one of the sensors ``names``: of two, which one a press means is unknown."""
+    """Raise TactileError if a scene already has one of the sensors ``names``: of two, either could be meant."""
     for thing in scene.objects:
         if thing.tactile.role in OF_ROLE and sensor_name(thing) in names:
             found, advice = f"already in the scene, as {thing.name}", "Use a scene for each pair"

@@ -11,14 +11,15 @@ from . import preferences, properties
 
 
 def budget_of(scene: bpy.types.Scene) -> Budget:
-    """Return bounds on error (surface um, picture levels) of a scene's panel. Raises TactileError for other text."""
+    """Return the largest errors that a scene allows, of surfaces, um, and of pictures, levels. Raises TactileError if
+    their text cannot be read."""
     text = scene.tactile_render.error.strip()
     return parse_budget(text) if text else Budget()
 
 
 def preset_of(scene: bpy.types.Scene) -> str:
-    """Return a scene's preset, or the cheapest within its bound on pictures. Raises TactileError for a text that is no
-    bound, and for a bound that no preset keeps."""
+    """Return a scene's preset: the cheapest that keeps its largest error of pictures, or the chosen one if that is not
+    given. Raises TactileError if the error's text cannot be read, or if no preset keeps it."""
     levels = budget_of(scene).levels
     if levels is None:
         return scene.tactile_render.preset
@@ -33,7 +34,7 @@ def calibration_of(scene: bpy.types.Scene, sensor: str, size: tuple[int, int] | 
     """Return the calibration of a gel's sensor, at a picture of ``size`` (width, height) px.
 
     It is that of the file that the scene names, else (for a DIGIT) that of the preferences, else the one that ships.
-    Raises TactileError, also for a file of a sensor that the scene has no gel of.
+    Raises TactileError for a bad file, and for a file of a sensor of which the scene has no gel.
     """
     path = scene.tactile_render.calibration
     if not path and sensor == sensors.TARGET:

@@ -47,12 +47,12 @@ def in_blender(text: str) -> str:
 
 
 def missing(*names: str) -> list[str]:
-    """Return the modules among these that Blender's Python does not have."""
+    """Return those of the modules ``names`` that Blender's Python does not have."""
     return [name for name in names if importlib.util.find_spec(name) is None]
 
 
 def require(*names: str) -> None:
-    """Raise TactileError naming those of the modules that Blender's Python does not have."""
+    """Raise TactileError if Blender's Python lacks one of the modules ``names``; the message names those."""
     lacking = missing(*names)
     if lacking:
         uses = ", ".join(dict.fromkeys(MODULES[name] for name in lacking))
@@ -65,7 +65,8 @@ class Refused(Exception):
 
 @contextmanager
 def reported(operator: bpy.types.Operator) -> Iterator[None]:
-    """Turn TactileError, and a module or a disk that is not there, into an error report and ``Refused``."""
+    """Turn TactileError, a missing module and an error of a file or disk into the operator's error report and raise
+    ``Refused``."""
     try:
         yield
     except TactileError as error:
@@ -100,7 +101,7 @@ class TactileOperator(bpy.types.Operator):
 
 @contextmanager
 def shown(context: bpy.types.Context) -> Iterator[Callable[[float], None]]:
-    """Show an operator's progress at the mouse pointer; yields the function to call with the share done, 0..1."""
+    """Show an operator's progress at the mouse pointer; yield a function to call with the share done, 0 to 1."""
     manager = context.window_manager
     manager.progress_begin(0, 100)
     try:

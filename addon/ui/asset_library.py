@@ -25,14 +25,14 @@ DESCRIPTIONS = {
 
 
 def folder() -> Path:
-    """Return the library's folder, which is made where it is missing."""
+    """Return the library's folder; make it if it is missing."""
     return Path(bpy.utils.extension_path_user(_PACKAGE, path="assets", create=True))
 
 
 def write(place: Path) -> Path:
     """Write styles.blend and its catalogue into a folder; returns the file's path.
 
-    Groups that the open file lacks are made for it and removed again; those that it holds are left without a mark.
+    Node groups that the open file lacks are made for this and removed again; those that it has are no assets after it.
     """
     before = {*bpy.data.node_groups, *bpy.data.materials}
     groups = {style: style_nodes.group(style) for style in style_nodes.NAMES}

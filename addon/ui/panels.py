@@ -64,7 +64,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
 
 
 def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -> None:
-    """Draw how many times a sensor's style enlarges its dent: an input of the style's modifier."""
+    """Draw the field for how many times a sensor's style enlarges its dent: an input of the style's modifier."""
     modifier = sensor.modifiers.get(styles.MODIFIER) if sensor is not None else None
     if modifier is None or modifier.node_group is None:
         return
@@ -74,7 +74,7 @@ def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -
 
 
 def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Object | None) -> None:
-    """Draw the current frame's force, and how far it is to be trusted: the gel's translation, else the skin."""
+    """Draw the current frame's force, and how far to trust its translation to the gel, else to the skin."""
     if skin is None or "force" not in skin:
         return
     size = sum(part * part for part in skin["force"]) ** 0.5
@@ -89,8 +89,8 @@ def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.t
 
 
 def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str, bool]:
-    """Return how far to trust the current frame, in the contact sheet's words, and whether it is a guess; "" for
-    simulated sensors. gel : whose values are used, None for the skin's"""
+    """Return words on how far to trust the current frame, the same as on a contact sheet, and true if it is a guess;
+    ("", False) for simulated sensors. gel : the one whose values are used; None for the skin's"""
     shown = gel if gel is not None and "expected_error_um" in gel else skin
     if "expected_error_um" not in shown:
         return "", False
@@ -113,7 +113,7 @@ def numbers_of(skin: bpy.types.Object) -> list[str]:
 
 
 def _text(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "BLANK1") -> None:
-    """Draw a text in lines that fit the panel, an icon, Blender's name of one, beside the first."""
+    """Draw a text in lines that fit the panel; icon : Blender's name of the one beside the first line"""
     scale = context.preferences.system.ui_scale
     for line in textwrap.wrap(text, max(16, int((context.region.width / scale - 60) / 6.2))):
         column.label(text=line, icon=icon)
@@ -155,7 +155,7 @@ class TACTILE_PT_parts(_Panel, bpy.types.Panel):
 
 
 def _shape(spec: str) -> str:
-    """An indenter's kind and sizes: "sphere, radius 3 mm"."""
+    """Return an indenter's kind and sizes in words, such as "sphere, radius 3 mm"."""
     about = json.loads(spec)
     sizes = [f"{name[:-3].replace('_', ' ')} {value} mm" for name, value in about.items() if name.endswith("_mm")]
     return ", ".join([about["kind"].replace("_", " "), *sizes])

@@ -1,4 +1,4 @@
-"""The workspace "Tactile": sensors, the picture, what the active object is made of, and a timeline."""
+"""Make the workspace "Tactile": a 3D view of the sensors, the picture, the active object's properties, a timeline."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class TACTILE_OT_open_workspace(TactileOperator):
 def _arrange_once_open(
     windows: bpy.types.WindowManager, window: bpy.types.Window, made: bpy.types.WorkSpace, looks: list[int]
 ) -> float | None:
-    """Arrange a new workspace, ``made``, as soon as its window shows it; seconds to the next look, None when there is
-    none. looks : one number, of looks left, which is counted down"""
+    """Arrange the new workspace ``made`` once its window shows it. Return the seconds after which Blender's timer is to
+    try again, None to stop. looks : [tries left], counted down here"""
     looks[0] -= 1
     if window not in windows.windows[:] or not looks[0]:
         return None
@@ -59,7 +59,7 @@ def _arrange_once_open(
 
 
 def _bare_timeline(windows: bpy.types.WindowManager, window: bpy.types.Window) -> None:
-    """Hide channels and sidebar of a timeline; of one that was never drawn, Blender 4.3 crashes."""
+    """Hide channels and sidebar of a timeline that has been drawn; before that, Blender 4.3 would crash."""
     for area in window.screen.areas if window in windows.windows[:] else ():
         if area.ui_type == "TIMELINE":
             area.spaces.active.show_region_channels = area.spaces.active.show_region_ui = False
@@ -83,8 +83,8 @@ def arrange(window: bpy.types.Window) -> None:
 
 
 def _split(window: bpy.types.Window, area: bpy.types.Area, direction: str, share: float, kind: str) -> bpy.types.Area:
-    """Split an area, "VERTICAL" or "HORIZONTAL", at a share from its left or lower end; the smaller part gets a
-    kind."""
+    """Split an area; return the smaller part, which becomes an editor of a ``kind``.
+    direction : "VERTICAL" or "HORIZONTAL"; share : 0 to 1, where to cut, from the left or lower end"""
     before = {*window.screen.areas}
     with bpy.context.temp_override(window=window, screen=window.screen, area=area):
         bpy.ops.screen.area_split(direction=direction, factor=share)
