@@ -162,7 +162,10 @@ class TACTILE_OT_simulate(JobOperator):
         thing = properties.found_again(context.scene, *self._thing, "the indenter that was simulated")
         result = read(self._folder.path)
         summary = bake(context, thing, result, self._frames, self._rate)
-        self._keep(context, thing)
+        try:
+            self._keep(context, thing)
+        except OSError as error:  # what it baked is kept
+            self.report({"WARNING"}, f"{error.filename}: the recording to translate is not kept ({error.strerror})")
         sensor = sensor_of(context, thing)
         if sensor.tactile.role == "DIGIT":
             pictures.show_result(self, context, sensor)
@@ -182,6 +185,7 @@ class TACTILE_OT_simulate(JobOperator):
         skin = next((each for each in there if properties.sensor_name(each) == ELECTRODES_OF), None)
         if skin is None:
             return
+        skin.tactile.recording = ""  # an earlier one's
         path = kept_files.folder(kept_files.SIMULATIONS) / f"{bpy.path.clean_name(thing.name)}.h5"
         with atomic.new_file(path) as partial:
             shutil.copyfile(self._folder.path / "recording.h5", partial)

@@ -157,7 +157,8 @@ def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Seq
     """
     for thing in context.view_layer.objects:
         thing.select_set(thing in things)
-    context.view_layer.objects.active = things[0]
+    if things[0].name in context.view_layer.objects:  # no object of an excluded collection is
+        context.view_layer.objects.active = things[0]
     for area, _ in _main_regions(context, "VIEW_3D"):
         if area.spaces.active.shading.color_type != "VERTEX":
             area.spaces.active.shading.color_type = "OBJECT"

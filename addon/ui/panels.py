@@ -115,7 +115,7 @@ def numbers_of(skin: bpy.types.Object) -> list[str]:
 def _text(column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "BLANK1") -> None:
     """Draw a text in lines that fit the panel; icon : Blender's name of the one beside the first line"""
     scale = context.preferences.system.ui_scale
-    for line in textwrap.wrap(text, max(16, int((context.region.width / scale - 60) / 6.2))):
+    for line in textwrap.wrap(text, max(16, int((context.region.width / scale - 82) / 6.2))):
         column.label(text=line, icon=icon)
         icon = "BLANK1"
 

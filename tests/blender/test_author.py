@@ -431,13 +431,19 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_
     bpy.ops.tactile.translate()
 
 
-def test_a_biotac_alone_is_simulated_without_a_digit(scene, part):
+def test_a_biotac_alone_is_simulated_without_a_digit(scene, part, tmp_path, capfd):
+    """Beside its .blend no folder can be made for the recording, which is then not kept, nor an earlier one's."""
+    (tmp_path / "tactile_simulations").touch()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "press.blend"))
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
+    bpy.context.object.tactile.recording = "//earlier.h5"
     assert _outputs(scene, part) == ["electrodes", "displacement_biotac"]
     _press(scene)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     scene.frame_set(3)
-    assert np.linalg.norm(scene.objects["BioTac skin"]["force"]) == pytest.approx(0.1, rel=0.05)
+    skin = scene.objects["BioTac skin"]
+    assert np.linalg.norm(skin["force"]) == pytest.approx(0.1, rel=0.05)
+    assert "recording to translate is not kept" in capfd.readouterr().out and not skin.tactile.recording
 
 
 def test_an_indenter_of_a_biotac_alone_presses_a_gel_that_comes_later(scene):

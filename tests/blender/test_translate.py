@@ -140,6 +140,12 @@ def test_translating_again_replaces_the_gel(gel):
     assert sum(thing.tactile.role == "DIGIT" for thing in bpy.context.scene.objects) == 1
 
 
+def test_sensors_of_an_excluded_collection_are_translated(gel, capfd):
+    bpy.context.view_layer.layer_collection.children["press_roll_slide"].exclude = True
+    assert bpy.ops.tactile.translate() == {"FINISHED"}
+    assert "DIGIT gel: hidden in view layer" in capfd.readouterr().out
+
+
 @pytest.mark.parametrize("name", ["DIGIT gel", "BioTac skin"])
 def test_a_sensor_in_edit_mode_is_refused_and_keeps_its_keys(gel, name):
     """Its keys could not be removed: new ones stood beside them, and another tare ended in a traceback."""
