@@ -47,10 +47,10 @@ LARGEST_OFFSET = 30.0  # counts; a larger one is a wrong match, not a tare error
 
 @dataclass(frozen=True)
 class Adapted:
-    """Fitted sensor with warnings for the user.
-    fitted : (19,) bool, the electrodes that have a gain
-    uncertainty : expected relative error of a gain, rms over electrodes, apart from a factor common to all; NaN where
-        no electrode has a gain"""
+    """Sensor file's entries for a fitted unit, with warnings for the user.
+    fitted : (19,) bool, true for electrodes whose gain was fitted
+    uncertainty : expected relative error of a gain, rms over electrodes, apart from a factor common to all; NaN if no
+        electrode has a gain"""
 
     sensor: ElectrodeGains
     fitted: np.ndarray
@@ -62,11 +62,12 @@ def adapt(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     rest: UnitRest | None = None,
 ) -> Adapted:  # fmt: skip
-    """Fit one sensor from all of its recordings (paths) together, by simulated contacts' typical signals.
+    """Fit rest, gains and offsets of one sensor from all of its recordings (paths) together.
 
-    rest : the unit's rest; None estimates it from all recordings. It is used where a recording is never calm near it
-    Raises TactileError: a recording that cannot be read or is scaled, signed and rectified ones mixed, too few frames
-    in contact, an estimated rest that looks like a contact. options : of preparation"""
+    typical : signals of simulated contacts, to which its own are matched; options : of preparation
+    rest : the unit's rest; None estimates it from all recordings. It serves recordings that are never calm near it
+    Raises TactileError for a recording that is unreadable or scaled, signed and rectified ones together, too few frames
+    in contact, and an estimated rest that looks like a contact."""
     parts, kinds, restless = [], set(), []
     recordings = [read(path, None if options is None else options.columns) for path in paths]
     rest = _rest(recordings, options) if rest is None else rest
@@ -96,10 +97,11 @@ def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
-    """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings.
-    typical : of simulated contacts; options : of preparation. Without a typical rest, rest and film alone are found
-    untouched : path of a recording without contact, where there is one unit; None finds rest in all recordings
-    Raises TactileError like `adapt`, and for a mixture of hands and single fingers."""
+    """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings. Only
+    rest and film are found for a sensor without a typical rest. typical : of simulated contacts; options : of
+    preparation
+    untouched : path of a recording without contact, if there is one unit; None finds rest in all recordings
+    Raises TactileError like `adapt`, and for a mixture of sensors, or of hands and single fingers."""
     columns = None if options is None else options.columns
     every = [one for path in paths for one in each_finger(path, columns)]
     found = {sensor_of(one, columns) for one in every}
@@ -121,7 +123,8 @@ def adapt_hand(
 
 
 def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | None) -> UnitRest:
-    """Read a unit's rest from a recording untouched. TactileError for several units, or without a typical rest."""
+    """Read a unit's rest from a recording untouched. Raises TactileError for several units, another sensor, or one
+    without a typical rest."""
     if units > 1:
         raise TactileError("--rest", f"given for {units} units", "one", "Adapt to each finger by itself: FILE#0")
     if typical_rest(sensor) is None:
@@ -135,7 +138,7 @@ def _given_rest(untouched: str, units: int, sensor: str, columns: ColumnMap | No
 
 
 def _units(every: Sequence[str]) -> dict[str, list[str]]:
-    """Group every recording's path by its unit's section. TactileError for hands and single fingers together."""
+    """Group recordings' paths by their unit's name. Raises TactileError for hands and single fingers together."""
     units: dict[str, list[str]] = {}
     for one in every:
         chosen = split(one)
@@ -157,8 +160,8 @@ def _rest_of_files(files: list[str], sensor: str) -> ElectrodeGains:
 
 
 def _rest(recordings: Sequence[Recording], options: PrepareOptions | None) -> UnitRest | None:
-    """Find the unit's rest. None if the recordings are too few or not raw, or if what is found looks like a contact and
-    one of them has a quiet part; raises TactileError if none has."""
+    """Find the unit's rest; None if the recordings are too few or not raw. If the rest found looks like a contact, it
+    is None as well if a recording has a quiet part, else TactileError is raised."""
     try:
         found = find_rest(recordings)
     except TactileError:
@@ -186,7 +189,8 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
 
 
 def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
-    """Return a unit of which only the rest is known, from a recording (path) of it untouched. Raises as `read_rest`."""
+    """Return a unit of which only the rest is known, from a recording (path) of it untouched. Raises TactileError if it
+    is not raw or an electrode moves more than drift does."""
     name = os.path.basename(path)
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 
@@ -208,8 +212,8 @@ def _rest_alone(rest: UnitRest, note: str) -> ElectrodeGains:
 def _fitted(
     parts: list[np.ndarray], rectified: bool, typical: ReferenceSignals, note: str, bare: ElectrodeGains | None
 ) -> Adapted:
-    """Fit gains and offsets to the recordings' parts (n, 19) counts, frames in contact, and add the unit's rest `bare`
-    (None: not known); the rest alone where there is too little contact to fit gains."""
+    """Fit gains and offsets to recordings' parts (n, 19) counts, frames in contact, and add the unit's rest ``bare``
+    (None: not known); if there is too little contact to fit gains, return the rest alone."""
     change = np.concatenate(parts)
     if bare is None:
         return fit(change, rectified, typical, note)
@@ -222,14 +226,14 @@ def _fitted(
 
 
 def _contacts(signals: Signals) -> np.ndarray:
-    """Return (n, 19) counts of the frames in contact, absolute where the recording is rectified."""
+    """Return the changes (n, 19) counts in frames in contact, absolute for a rectified recording."""
     change = np.abs(signals.typical) if signals.kind == "rectified" else signals.typical
     return change[reference_signals.touching(change) & ~signals.quiet]
 
 
 def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: str) -> Adapted:
-    """Fit gains and offsets to change (n, 19) counts, the frames in contact of all recordings, by simulated contacts'
-    typical signals. rectified : true if change has lost its signs; note : how it was fitted, kept in the result
+    """Fit gains and offsets by matching change (n, 19) counts, the frames in contact of all recordings, to typical
+    signals. rectified : true if change has lost its signs; note : how it was fitted, kept in the result
     Raises TactileError for fewer than FEWEST_FRAMES frames, and for fewer than FEWEST_CONTACTS different contacts."""
     frames = len(change)
     if frames < FEWEST_FRAMES:
@@ -256,8 +260,8 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
 
 
 def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Replace gains that the frames do not show, or that are out of range, by 1; return gains (19,), which (19,) bool
-    are fitted, and warnings.
+    """Set gains to 1 that the frames do not determine or that are out of range; return gains (19,), a mask (19,) bool
+    of those fitted, and warnings.
     gain : (19,) as matched; touched : (19,) bool, electrodes with enough contact; found : the whole match"""
     wild = touched & ~((gain >= LEAST) & (gain <= MOST))
     warnings = []
@@ -277,7 +281,8 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
 
 
 def _uncertainty(gain: np.ndarray, contacts: int) -> float:
-    """Return the expected relative error of a fitted gain (n,), from a number of different contacts; NaN for none."""
+    """Return the expected relative error of fitted gains (n,), by the number of different contacts; NaN if n is 0. gain
+    : (n,)"""
     if not len(gain):
         return np.nan
     return float(np.log(gain).std()) * (LEAST_LEFT + LEFT / np.sqrt(contacts))

@@ -1,4 +1,4 @@
-"""Options for estimating a contact from the posterior of each frame's signals."""
+"""Options of the estimate of a contact from each frame's posterior (its probability given the electrodes' signals)."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class Answer:
     """Options of the estimate for each frame.
 
     kind : "likely", the most plausible contact, or "mean", of all plausible ones, which may resemble none of them
-    frames_apart : estimate each frame from its own signals; otherwise the contact is tracked through all frames
-    mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: the position of the BioTac on it
+    frames_apart : true estimates each frame from its own signals; false tracks the contact through all frames
+    mount_shift_mm : (x, z), shift of contacts on the DIGIT's gel: where on it the BioTac is mounted
     samples : number of contacts drawn for each frame from its posterior
-    contacts : 1, or 2 to look for a second in each frame. Use it only where there may be two: on a real unit a single
-        wide contact is often taken for two"""
+    contacts : 1, or 2 to look for a second in each frame. Use 2 only if there may be two: on a real unit a single wide
+        contact is often taken for two"""
 
     kind: Estimate = LIKELY
     frames_apart: bool = False
@@ -62,7 +62,7 @@ class Answer:
         return 1e-3 * np.array(self.mount_shift_mm)
 
     def describe_shift(self) -> tuple[str, ...]:
-        """Describe a mount's shift in sentences for the user; none without a shift."""
+        """Describe the mount's shift in sentences for the user; return none without a shift."""
         if not any(self.mount_shift_mm):
             return ()
         x, z = self.mount_shift_mm
@@ -72,7 +72,7 @@ class Answer:
 def parse_answer(
     kind: Estimate, frames_apart: bool, mount_shift: str | None, samples: int, contacts: int = 1
 ) -> Answer:  # fmt: skip
-    """Return the options of a command line, as in `Answer`; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
+    """Return the `Answer` that a command line's options give; mount_shift : ``"X,Z"`` mm, or None for no shift. Raises
     TactileError for a shift or a number of samples out of range."""
     if not 0 <= samples <= MOST_SAMPLES:
         raise TactileError("--samples", str(samples), f"0 to {MOST_SAMPLES}")

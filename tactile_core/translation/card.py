@@ -4,8 +4,8 @@ A bound is a factor on the expected error that covers the largest error of 95 of
 conformal prediction in groups with the ratio of the errors as score (Lei et al. 2018, section 5.2; Vovk 2012). The
 groups are regions along the finger: one factor for all gave bounds that were too wide over the electrodes and too
 narrow beyond them. Results without contact are a group whose score is the error itself: nearly all are right to a
-micrometre, so a ratio to the expected error says nothing about the few that missed a light touch.
-where : the card's file, for errors"""
+micrometre, so a ratio to the expected error says nothing about the few that missed a light touch. Parameters called
+``where`` or ``path`` name the card's file in errors."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small
 
 
 def tensor_shapes(net: str, sizes: dict[str, int], electrodes: int = ELECTRODES) -> dict[str, tuple[int, ...]]:
-    """Return name -> shape of network `net`'s tensors, by the sizes in its card; electrodes : how many are read."""
+    """Return the shapes, by name, of network `net`'s tensors; sizes : of its card entry; electrodes : how many are
+    read"""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
         shapes = plain_shapes("encoder", (electrodes + 1, *hidden, 2 * latent))
@@ -64,7 +65,7 @@ SIZE_NAMES = {net: _OWN.get(net, _MAP) for net in (*NETS, PARTS)}
 
 
 def card_entry(card: dict, net: str, path: Path) -> dict:
-    """Return the card's entry for the network `net`: its sha256 and sizes. Raises TactileError, which names path."""
+    """Return the card's entry for the network `net`: sha256 and sizes. Raises TactileError if it is incomplete."""
     nets = card.get("nets")
     entry: Any = nets.get(net) if isinstance(nets, dict) else None
     sizes: Any = entry.get("sizes") if isinstance(entry, dict) else None
@@ -81,8 +82,8 @@ def card_entry(card: dict, net: str, path: Path) -> dict:
 
 
 def check_chain(sizes: dict[str, dict[str, int]], path: Path, electrodes: int = ELECTRODES) -> None:
-    """Raise TactileError unless networks fit together: a latent's size is the same in all networks that share it.
-    sizes : network -> name -> number, of the card; electrodes : how many are read"""
+    """Raise TactileError if networks do not fit together: networks that share a latent must agree on its size.
+    sizes : of the card, by network and name; electrodes : how many are read"""
     links = [
         ("S2MPN", "inputs", sizes["SVB"]["latent"]),
         ("S2MPN", "outputs", sizes["MVB"]["latent"]),
@@ -117,13 +118,14 @@ WORSE = 0.8  # error over that of zero displacement, above which weights hardly 
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
-    """Return the sensor that is read and the gel that is translated to. Raises as ``descriptor.pair_of`` does."""
+    """Return the sensor that is read and the gel that is translated to. Raises TactileError for a card of no such
+    pair."""
     return descriptor.pair_of(card, where, "networks", "") or PAIR
 
 
 def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Return the rms error of the translated gel on held-out presses, and that of no displacement (the baseline), um;
-    None for a card without that row."""
+    """Return the rms error, um, of the translated gel on held-out presses, and that of predicting no displacement
+    (baseline); None for a card without that row."""
     rows = card.get("errors")
     for row in rows if isinstance(rows, list) else []:
         if isinstance(row, dict) and (row.get("name"), row.get("set")) == (ROW, SET):
@@ -134,7 +136,8 @@ def chain_error(card: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def doubt(card: Mapping[str, Any]) -> str:
-    """Return a sentence on weights that are worse than none or hardly better, or the card's own (``DOUBT``), or ""."""
+    """Return the card's own doubt (``DOUBT``), else a sentence if the weights are worse or hardly better than none, or
+    ""."""
     if isinstance(card.get(DOUBT), str):
         return card[DOUBT]
     found = chain_error(card)
@@ -148,7 +151,8 @@ def doubt(card: Mapping[str, Any]) -> str:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return what 99 % of frames of noise stay below, by a card's silence; quantity : biotac_m, digit_m or force_N"""
+    """Return what 99 % of translated frames of noise stay below, by a card's silence; quantity : biotac_m, digit_m,
+    force_N"""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 
 
@@ -160,14 +164,14 @@ KINDS = ("signed", "rectified")
 
 
 def region(x: np.ndarray) -> np.ndarray:
-    """Return the region (T,) int of each contact: 0 where x is NaN (no contact), else 1 (tip) to REGIONS - 1 (base).
-    x : (T,) m, place along the finger"""
+    """Return the region (T,) int along the finger of each contact: 0 without contact, else 1 (tip) to REGIONS - 1
+    (base). x : (T,) m, place along the finger, NaN without contact"""
     return np.where(np.isnan(x), 0, 1 + np.searchsorted(EDGES, x, side="right"))
 
 
 def fit_bounds(error: np.ndarray, expected: np.ndarray, x: np.ndarray) -> list[float]:
-    """Fit the bounds of all REGIONS, four digits each: a length in m (without contact), then factors on the expected
-    error. Each covers LEVEL of the contacts in its region.
+    """Fit the bounds of all REGIONS, four digits each: first a length in m, for results without contact, then factors
+    on the expected error. Each covers LEVEL of the contacts in its region.
     error, expected : (C,) m, the largest node error and its estimate; x : (C,) m, place along the finger"""
     ratio, where = error / expected, region(x)
     scores = [error, *[ratio] * (REGIONS - 1)]
@@ -180,14 +184,14 @@ def _quantile(score: np.ndarray) -> float:
 
 
 def error_bound(expected: np.ndarray, x: np.ndarray, numbers: list[float]) -> np.ndarray:
-    """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the region's
-    number (without contact the number itself, m). expected : (T,) m; x : (T,) m or NaN; numbers : of `fit_bounds`"""
+    """Return the bound (T,) float32 m that 95 of 100 largest errors stay below: expected error times the number of the
+    region (without contact the number itself, m). expected : (T,) m; x : (T,) m or NaN; numbers : of `fit_bounds`"""
     where = region(x)
     return np.where(where == 0, numbers[0], np.asarray(numbers)[where] * expected).astype(np.float32)
 
 
 def check_tables(card: dict[str, Any], where: str) -> None:
-    """Raise TactileError unless a card has bounds, and rising quantiles, one per level, for confidence and silence."""
+    """Raise TactileError unless a card has bounds, and rising quantiles, one per level, of distance and silence."""
     _check_table(card.get("silence"), ("biotac_m", "digit_m", "force_N"), f"{where}, silence")
     distance: Any = card.get("distance") if isinstance(card.get("distance"), dict) else {}
     for kind in KINDS:
@@ -225,7 +229,7 @@ def check_pair(card: dict[str, Any], source: str | None, target: str | None, whe
 
 
 def check_bounds(card: Mapping[str, object], where: str) -> None:
-    """Raise TactileError unless the card has REGIONS positive numbers per surface for signed and rectified signals."""
+    """Raise TactileError unless the card has REGIONS positive error bounds for each surface and kind of signals."""
     bounds = card.get("error_bounds")
     for kind in KINDS:
         for name in SURFACES:

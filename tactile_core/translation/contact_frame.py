@@ -27,7 +27,7 @@ class ContactFrame:
 
     rows, columns : of the lattice; nodes behind them (poles) lie in no window
     half : cells from the window's middle to its edge
-    turn : (n,) rad, rotation of each node's frame about x against the shared one
+    turn : (n,) rad, angle about x from the shared frame to each node's own
     sensor : whose surface it is
     """
 
@@ -47,7 +47,7 @@ class ContactFrame:
         return np.cos(self.turn).astype(np.float32), np.sin(self.turn).astype(np.float32)
 
     def to_local(self, displacement: np.ndarray) -> np.ndarray:
-        """Rotate displacement (T, n, 3) m from the shared frame to each node's: along, inward, around."""
+        """Rotate displacement (T, n, 3) m from the shared frame to each node's own axes: along, inward, around."""
         cosine, sine = self._cosine_sine
         local = np.array(displacement, np.float32)
         local[..., 1] = cosine * displacement[..., 1] - sine * displacement[..., 2]
@@ -64,9 +64,9 @@ class ContactFrame:
         return local
 
     def place(self, displacement: np.ndarray) -> np.ndarray:
-        """Locate the dent of displacement (T, n, 3) m, in any frame: (T, 2) float32, row and column from the middle in
-        PLACE_UNIT cells; 0 where no node moves by STILL.
-        It is the mean of the nodes that move more than `CORE` of the largest displacement, weighted with theirs."""
+        """Return the place (T, 2) float32 of the dent in displacement (T, n, 3) m, in any frame: row and column from
+        the lattice's middle in PLACE_UNIT cells; 0 if no node moves by STILL.
+        It is the mean of the nodes that move more than `CORE` of the largest displacement, weighted by theirs."""
         grid = displacement[:, : self.rows * self.columns].astype(np.float32)
         moved = np.sqrt(np.square(grid).sum(-1))
         peak = moved.max(-1, keepdims=True)
@@ -79,8 +79,8 @@ class ContactFrame:
         return np.where(total[:, None] > 0, place, 0).astype(np.float32)
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Round places (T, 2) of `place`, NaN as the middle, to the lattice's cells (T, 2) int; also return what is
-        left (T, 2), in cells, at most 1 either way."""
+        """Round places (T, 2), in PLACE_UNIT cells from the middle, to cells of the lattice (T, 2) int; also return the
+        remainders (T, 2), in cells, from -1 to 1. NaN counts as the middle."""
         at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
         cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
         left = np.minimum(np.maximum(at - cell, -1), 1)  # a place off the lattice counts as its edge
@@ -97,7 +97,8 @@ class ContactFrame:
         return np.outer(along, along).astype(np.float32)
 
     def windows(self, local: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Cut windows (T, width, width, 3) from the field `local` (T, n, 3) around cells (T, 2); 0 beyond it."""
+        """Cut windows (T, width, width, 3) from the field `local` (T, n, 3) around cells (T, 2); beyond it they are
+        0."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)
         out = np.zeros((len(local), self.width, self.width, 3), local.dtype)
         for frame, cell in enumerate(cells):
@@ -106,7 +107,7 @@ class ContactFrame:
         return out
 
     def add(self, local: np.ndarray, windows: np.ndarray, cells: np.ndarray) -> np.ndarray:
-        """Add windows (T, width, width, 3) to the field `local` (T, n, 3) around cells (T, 2), in place; return it."""
+        """Add windows (T, width, width, 3) around cells (T, 2) to a field, local (T, n, 3), in place; return it."""
         grid = local[:, : self.rows * self.columns].reshape(len(local), self.rows, self.columns, 3)  # a view
         for frame, cell in enumerate(cells):
             on_grid, in_window = self._overlap(cell)
@@ -114,7 +115,8 @@ class ContactFrame:
         return local
 
     def _overlap(self, cell: np.ndarray) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """Return the part of the lattice that the window around a cell (2,) covers, and that of the window."""
+        """Return the part of the lattice that the window around a cell (2,) covers, and where that part is in the
+        window."""
         on_grid, in_window = [], []
         for middle, size in zip(cell.tolist(), (self.rows, self.columns), strict=True):
             first, last = max(middle - self.half, 0), min(middle + self.half + 1, size)
@@ -124,8 +126,8 @@ class ContactFrame:
 
 
 def frame_of(sensor: str, half: int) -> ContactFrame:
-    """Return the moving frame of a sensor's surface, its window ``half`` cells to each side. A skin's nodes are rotated
-    by their angle about its axis."""
+    """Return the moving frame of a sensor's surface, its window ``half`` cells to each side. The nodes' own axes on a
+    skin turn with their angle about its axis; a gel's are the shared ones."""
     lattice = sensors.sensor_surface(sensor)
     turn = np.zeros(len(lattice.rest), np.float32)
     if not sensors.is_gel(sensor):
@@ -135,8 +137,8 @@ def frame_of(sensor: str, half: int) -> ContactFrame:
 
 
 def between_nodes(grid: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Interpolate grid (rows, columns, k), values at a lattice's nodes, bilinearly; returns (F, k).
-    place : (F, 2), row and column from the lattice's middle in PLACE_UNIT cells, clipped to the lattice"""
+    """Interpolate grid (rows, columns, k), values at a lattice's nodes, bilinearly; return (F, k).
+    place : (F, 2), row and column from the lattice's middle in PLACE_UNIT cells; places outside count as the edge"""
     size = np.array(grid.shape[:2])
     at = np.clip(place * PLACE_UNIT + (size - 1) / 2, 0, size - 1)
     cell = np.minimum(at.astype(int), size - 2)

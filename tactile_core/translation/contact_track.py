@@ -41,12 +41,12 @@ BLOCK, MARGIN = 256, 64  # frames smoothed at once, and read in addition on eith
 
 @dataclass(frozen=True)
 class Evidence(Posterior):
-    """Posterior of each frame alone, and what its signals show besides.
+    """Posterior of each frame by its own signals, and what else they show. In T frames of e electrodes:
 
-    size : (T,) counts, root mean square of the changes; rectified : (T,) bool
-    latent : (T, K) of the signals; unsigned : (T,) bool, frames whose lost signs were not recovered
-    second : (T, e) counts, changes by the weaker of two contacts, NaN where there is one; (T, 0) where none is looked
-        for. All other fields then describe the stronger contact"""
+    size : (T,) counts, root mean square of the changes; rectified : (T,) bool, frames recorded without signs
+    latent : (T, K) of the signals; unsigned : (T,) bool, rectified frames whose signs were not recovered
+    second : (T, e) counts, changes by the weaker of two contacts, NaN if there is one; (T, 0) if none is looked for.
+        All other fields then describe the stronger contact"""
 
     size: np.ndarray
     rectified: np.ndarray
@@ -60,7 +60,7 @@ class Evidence(Posterior):
 
     @classmethod
     def joined(cls, parts: Sequence[Evidence]) -> Evidence:
-        """Join the evidence of frames that follow each other."""
+        """Join the parts, evidence of successive frames, to one."""
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
@@ -69,7 +69,7 @@ Read = Callable[[int, int], tuple[np.ndarray, Evidence]]
 
 class _Course(NamedTuple):
     """Places on a path through the frames' components.
-    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true where the path starts again"""
+    mean, variance : (T, PLACE); touched : (T,), true in contact; free : (T,), true if the path starts anew there"""
 
     mean: np.ndarray
     variance: np.ndarray
@@ -78,8 +78,8 @@ class _Course(NamedTuple):
 
 
 def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
-    """Estimate states (T, STATE) float32, as of `Posterior`, from all frames' posteriors, the evidence: place smoothed
-    forward and back, force by its smoothed ratio to the signals' size, depth as each frame has it. time : (T,) s"""
+    """Estimate the states (T, STATE) float32 of `Posterior` from all frames' evidence together: place smoothed forward
+    and back, force by its smoothed ratio to the signals' size, depth from each frame alone. time : (T,) s"""
     if len(time) == 0:
         return np.zeros(evidence.mean.shape[::2], np.float32)
     elapsed = _elapsed(time)
@@ -96,26 +96,27 @@ def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
 
 
 def needed(frames: np.ndarray, count: int) -> np.ndarray:
-    """Return the frames (n,), of `count` in all, whose posteriors are needed for the states of rising frames (T,)."""
+    """Return the frames (n,), of `count` in all, whose evidence the states of rising ``frames`` (T,) depend on."""
     blocks = np.unique(frames // BLOCK)
     return np.unique(np.concatenate([np.arange(*_span(int(block), count)) for block in blocks]))
 
 
 def _span(block: int, count: int) -> tuple[int, int]:
-    """Return the first frame of a block (its number) with its margins, and the one past its last, of `count` frames."""
+    """Return the first frame of a block (its number) with margins, and the one past its last; count : frames in all"""
     return max(block * BLOCK - MARGIN, 0), min((block + 1) * BLOCK + MARGIN, count)
 
 
 class Tracker:
-    """Function from frames of a whole recording to evidence and states, by ``track``: on demand, block by block."""
+    """Computes evidence and tracked states of frames of a whole recording by ``track``: on demand, block by block."""
 
     def __init__(self, read: Read, count: int) -> None:
-        """Take read(start, stop), which gives times and evidence of these frames; count : frames in all."""
+        """Take read(start, stop), which returns times and evidence of these frames; count : frames in all."""
         self._read, self._count = read, count
         self._kept: tuple[int, Evidence, np.ndarray] | None = None
 
     def __call__(self, frames: np.ndarray) -> tuple[Evidence, np.ndarray]:
-        """Return evidence and states (n, STATE) of rising frames (n,); a frame's do not depend on the others asked."""
+        """Return evidence and states (n, STATE) of rising frames (n,); they do not depend on which others are asked
+        for."""
         blocks, parts, states = frames // BLOCK, [], []
         for block in np.unique(blocks):
             evidence, state = self._block(int(block))
@@ -134,7 +135,7 @@ class Tracker:
 
 
 class ForwardTracker:
-    """Contact in a recording that grows: ``track`` from past frames alone. Call it once per frame, in order."""
+    """Tracks a contact in a growing recording by ``track`` from past frames alone. Call it once per frame, in order."""
 
     def __init__(self) -> None:
         self._time, self._score, self._frame = -np.inf, np.zeros(0), _Frame(*(np.zeros(0),) * 3)  # of the frame before
@@ -142,7 +143,7 @@ class ForwardTracker:
         self._ratio: tuple[np.ndarray, np.ndarray] | None = None  # its mean and variance; None without contact
 
     def __call__(self, evidence: Evidence, time: float) -> np.ndarray:
-        """Take the next frame's posterior, at ``time`` s, and return the contact's state (1, STATE) float32 there."""
+        """Return the contact's state (1, STATE) float32 in the next frame, from its evidence; time : s, of the frame"""
         now, elapsed = _components(evidence), _elapsed(np.array([time]), self._time)
         best, free, score = now.weight[0].argmax(), True, now.weight[0]
         step = _step(elapsed, evidence.rectified)
@@ -176,17 +177,17 @@ def _states(evidence: Evidence, place: np.ndarray, touched: np.ndarray) -> np.nd
 
 
 def _log_ratio(force: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return log(force / signal size) (T,); force : (T,) on the asinh scale of a state; size : (T,) counts"""
+    """Return log(force / signal size) (T,); force : (T,) as in a state, asinh(force / 0.1 N); size : (T,) counts"""
     return np.log(np.sinh(np.clip(force, LEAST_TOUCH, COMPRESSED_LIMIT)) / np.maximum(size, LEAST_SIZE))
 
 
 def _force_of(log_ratio: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return forces (T,) on their asinh scale from log_ratio (T,) and size (T,) counts: the inverse of `_log_ratio`."""
+    """Return forces (T,) as in a state from log_ratio (T,) and size (T,) counts: the inverse of `_log_ratio`."""
     return np.arcsinh(np.exp(log_ratio) * np.maximum(size, LEAST_SIZE))
 
 
 class _Frame(NamedTuple):
-    """Components of frames: weight (..., C), a logarithm; mean, spread (..., C, STATE), as of `Posterior`."""
+    """Components of frames' posteriors: weight (..., C), as a logarithm; mean, spread (..., C, STATE)."""
 
     weight: np.ndarray
     mean: np.ndarray
@@ -199,27 +200,27 @@ def _components(posterior: Posterior) -> _Frame:
 
 
 def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarray:
-    """Return the variance (..., STATE) by which a state changes within seconds (...,).
+    """Return the variance (..., STATE) of a state's change within seconds (...,).
     rectified : (...,) bool, frames whose signals have lost their signs; their place moves by less"""
     shorter = np.where(np.asarray(rectified)[..., None] & (np.arange(STATE) < PLACE), RECTIFIED_STEP, 1.0)
     return np.square(shorter * STEP) * np.asarray(seconds)[..., None] / FRAME
 
 
 def _ratio_step(seconds: np.ndarray) -> np.ndarray:
-    """Return the variance (T,) by which `_log_ratio` changes within seconds (T,)."""
+    """Return the variance (T,) of the change of `_log_ratio` within seconds (T,)."""
     return RATIO_STEP**2 * seconds / FRAME
 
 
 def _elapsed(time: np.ndarray, before: float = -np.inf) -> np.ndarray:
-    """Return the seconds (T,) since the frame before, from time (T,) s; infinite at the first frame unless it follows
-    one at `before` s, after gaps and where a clock runs backwards."""
+    """Return the seconds (T,) since the previous frame; infinite after gaps, where the clock runs backwards and, unless
+    a frame at `before` s precedes it, at the first frame. time : (T,) s"""
     seconds = np.diff(time, prepend=before)
     return np.where((seconds >= 0) & (seconds < GAP), seconds, np.inf)
 
 
 def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the log probability (..., C, C) of each component's step to each of the next frame, and whether it is
-    free.
+    """Return the log probability (..., C, C) of the step from each component to each of the next frame, and a mask,
+    true if the step is free: without contact, or as a jump.
     before, now : components of frames and of those that follow them; step : (..., STATE), variances of `_step`
 
     It is minus half the squared distance in standard deviations, without a density's normalisation: errors of
@@ -237,8 +238,8 @@ def _moves(before: _Frame, now: _Frame, step: np.ndarray) -> tuple[np.ndarray, n
 
 
 def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Continue the best paths (Viterbi) through further frames: return the last scores (C,), and for each frame and
-    component (T, C) its best predecessor.
+    """Continue the best paths (Viterbi) through T further frames; return the paths' scores (C,) at the last, and the
+    best predecessor (T, C) of each component in each frame.
     score : (C,) of the paths so far; moves : (T, C, C) log probability of each step; weight : (T, C) log weights"""
     came = np.empty(weight.shape, int)
     for frame, move in enumerate(moves):
@@ -249,7 +250,7 @@ def _scored(score: np.ndarray, moves: np.ndarray, weight: np.ndarray) -> tuple[n
 
 
 def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
-    """Find the best path through the components of frames; steps : (T, STATE), variances of `_step` before each"""
+    """Return the best path through the components of frames; steps : (T, STATE), variances of `_step` before each"""
     before, now = (_Frame(*(each[part] for each in frames)) for part in (slice(None, -1), slice(1, None)))
     moves, free = _moves(before, now, steps[1:])
     score, came = _scored(frames.weight[0], moves, now.weight)
@@ -266,8 +267,9 @@ def _best_course(frames: _Frame, steps: np.ndarray) -> _Course:
 def _filtered(
     value: np.ndarray, noise: np.ndarray, steps: np.ndarray, mean: np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Filter a random walk forward (Kalman 1960): means, variances, and variances before each measurement (T, k).
-    value, noise, steps : (T, k) measurements, their variances, and the walk's variance before each
+    """Filter a random walk forward (Kalman 1960); return (T, k) means, variances, and variances before each
+    measurement.
+    value, noise, steps : (T, k) measurements, their variances, and the variance of the step before each
     mean, variance : (k,) of the walk before the first"""
     means, variances, expected = (np.empty_like(value) for _ in range(3))
     for frame, step in enumerate(steps):
@@ -281,7 +283,7 @@ def _filtered(
 
 def _smoothed(value: np.ndarray, noise: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return the means (T, k) of a random walk given all measurements (Rauch, Tung and Striebel 1965).
-    value, noise, steps : (T, k) measurements, their variances, and the walk's variance before each"""
+    value, noise, steps : (T, k) measurements, their variances, and the variance of the step before each"""
     mean, variance, expected = _filtered(value, noise, steps, value[0], np.zeros(value.shape[1]))
     for frame in range(len(steps) - 2, -1, -1):
         back = variance[frame] / expected[frame + 1]

@@ -1,5 +1,5 @@
-"""Find how stiff a unit is from a measured force: one scale of force and pressure, judged on frames not fitted.
-Signals cannot show it: a stiffer skin has the same ones for the same dent, at a larger force and pressure."""
+"""Find how stiff a unit's skin is from a measured force: one scale of force and pressure, judged on frames not fitted.
+Signals cannot show it: a stiffer skin gives the same signals for the same dent, at a larger force and pressure."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PARTS = 8  # of the frames; the scatter of their scales gives the scale's error
 class ForceScale:
     """Scale of the translated force that fits the first half of the frames best, judged on the other half.
     scale : measured over translated force; error : relative error of it, from the scatter of eighths of the frames
-    lag : s, of the force behind the electrodes; correlation : of the two, on the first half
+    lag : s, by which the force comes later than the electrodes; correlation : of the two forces, on the first half
     without, scaled, constant : N, mean absolute error on the second half: of the translated force, of the scaled one,
         and of the first half's median"""
 
@@ -67,10 +67,10 @@ class ForceScale:
 def with_stiffness(
     unit: ElectrodeGains, named: str, paths: Sequence[str], translator: Translator, options: PrepareOptions
 ) -> tuple[ElectrodeGains, str]:
-    """Return a unit with the stiffness that a measured force shows, if that improves the force; and a text on the fit.
-    Gains and offsets that do not improve the scaled force are dropped as well.
-    paths : the unit's recordings; named : file of the force beside the first, or columns of all their own files
-    Raises TactileError for what `force_file.read_force` refuses, too few frames, and a scale that no unit has."""
+    """Return the unit with the stiffness that a measured force shows, if that improves the force; and a text on the
+    fit. Gains and offsets that do not improve the scaled force are dropped as well.
+    paths : the unit's recordings; named : file of the force for the first of them, or columns that all have
+    Raises TactileError for a force that cannot be read, too few frames in contact, and a scale that no unit has."""
     beside = paths[:1] if os.path.exists(named) else paths
     recordings = [read(path, options.columns, translator.source) for path in beside]
     forces = [read_force(named, recording) for recording in recordings]
@@ -99,8 +99,8 @@ def with_stiffness(
 
 
 def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: str) -> ForceScale:
-    """Fit the scale of translated forces (n,) N, in order of time, to measured(lag), the measured ones (n,) N if they
-    come `lag` s late, NaN where unknown. where : the force's file or columns, for errors"""
+    """Fit the scale of translated forces (n,) N, in order of time, to measured ones. where : of the force, for errors
+    measured : function from a lag, s, to the forces (n,) N measured so much later, NaN if unknown"""
     half = len(translated) // 2
     correlations = {lag: _correlation(translated[:half], measured(lag)[:half]) for lag in map(float, LAGS)}
     lag = max(correlations, key=lambda one: (correlations[one], -abs(one)))
@@ -142,8 +142,8 @@ def _translated(
 
 
 def _scale(translated: np.ndarray, force: np.ndarray) -> float:
-    """Return the scale of least mean absolute error of translated (n,) N to force (n,) N: the median of the ratios,
-    weighted by the translated force."""
+    """Return the scale with which translated (n,) N has the least mean absolute error from force (n,) N: the median of
+    the ratios, weighted by the translated force."""
     order = np.argsort(force / translated)
     reached = np.cumsum(translated[order])
     return float((force / translated)[order][np.searchsorted(reached, reached[-1] / 2)])

@@ -1,4 +1,4 @@
-"""Find where on a gel a contact lies: its patch and place, to shift contacts. frame : the gel's moving window"""
+"""Find where on a gel a contact lies, its centre and patch, and shift contacts. frame : the gel's `ContactFrame`"""
 
 from __future__ import annotations
 
@@ -32,12 +32,13 @@ _MARGIN = 20  # cells of zero padding round the lattice, as the Fourier transfor
 
 
 def on_gel(frame: ContactFrame, place: np.ndarray) -> np.ndarray:
-    """Return positions (T, 2) = (x, z) m on the resting gel; place : (T, 2) row, column from middle, tens of cells"""
+    """Return positions (T, 2) = (x, z) m on the resting gel; place : (T, 2) row, column from middle, in tens of
+    cells"""
     return between_nodes(_grid(frame.sensor, frame.rows, frame.columns), place)
 
 
 def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) -> np.ndarray:
-    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN where no node moves by ``silent`` m.
+    """Return the centre (T, 2) = (x, z) float32 m of a gel's dent; NaN if no node moves by ``silent`` m.
     displacement : (T, n, 3) m of the gel's nodes; rest : (n, 3) m, their positions at rest"""
     center = accuracy.dent_center(displacement, rest).astype(np.float32)
     center[accuracy.lengths(displacement).max(axis=1) < silent] = np.nan
@@ -45,7 +46,8 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from state (T, STATE)."""
+    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from those of state (T,
+    STATE)."""
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
     far = accuracy.lengths(points - on_gel(frame, place)[:, None]) > APART
@@ -53,8 +55,8 @@ def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> n
 
 
 def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
-    """Return the places (T, 2), as `on_gel` takes them, of point (T, 2) = (x, z) m, its inverse; points
-    beside the gel get its rim's places."""
+    """Return the places (T, 2), row and column from the middle in tens of cells, of points on the gel: `on_gel`'s
+    inverse. point : (T, 2) = (x, z) m; points beside the gel get its rim's places"""
     grid = _grid(frame.sensor, frame.rows, frame.columns)
     size = np.array(grid.shape[:2])
     apart = np.square(grid.reshape(-1, 2)[None] - point[:, None]).sum(axis=-1).argmin(axis=1)
@@ -71,16 +73,16 @@ def place_on(frame: ContactFrame, point: np.ndarray) -> np.ndarray:
 
 
 def beyond_picture(center: np.ndarray, camera: Camera) -> np.ndarray:
-    """Return the flags (T,) uint16, `Flag.BEYOND_PICTURE` or 0, of contacts that a camera does not see.
+    """Return flags (T,) uint16: `Flag.BEYOND_PICTURE` for contacts that the camera does not see, else 0.
     center : (T, 2) = (x, z) m on the gel, NaN without contact"""
     beside = np.isfinite(center[:, 0]) & ~camera.sees(*center.T)
     return np.where(beside, Flag.BEYOND_PICTURE, 0).astype(np.uint16)
 
 
 def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
-    """Mark (T, n) bool the nodes in contact of a surface that is one lattice; displacement : (T, n, 3) m of its nodes
+    """Mark (T, n) bool the nodes that touch, of a surface that is one lattice; displacement : (T, n, 3) m of its nodes
 
-    A surface takes the indenter's curvature in contact and the opposite one beside it: the patch is where the smoothed
+    In contact a surface takes the indenter's curvature, beside it the opposite one: the patch is where the smoothed
     Laplacian of the depth is negative. (Pressure on a half-space is |k| times the depth, k the wave number; the
     Laplacian takes k^2 instead, which measured better: thin gels damp long waves.) A frame dented less than ``FLOOR``
     has no patch."""
@@ -101,13 +103,13 @@ def contact_patch(displacement: np.ndarray, surface: Lattice) -> np.ndarray:
 
 
 def _fast_length(least: int) -> int:
-    """Return the next length >= least with prime factors 2, 3 and 5 alone, for which FFTs are fast."""
+    """Return the smallest length >= least that has no prime factor but 2, 3 and 5, for which FFTs are fast."""
     return next(length for length in range(least, 2 * least + 1) if pow(30, length, length) == 0)
 
 
 class Shift:
-    """Function that shifts displacements along a gel, as of a BioTac mounted elsewhere on it, whose gel is assumed
-    equally thick there."""
+    """Shifts displacements along a gel, as if the BioTac were mounted elsewhere on it; the gel is assumed equally thick
+    there."""
 
     def __init__(self, frame: ContactFrame, shift: np.ndarray) -> None:
         """Take the shift (2,) = (x, z) m of contacts."""
@@ -119,7 +121,7 @@ class Shift:
         self._share = np.maximum(1 - beside / FADE, 0)[:, None].astype(np.float32)
 
     def __call__(self, displacement: np.ndarray) -> np.ndarray:
-        """Shift displacement (T, n, 3) m of the gel's nodes; it fades out where the gel ended."""
+        """Return displacement (T, n, 3) m of the gel's nodes, shifted; what came over its rim fades out."""
         rows, columns, count = self._frame.rows, self._frame.columns, len(displacement)
         grid = np.moveaxis(displacement, 0, 1).reshape(rows, columns, count * 3)
         found = between_nodes(grid, self._place) * self._share

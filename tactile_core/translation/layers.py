@@ -1,4 +1,4 @@
-"""The scale that networks see signals on, and their building blocks in numpy, float32: names and sums as torch has."""
+"""The scale on which networks read signals, and their building blocks in numpy, float32: names and sums are torch's."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ NORM_EPSILON = 1e-5  # torch.nn.LayerNorm's default
 class SignalDistance:
     """Distances of signals from the training signals; the card holds quantiles of each.
 
-    mahalanobis : (T,) float32, distance of the signal latent to the training latents in their standard deviations
-    residual : (T,) float32, rms over electrodes of the signal autoencoder's (SVB's) error over that in validation
+    mahalanobis : (T,) float32, Mahalanobis distance of the signal's latent from the training latents
+    residual : (T,) float32, rms over electrodes of the signal autoencoder's (SVB's) error over its rms in validation
     largest : (T,) float32, counts, largest absolute change of an electrode"""
 
     mahalanobis: np.ndarray
@@ -47,20 +47,20 @@ def expand(compressed: np.ndarray) -> np.ndarray:
 
 
 def linear(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """Map x (T, inputs) to (T, outputs); the named tensors are weight (outputs, inputs), as in torch, and bias."""
+    """Map x (T, inputs) to (T, outputs) by tensors `name`.weight (outputs, inputs), as in torch, and `name`.bias."""
     return x @ tensors[f"{name}.weight"].T + tensors[f"{name}.bias"]
 
 
 def layer_norm(x: np.ndarray, tensors: Tensors, name: str) -> np.ndarray:
-    """Normalise x (..., width) over the last axis (Ba et al. 2016), biased variance as in torch; tensors : by name,
-    `name`.weight and `name`.bias (width,)."""
+    """Normalise x (..., width) over its last axis (Ba et al. 2016), with torch's biased variance; tensors : hold
+    `name`.weight and `name`.bias (width,)"""
     centred = x - _mean(x)
     spread = np.sqrt(_mean(np.square(centred)) + np.float32(NORM_EPSILON))
     return centred / spread * tensors[f"{name}.weight"] + tensors[f"{name}.bias"]
 
 
 def _mean(x: np.ndarray) -> np.ndarray:
-    """Average x over its last axis, which is kept; `np.mean`'s checks cost more than the sum for a single frame."""
+    """Average x over its last axis, which is kept; for a single frame `np.mean`'s checks cost more than the sum."""
     return np.add.reduce(x, axis=-1, keepdims=True) / np.float32(x.shape[-1])
 
 
@@ -70,15 +70,15 @@ def silu(x: np.ndarray) -> np.ndarray:
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
-    """Apply linear layers with ReLU between them: x (T, inputs) to (T, outputs); tensors : named by `plain_shapes`"""
+    """Apply linear layers with ReLU between them to x (T, inputs); return (T, outputs). tensors : of `plain_shapes`"""
     for layer in range(layers):
         x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
     return x
 
 
 def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndarray:
-    """Apply a residual MLP of ``blocks`` and a linear skip, x (T, inputs) to (T, outputs); docs/sources.md, Networks.
-    tensors : by the names of `residual_shapes`"""
+    """Apply a residual MLP (docs/sources.md, Networks) of ``blocks`` and a linear skip to x (T, inputs); return (T,
+    outputs). tensors : by `residual_shapes`' names"""
     hidden = linear(x, tensors, f"{name}.first")
     for block in range(blocks):
         inner = layer_norm(hidden, tensors, f"{name}.blocks.{block}.norm")
@@ -89,7 +89,8 @@ def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndar
 
 
 def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    """Return the shapes of `plain`'s tensors, name -> shape; name : before each; sizes : of inputs, then each layer"""
+    """Return `plain`'s tensors' shapes by name, which begins with ``name``; sizes : of inputs, then each layer's
+    outputs"""
     shapes: dict[str, tuple[int, ...]] = {}
     for layer, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
         shapes |= {f"{name}.{layer}.weight": (outputs, inputs), f"{name}.{layer}.bias": (outputs,)}
@@ -97,7 +98,8 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Return name -> shape of `residual`'s tensors: inputs, `blocks` blocks of a width, outputs; name : before each"""
+    """Return `residual`'s tensors' shapes by name, which begins with ``name``; inputs, outputs, width : of its
+    vectors"""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),
@@ -112,8 +114,8 @@ def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: in
 
 
 def in_blocks(function: Pass, x: np.ndarray, shape: tuple[int, ...], name: str) -> np.ndarray:
-    """Apply a function to frames x (T, *shape) in padded blocks, unpadded where T is 1; raises TactileError, which
-    names the network by `name`, if x has another shape."""
+    """Apply a function to frames x (T, *shape) in blocks padded to equal length; a single frame is not padded. Raises
+    TactileError, which calls the network `name`, if x has another shape."""
     x = np.asarray(x, np.float32)
     if x.shape[1:] != shape:
         expected = "(T, " + ", ".join(map(str, shape)) + ")"

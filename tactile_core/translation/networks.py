@@ -1,10 +1,10 @@
-"""The five networks and the force estimate in numpy, for machines without torch (Blender included).
+"""The networks of a translation in numpy, for machines without torch (Blender included).
 
 Every network of `training/modules.py` has its forward pass here, with the same tensor names; float32 throughout.
   SVB  signal autoencoder       MVB  BioTac mesh autoencoder       MVD  DIGIT mesh autoencoder
   S2MPN  signal latent -> posterior over contacts (`Posterior`); with one of these -> BioTac latent
   M2MPN  BioTac latent -> DIGIT latent
-  R2MPN  as S2MPN, for rectified signals: training for unknown units, which it needs, would make S2MPN worse
+  R2MPN  S2MPN for rectified signals: training for unknown units, which these need, would make S2MPN worse
   D2BPN  DIGIT latent -> BioTac latent        B2SPN  BioTac latent -> signal latent
   force  head on the BioTac latent            pressure, error  heads on the signal
   parts  signal -> the signals of two contacts at once; weights may lack it
@@ -43,13 +43,14 @@ SHIPPED_CARD_SHA256 = "9fa2615fd2ff73ac79a38a53f32e45e1d1af0587d25167aeea3b684e2
 class Networks:
     """The trained networks. Arrays are float32, T first; displacements in m, forces in N, changes in counts.
 
-    tensors : network -> tensor name -> array
+    tensors : arrays by network, then by tensor's name
     card : the model card: sizes, hashes, quantiles, bounds, errors; source, target : the sensors that it names
-    electrodes : number of the source's electrodes; shapes below say 19, as of a BioTac
+    electrodes : number of the source's electrodes; shapes below say 19, the BioTac's
     sha256 : hash of the card, which identifies these weights
 
     K, L, L' are the sizes of the latents of signal, source and target; N, M the nodes of source and target; a state is
-    that of `Posterior`. change is against rest; rectified (T,) or one for all, true where it has lost its signs"""
+    `Posterior`'s. In all methods change is counts less those at rest, and rectified, one bool for all frames or (T,),
+    is true if change has lost its signs."""
 
     def __init__(self, tensors: dict[str, Tensors], card: dict, sha256: str = "") -> None:
         self.card, self.sha256 = card, sha256
@@ -67,8 +68,8 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode change (T, 19) counts, below 0 where a film thins or, where rectified (T,) or one is true, without
-        signs, to latent_signal (T, K), the mean that SVB infers."""
+        """Encode change (T, 19) counts, below 0 where a film thins unless rectified (T,) or one, as latent_signal (T,
+        K), the mean that SVB infers."""
         return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
@@ -90,7 +91,8 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), state of contacts (T, STATE), rectified (T,) or one, to latent_source (T, L)."""
+        """Map latent_signal (T, K), rectified (T,) or one, and the state (T, STATE) of contacts to latent_source (T,
+        L)."""
         return self._either("code", np.concatenate([latent_signal, state], -1), rectified)
 
     def m2m(self, latent_source: np.ndarray) -> np.ndarray:
@@ -100,7 +102,7 @@ class Networks:
     def latents(
         self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), state (T, STATE), rectified (T,) or one, to latent_source and latent_target."""
+        """Map latent_signal (T, K), rectified (T,) or one, and state (T, STATE) to latent_source and latent_target."""
         latent_source = self.given(latent_signal, state, rectified)
         return latent_source, self.to_target(state, latent_source)
 
@@ -111,7 +113,7 @@ class Networks:
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
-        """Map state (T, STATE) and latent_source (T, L) to latent_target (T, L') placed where the state says."""
+        """Map latent_source (T, L) to latent_target (T, L'), its place replaced by that of state (T, STATE)."""
         latent = self.m2m(latent_source)
         latent[:, :PLACE] = state[:, :PLACE]
         return latent
@@ -156,13 +158,13 @@ class Networks:
         return estimate * (size / np.where(length > 0, length, 1))[:, None]
 
     def pressure(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return the rise (T,) Pa of the fluid's pressure, from change (T, 19) counts, rectified (T,) or one for all.
-        For rectified frames it is proportional to the sum of changes: their pattern misleads where gains are unknown,
-        as a real finger distributes its changes otherwise than a simulated one."""
+        """Return the rise (T,) Pa of the fluid's pressure from change (T, 19) counts, rectified (T,) or one for all.
+        For rectified frames it is proportional to the sum of changes: their pattern misleads if gains are unknown, as a
+        real finger distributes its changes otherwise than a simulated one."""
         return in_blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
-        """Return each frame's distances from the training signals, of change (T, 19) counts, rectified (T,) or one."""
+        """Return each frame's `SignalDistance` from the training, by change (T, 19) counts, rectified (T,) or one."""
         distances = in_blocks(self._distance, *self._signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 
@@ -201,8 +203,8 @@ class Networks:
         return np.where(signal[:, -1:] > 0, rectified, signed)
 
     def _either(self, part: str, seen: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Apply a part of S2MPN, or of R2MPN to rectified frames, to its inputs `seen` (T, inputs).
-        part : "posterior" or "code"; rectified : (T,) or one, true where the signs are lost"""
+        """Apply one part of S2MPN, or for rectified frames of R2MPN, to its inputs `seen` (T, inputs).
+        part : "posterior" or "code"; rectified : (T,) or one, true if the signs are lost"""
         which = np.broadcast_to(np.asarray(rectified, bool), len(seen))
         if which.all() and len(which):
             return self._map("R2MPN", seen, part)
@@ -217,15 +219,15 @@ class Networks:
         return in_blocks(lambda z: residual(z, tensors, part, blocks), latent, (size,), net)
 
     def _map_placed(self, net: str, vae: str, latent: np.ndarray) -> np.ndarray:
-        """Map latent (T, L), joined by the remainder of its place after rounding to cells, by the network `net`.
+        """Map latent (T, L) by the network `net`, which also reads what is left of the place after rounding to cells.
         vae : the autoencoder of that latent, "MVB" (BioTac) or "MVD" (DIGIT)"""
         tensors, blocks = self.tensors[net], self.sizes[net]["blocks"]
         size = self.sizes[vae]["latent"]
         return in_blocks(lambda z: residual(self._placed(vae, z)[0], tensors, "map", blocks), latent, (size,), net)
 
     def _placed(self, net: str, latent: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append to latent (B, L) the remainder of its place after rounding to cells; return (B, L + 2), cells
-        (B, 2)."""
+        """Append to latent (B, L) what is left of its place after rounding to cells; return (B, L + 2) and the cells
+        (B, 2). net : the latent's autoencoder"""
         cells, left = self.frames[net].cells(latent[:, :PLACE])
         return np.concatenate([latent, left], -1), cells
 
@@ -261,8 +263,8 @@ class Networks:
         return in_blocks(decode, latent, (sizes["latent"],), f"{net} decoder")
 
     def _signal(self, change: np.ndarray, rectified: np.ndarray | bool) -> tuple[np.ndarray, tuple[int]]:
-        """Build SVB's input (T, 20) of change (T, 19) counts and the mark rectified (T,) or one; and the shape of one
-        frame of it. A change of another shape is returned as it is: `in_blocks` reports it."""
+        """Return SVB's input (T, 20), change (T, 19) counts with rectified (T,) or one as last column, and the shape of
+        its frame. A change of another shape is returned as it is: `in_blocks` reports it."""
         change = np.asarray(change, np.float32)
         if change.shape[1:] != (self.electrodes,):
             return change, (self.electrodes,)
@@ -273,14 +275,14 @@ class Networks:
 
 
 def shipped_folder(source: str | None = None) -> Path:
-    """Return the folder of the weights that ship for a sensor's recordings; the BioTac's for None, or one without."""
+    """Return the folder of weights that ship for a sensor's recordings: the BioTac's for None, or if it has none."""
     own = WEIGHTS_FOLDER / (source or SOURCE)
     return own if (own / CARD_NAME).is_file() else WEIGHTS_FOLDER
 
 
 def load(folder: str | os.PathLike | None = None, source: str | None = None) -> Networks:
-    """Read and verify a weights folder; None: the weights that ship for recordings of ``source``.
-    Raises TactileError naming the file (found and expected sha256) or the tensor (found and expected shape)."""
+    """Read and verify a weights folder; None for the weights that ship for recordings of ``source``. Raises
+    TactileError that names the file (found and expected sha256) or the tensor (found and expected shape)."""
     shipped, folder = folder is None, Path(folder or shipped_folder(source))
     card, digest = read_card(folder)
     if shipped and folder == WEIGHTS_FOLDER and digest != SHIPPED_CARD_SHA256:

@@ -20,10 +20,10 @@ SEED = 0  # of contacts that are drawn: the same recording, the same contacts
 class Posterior:
     """Posterior of a contact's state given the signals: a mixture of C Gaussians in each of T frames.
 
-    A state (STATE,) is the gel's dent's place (row, column from the middle, tens of cells), asinh(force / 0.1 N) and
-    asinh(its depth / 20 um); all zero without contact. The place is that on the gel, which is flat: at the
+    A state (STATE,) is the place of the gel's dent (row and column from the middle, in tens of cells), asinh(force /
+    0.1 N) and asinh(depth / 20 um); all zero without contact. The place is that on the gel, which is flat: at the
     BioTac's tip, where most real contacts lie, the skin's lattice has a pole, and a place on it says little.
-    weight : (T, C), sum 1 over C; mean, spread : (T, C, STATE)"""
+    weight : (T, C), sum 1 over C; mean, spread : (T, C, STATE), spread being the standard deviation"""
 
     weight: np.ndarray
     mean: np.ndarray
@@ -33,8 +33,8 @@ class Posterior:
     def likely(self) -> np.ndarray:
         """State (T, STATE) float32 of the most plausible contact, not the average of all.
 
-        Mean shift (Cheng 1995) from the place of the heaviest component, over the components near it: several often
-        describe one contact, and together they are more certain than each alone."""
+        It is found by mean shift (Cheng 1995) from the place of the heaviest component, over the components near it:
+        several often describe one contact, and together they are more certain than each alone."""
         state = self.mean[np.arange(len(self.mean)), self.weight.argmax(-1)]
         touched = touches(state)
         for _ in range(MEAN_SHIFTS):
@@ -60,7 +60,8 @@ class Posterior:
         return (self.weight[..., None] * self.mean).sum(1)
 
     def drawn(self, frames: np.ndarray, count: int) -> np.ndarray:
-        """Draw ``count`` states of each row, (T, count, STATE). frames : (T,) int, the rows' frame numbers, as seeds"""
+        """Draw ``count`` states of each frame, (T, count, STATE). frames : (T,) int, numbers in the recording, as
+        seeds"""
         found = np.empty((len(frames), count, self.mean.shape[-1]), np.float32)
         for row, frame in enumerate(frames):
             random = np.random.default_rng([SEED, int(frame)])
@@ -72,5 +73,5 @@ class Posterior:
 
 
 def touches(state: np.ndarray) -> np.ndarray:
-    """Mark (...,) bool the contacts in state (..., STATE): their force is at least half the lightest in training."""
+    """Mark (...,) bool the contacts in state (..., STATE): force at least half that of the lightest in training."""
     return state[..., PLACE] >= LEAST_TOUCH

@@ -1,5 +1,5 @@
-"""A few hundred simulated signals that represent the training's contacts, for `tactile adapt` to match. They ship with
-the weights as ``signals.safetensors``, whose hash is in the card under "signals"."""
+"""A few hundred typical signals of the training's simulated contacts, for `tactile adapt` to match. They ship with the
+weights as ``signals.safetensors``, whose hash is in the card under "signals"."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ TRIES = 2_000  # readings made up to find the match's own bias
 class ReferenceSignals:
     """Typical signals of simulated contacts, and the bias of matching readings to them.
     typical : (P, 19) counts, signed
-    bias_signed, bias_rectified : (19,), log gains that matching finds for simulated readings themselves, signed or
-        rectified: a typical signal is a mean of signals and therefore smaller than they are"""
+    bias_signed, bias_rectified : (19,), log gains that matching finds even for the simulated contacts' own readings,
+        signed or rectified: a typical signal is a mean of signals and therefore smaller than they are"""
 
     typical: np.ndarray
     bias_signed: np.ndarray
     bias_rectified: np.ndarray
 
     def bias(self, rectified: bool) -> np.ndarray:
-        """Return the log gain (19,) to subtract from a match of rectified, or of signed, readings."""
+        """Return the log gain (19,) to subtract from a match: of rectified readings if true, else of signed ones."""
         return self.bias_rectified if rectified else self.bias_signed
 
 
@@ -49,8 +49,8 @@ def touching(change: np.ndarray) -> np.ndarray:
 
 
 def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
-    """Compute typical signals of simulated contacts, by k-means in the networks' scale. TactileError for too few.
-    signal : (C, 19) counts, their changes without noise; seed : of the random choices"""
+    """Return typical signals of simulated contacts, by k-means in the networks' scale. Raises TactileError for too few.
+    signal : (C, 19) counts, the contacts' changes without noise; seed : of the random choices"""
     random = np.random.default_rng(seed)
     signal = np.asarray(signal, np.float64)
     signal = signal[touching(signal)]
@@ -67,7 +67,7 @@ def make(signal: np.ndarray, seed: int = 0) -> ReferenceSignals:
 
 
 def _k_means(points: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return centres (p, 19) of points (n, 19) by Lloyd's k-means; p is COUNT, or half the points if that is fewer."""
+    """Return centres (p, 19) of points (n, 19) by Lloyd's k-means; p is COUNT, or n / 2 if that is less."""
     count = min(COUNT, len(points) // 2)
     centres = points[random.choice(len(points), count, replace=False)]
     for _ in range(TURNS):
@@ -92,7 +92,7 @@ def write(folder: str | os.PathLike, signals: ReferenceSignals) -> dict:
 
 
 def read(folder: str | os.PathLike) -> ReferenceSignals:
-    """Read the typical signals of a weights folder. Raises TactileError: a card without them, or a file that is
+    """Read the typical signals of a weights folder. Raises TactileError for a card without them, or a file that is
     missing, changed or of another shape."""
     card, _ = weights.read_card(folder)
     entry: Any = card.get("signals")

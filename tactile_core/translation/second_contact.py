@@ -20,9 +20,9 @@ PARTED = 0.25  # unit of half the difference of both parts, over the signal's le
 
 
 class SecondContact(NamedTuple):
-    """Second contacts in n of T frames, of e electrodes. rows : (n,) int, which frames
-    skin, gel : (n, N, 3), (n, M, 3) m, displacements; predicted : (n, e) counts, the electrodes' changes under them
-    center : (T, 2) = (x, z) m on the gel, NaN without; force : (T, 3) N, zero without"""
+    """Second contacts, found in n of T frames of e electrodes. rows : (n,) int, indices of these frames
+    skin, gel : (n, N, 3), (n, M, 3) m, displacements; predicted : (n, e) counts, the electrodes' changes by them
+    center : (T, 2) = (x, z) m on the gel, NaN without one; force : (T, 3) N, zero without one"""
 
     rows: np.ndarray
     skin: np.ndarray
@@ -33,8 +33,8 @@ class SecondContact(NamedTuple):
 
 
 def told_apart(nets: Networks, change: np.ndarray, unsigned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split change (T, e) counts into the stronger contact's part and the weaker's: all and NaN where one is alone.
-    unsigned : (T,) bool, frames whose signs are lost; they are not separated"""
+    """Split change (T, e) counts into the stronger contact's part and the weaker's, both (T, e); in frames of a single
+    contact they are the whole change and NaN. unsigned : (T,) bool, frames whose signs are lost, which are not split"""
     tensors, blocks = nets.tensors[PARTS], nets.sizes[PARTS]["blocks"]
     change = np.asarray(change, np.float32)
     seen = np.concatenate([compress(change), compress(np.float32(FINE) * change)], -1)
@@ -51,10 +51,10 @@ def second_contact(
     nets: Networks, change: np.ndarray, silent: np.ndarray, mounted: Callable[[np.ndarray], np.ndarray], least: float,
     stiffness: float,
 ) -> SecondContact:  # fmt: skip
-    """Translate the weaker of two contacts from its change (T, e) counts, NaN where there is none, each frame alone.
+    """Translate the weaker of two contacts, each frame alone. change : (T, e) counts, by it; NaN if there is none
     silent : (T,) bool, frames without a first contact, which get no second
     mounted : function that moves gels (n, M, 3) m by the mount's shift
-    least : m, smallest displacement of the deepest node that counts as contact; stiffness : of the skin, 1 typical"""
+    least : m, displacement of the deepest node from which it counts as contact; stiffness : of the skin, 1 typical"""
     center, force = np.full((len(change), 2), np.nan, np.float32), np.zeros((len(change), 3), np.float32)
     rows = np.flatnonzero(np.isfinite(change).all(axis=1) & ~silent & (change.shape[1] > 0))
     if not len(rows):

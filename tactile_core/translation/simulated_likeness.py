@@ -55,7 +55,7 @@ FIRST = 64  # patterns most like the signal, of which one must be among the two:
 @dataclass(frozen=True)
 class Patterns:
     """Simulated contacts, P of them, of e electrodes.
-    signals : (P, e) float64 counts; units : (P, e), scaled to length one; alike : (P, P), their cosines
+    signals : (P, e) float64 counts; units : (P, e), signals scaled to length one; alike : (P, P), cosines between them
     drift : (e,), of length one, the change when the fluid's conductivity changes"""
 
     signals: np.ndarray
@@ -65,7 +65,7 @@ class Patterns:
 
 
 def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
-    """Return the patterns of simulated contacts with signals (P, e) counts, of a unit with rest (e,) counts."""
+    """Return the `Patterns` of simulated contacts with signals (P, e) counts, of a unit with rest (e,) counts."""
     units = signals / np.linalg.norm(signals, axis=1, keepdims=True)
     drift = divider.of_films(DRIFT, rest) - rest
     return Patterns(signals, units, units @ units.T, drift / np.linalg.norm(drift))
@@ -73,13 +73,14 @@ def patterns_of(signals: np.ndarray, rest: np.ndarray) -> Patterns:
 
 @functools.cache
 def shipped_patterns(sensor: str = SOURCE) -> Patterns:
-    """Return the patterns of the simulated contacts that ship with a sensor's descriptor."""
+    """Return the `Patterns` of the simulated contacts that ship with a sensor's descriptor."""
     return patterns_of(contact_signals(sensor), places_of(sensor).rest_counts)
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
-    """Return the shares (T, 3) of change (T, 19) counts that the best pattern, the best two, and drift do not explain.
-    change : of a typical unit; patterns : of the sensor, None for a BioTac's
+    """Return the shares (T, 3) of each change's length that the best pattern, the best two, and drift leave
+    unexplained.
+    change : (T, 19) counts, of a typical unit; patterns : of the sensor, None for a BioTac's
     rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN"""
     patterns = patterns or shipped_patterns()
     found = np.full((len(change), 3), np.nan)
@@ -92,13 +93,13 @@ def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Pattern
 
 
 def two_contacts(shares: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames that two contacts explain and one does not; shares : (T, 3), of one, two, drift"""
+    """Mark (T,) bool the frames that two contacts explain and one does not; shares : (T, 3), of `residual_shares`"""
     one, two, _ = shares.T
     return (two < LEFT_BY_TWO) & (one - two > MORE_BY_ONE)
 
 
 def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool frames like no simulated contact, or more like drift; shares : (T, 3), of one, two, drift
+    """Mark (T,) bool frames like no simulated contact, or more like drift; shares : (T, 3), of `residual_shares`
     change : (T, 19) counts; in faint changes a larger share is allowed, for noise"""
     one, _, by_drift = shares.T
     square = np.maximum(np.square(change, dtype=np.float64).sum(axis=1), FAINT**2)
@@ -106,14 +107,14 @@ def unlike(shares: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 
 def contradicted(pressure: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Mark (T,) bool the frames whose estimated pressure (T,) Pa disagrees with that measured (T,) Pa (NaN: none)."""
+    """Mark (T,) bool frames whose estimated pressure (T,) Pa is far from that measured (T,) Pa (NaN: not measured)."""
     measured = np.maximum(measured, 0)
     return (pressure > MOST_OVER * measured + FELT) | (measured > MOST_BELOW * pressure + PRESSED)
 
 
 def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lengths (T,) of what the best pattern leaves of unit signals (T, 19), and of what the best two leave.
-    Two are fitted only where one leaves more than ``MORE_BY_ONE``; elsewhere both lengths are equal."""
+    """Return lengths (T,) of what the best pattern leaves of each of signals (T, 19), of length 1, and of what the best
+    two leave. Two are fitted only if one leaves more than ``MORE_BY_ONE``; else both lengths are equal."""
     alike, near = patterns.alike, signals @ patterns.units.T
     one = np.sqrt(np.maximum(1 - np.square(near.max(axis=1, initial=0)), 0))
     two = one.copy()
@@ -131,7 +132,8 @@ def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarra
 def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Restore the signs of change (T, 19) counts where they are certain; also return the frames (T,) still rectified.
+    """Give change (T, 19) counts its signs back if they are certain; return it and the mask (T,) of frames still
+    rectified.
     rectified : (T,) bool, frames that have lost their signs; patterns : of the sensor, None for a BioTac's"""
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)

@@ -1,4 +1,4 @@
-"""One pass over a recording: prepare its signals, track the contact, decode every frame."""
+"""Translate a recording in one pass: prepare its signals, track the contact, decode every frame."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Read = Callable[[np.ndarray], tuple[np.ndarray, Signals]]  # times (n,) s and si
 class Decoded(NamedTuple):
     """Frames of a recording after the networks.
     frames : (T,) int, their indices in the recording; time : (T,) s; signals : what the networks were given
-    evidence : what they say of each frame alone; translation : the result
+    evidence : posterior of each frame by its own signals; translation : the result
     state : (T, STATE), the contact's state as tracked through time; None if each frame is estimated alone"""
 
     frames: np.ndarray
@@ -45,10 +45,10 @@ class Decoded(NamedTuple):
 
 
 class RecordingPass:
-    """Function from frames of a recording to their `Decoded`; a frame's result does not depend on the others."""
+    """Translates frames of a recording to `Decoded`; a frame's result does not depend on which others are asked for."""
 
     def __init__(self, translator: Translator, read: Read, count: int) -> None:
-        """Take read(frames), which gives their times and signals; count : frames of the whole recording."""
+        """Take read(frames), a function that returns their times and signals; count : frames of the whole recording."""
         self._translator, self._read = translator, read
         self._tracker = Tracker(self._evidence, count) if translator.answer.follows else None
 
@@ -57,7 +57,7 @@ class RecordingPass:
         return time, self._translator.encode(signals)
 
     def __call__(self, frames: np.ndarray) -> Decoded:
-        """Translate frames (T,) int, rising indices into the recording's."""
+        """Translate frames (T,) int, rising indices into the recording."""
         time, signals = self._read(frames)
         if self._tracker is None:
             evidence, state = self._translator.encode(signals), None
@@ -67,20 +67,20 @@ class RecordingPass:
 
 
 def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> RecordingPass:
-    """Return the pass over signals in memory; time : (T,) s, of their frames"""
+    """Return the `RecordingPass` over signals in memory; time : (T,) s, of their frames"""
     return RecordingPass(translator, lambda frames: (time[frames], signals.at(frames)), len(time))
 
 
 class PreparedRows:
-    """Prepared rows of a recording in memory; of a long one only those that the requested frames need.
-    recording, signals : of these rows, prepared with the whole recording; count : frames of the whole recording"""
+    """Prepared frames of a recording in memory; of a long one only those that the requested frames depend on.
+    recording, signals : of these frames; rest and the like are the whole recording's; count : frames in that"""
 
     def __init__(
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
         unit: ElectrodeGains | None = None,
     ) -> None:  # fmt: skip
-        """Prepare a recording for rising frames (T,), and for their neighbours where `answer` tracks the contact.
-        options, unit : of the preparation, see `Preparer`, whose TactileErrors it raises"""
+        """Prepare rising ``frames`` (T,) of a recording and, if `answer` tracks the contact, their neighbours.
+        options, unit : of the `Preparer`, which raises TactileError for a recording that it cannot prepare"""
         rows, self.count = needed(frames, len(recording)) if answer.follows else frames, len(recording)
         if 2 * len(rows) > self.count:  # a copy would take more than it lets go
             self._rows, self.recording = np.arange(self.count), recording
@@ -90,7 +90,7 @@ class PreparedRows:
             self.signals = Preparer(options, unit)(recording, rows)
 
     def at(self, frames: np.ndarray) -> np.ndarray:
-        """Return the indices (n,) among the rows of frames (n,) of the recording."""
+        """Return the indices (n,), among the frames in memory, of the recording's frames (n,)."""
         return np.searchsorted(self._rows, frames)
 
     def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
@@ -159,12 +159,12 @@ def translate(
 
 
 def translated(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Translation:
-    """Translate rising frames (T,) of a recording; rows : prepared for them"""
+    """Return the translation of rising frames (T,) of a recording; rows : the recording prepared for them"""
     return Translation.joined(list(translated_parts(translator, rows, frames)))
 
 
 def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndarray) -> Iterator[Translation]:
-    """Yield the translations of rising frames (T,) of a recording, `CHUNK` at a time; rows : prepared for them"""
+    """Yield translations of rising frames (T,) of a recording, `CHUNK` at a time; rows : it prepared for them"""
     whole = RecordingPass(translator, rows.read, rows.count)
     for start in range(0, len(frames), CHUNK):
         yield whole(frames[start : start + CHUNK]).translation
@@ -172,7 +172,7 @@ def translated_parts(translator: Translator, rows: PreparedRows, frames: np.ndar
 
 @lru_cache(maxsize=2)
 def _shared_translator(weights: str | None, source: str | None, answer: Answer) -> Translator:
-    """Load networks once in a process: 13 MB, a quarter of a second."""
+    """Load networks for `translate`, which keeps them: 13 MB, a quarter of a second."""
     return load_translator(weights, answer, None, source)
 
 
@@ -182,9 +182,8 @@ def load_translator(
 ) -> Translator:  # fmt: skip
     """Load the networks of a weights folder, the shipped ones by default, with options of the estimate.
 
-    target : the gel that they must translate to; None for whichever they do
-    source : the sensor whose recordings they must translate, by which those that ship are chosen; None for whichever
-        they do
+    target : the gel that they must translate to; None accepts any
+    source : the sensor whose recordings they must translate, None accepts any; it also selects the shipped weights
     Raises TactileError for weights that are missing, changed, of another shape, or trained for other surfaces, and for
     a target that is no sensor or not theirs.
     """

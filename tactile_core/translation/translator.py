@@ -54,12 +54,12 @@ class Translation(Summary):
     confidence : (T,), share of simulated frames like this one whose largest node error is below ``error_bound_digit``;
         lower far from the training, and at most `UNTRAINED_CONFIDENCE` where a flag doubts the frame
     expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one
-    error_bound_biotac, error_bound_digit : (T,) m, its 95 % quantile (as of the validation presses)
+    error_bound_biotac, error_bound_digit : (T,) m, 95 % quantile of the same (measured on the validation presses)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
         and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
-    explained : (T,), 1 - sum((change - predicted)^2) / sum(change^2), predicted being the electrodes' change that
-        such a unit shows under the translated contact; at most 1, below 0 where zero is nearer, NaN without contact"""
+    explained : (T,), 1 - sum((change - predicted)^2) / sum(change^2), predicted being the electrodes' change that such
+        a unit shows under the translated contact; at most 1, below 0 where zero is nearer, NaN without contact"""
 
     latent_signal: np.ndarray
     latent_biotac: np.ndarray
@@ -81,7 +81,7 @@ class Translation(Summary):
 
     @classmethod
     def joined(cls, parts: Sequence[Translation]) -> Translation:
-        """Join translations of frames that follow each other."""
+        """Join the parts, translations of successive frames, to one."""
         names = [field.name for field in dataclasses.fields(cls)]
         return cls(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
 
@@ -91,10 +91,11 @@ def _rectified(signals: Signals) -> np.ndarray:
 
 
 class Translator:
-    """Verified networks that encode signals, decode contacts; card : model card; sha256 : its hash; answer : options"""
+    """Networks, verified, that encode signals and decode contacts; card, sha256 : model card, its hash; answer :
+    options"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
-        """Store networks and options; patterns : simulated contacts of the source, None for a BioTac's, which ship."""
+        """Store networks and options. patterns : simulated contacts of the source; None for a BioTac's, which ship."""
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
         self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()
@@ -106,7 +107,7 @@ class Translator:
         self._unrolled = surface.unrolled_nodes(self.source)
 
     def encode(self, signals: Signals) -> Evidence:
-        """Return each frame's own posterior, and what tracking and decoding need. TactileError for another sensor."""
+        """Return each frame's own posterior and what else decoding needs. Raises TactileError for another sensor."""
         change, unsigned = self.changes(signals)
         whole, second = self._typical(signals), np.zeros((len(change), 0), np.float32)
         if self.answer.contacts > 1:
@@ -118,9 +119,9 @@ class Translator:
         return Evidence(**vars(self.nets.posterior(latent, unsigned)), size=size, **beside)
 
     def plausible(self, evidence: Evidence, frames: np.ndarray, stiffness: float = 1.0) -> dict[str, np.ndarray]:
-        """Draw S = ``answer.samples`` contacts on the gel for each frame from its posterior; return two arrays by name.
-        frames : (T,) int, indices into the recording, which are the seeds; stiffness : of the skin, 1 typical
-        sample_center : (T, S, 2) = (x, z) m, NaN without contact; sample_force : (T, S) N"""
+        """Draw S = ``answer.samples`` contacts on the gel for each frame from its posterior. Return "sample_center" (T,
+        S, 2) = (x, z) m, NaN without contact, and "sample_force" (T, S) N.
+        frames : (T,) int, indices into the recording, which are the seeds; stiffness : of the skin, 1 typical"""
         states = evidence.drawn(frames, self.answer.samples)
         shape, flat = states.shape[:2], states.reshape(-1, STATE)
         center = gel_place.on_gel(self.nets.frames["MVD"], flat[:, :PLACE]) + self.answer.mount_shift
@@ -130,12 +131,12 @@ class Translator:
         return dict(zip(SAMPLES, (center, np.where(touched, force, 0).reshape(shape)), strict=True))
 
     def changes(self, signals: Signals) -> tuple[np.ndarray, np.ndarray]:
-        """Return the networks' input: changes (T, e) counts, signed where signs are known, and the frames (T,) that
+        """Return the networks' input: changes (T, e) counts, signed if signs are known, and a mask (T,) of frames that
         stay rectified. Raises TactileError for another sensor's signals."""
         return recovered(self._typical(signals), _rectified(signals), self._patterns)
 
     def _typical(self, signals: Signals) -> np.ndarray:
-        """Convert changes to (T, e) counts of the unit that the networks know; TactileError for another sensor."""
+        """Return changes (T, e) counts of the unit that the networks know. Raises TactileError for another sensor."""
         if signals.sensor != self.source:
             found = f"signals of a {sensors.title(signals.sensor)}"
             raise TactileError("translation", found, f"those of a {sensors.title(self.source)}, as the weights")
@@ -143,11 +144,11 @@ class Translator:
         return signals.typical if rest is None else signals.relative_to(np.array(rest))
 
     def __call__(self, signals: Signals, state: np.ndarray | None = None) -> Translation:
-        """Translate all frames of ``signals``; state : (T, STATE) tracked, None estimates each frame alone"""
+        """Translate all frames of ``signals``; state : (T, STATE), tracked; None estimates each frame alone"""
         return self.decode(signals, self.encode(signals), state)
 
     def decode(self, signals: Signals, evidence: Evidence, state: np.ndarray | None = None) -> Translation:
-        """Translate frames with their own evidence; a frame's numbers do not depend on its neighbours.
+        """Translate frames, given their evidence (of `encode`); a frame's numbers do not depend on its neighbours.
         state : (T, STATE) of contacts tracked through several frames; None estimates each frame alone, by ``answer``"""
         nets, rectified, alone = self.nets, evidence.rectified, state is None
         change = np.asarray(self._typical(signals), np.float32)
@@ -195,10 +196,10 @@ class Translator:
         return gel if self._shift is None else self._shift(gel)
 
     def reverse(self, displacement: np.ndarray) -> dict[str, np.ndarray]:
-        """Translate displacements (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
+        """Translate displacement (T, M, 3) m of the target's gel back to the source, each frame alone (D2BPN, B2SPN).
 
-        The result's displacement : (T, N, 3) m of the source's skin; force : (T, 3) N; electrodes : (T, e) counts,
-        changes against rest. All are zero where the gel moves less than noise alone makes the networks move it."""
+        Returns by name: displacement (T, N, 3) m of the source's skin; force (T, 3) N; electrodes (T, e) counts,
+        changes against rest. All are zero if the gel moves less than noise alone makes the networks move it."""
         nets = self.nets
         skin = nets.m2m_back(nets.encode_target(displacement))
         found = {
@@ -213,8 +214,8 @@ class Translator:
     def _explained(
         self, signals: Signals, change: np.ndarray, predicted: np.ndarray, rectified: np.ndarray
     ) -> np.ndarray:
-        """Return the share (T,) of change (T, e) that predicted (T, e) explains, both counts of a typical unit,
-        compared as of this unit; see `Translation`. Where rectified (T,) bool, signs are ignored."""
+        """Return `Translation.explained` (T,): change and predicted (T, e) counts of a typical unit are converted to
+        this unit's and compared, for rectified (T,) bool frames without signs."""
         at = self.card.get(REST, sensors.typical_rest(self.source))
         own, told = (signals.of_typical(each, at) for each in (change, predicted))
         own, told = (np.where(rectified[:, None], np.abs(each), each) for each in (own, told))
@@ -222,12 +223,12 @@ class Translator:
         return (1 - left / np.maximum(whole, LEAST_SQUARE)).astype(np.float32)
 
     def silent(self, quantity: str) -> float:
-        """Return what noise alone stays below, by the card; quantity : "biotac_m", "digit_m" or "force_N" of it."""
+        """Return what 99 % of frames of noise stay below, by the card; quantity : biotac_m, digit_m or force_N of it"""
         return silent_level(self.card["silence"], quantity)
 
     def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Compute expected largest errors and bounds, by `Translation`'s names, of change (T, e), rectified (T,) bool.
-        x : (T,) m, of the contact along the finger, NaN without contact"""
+        """Return expected largest errors and their bounds, by `Translation`'s names, for change (T, e), rectified (T,)
+        bool. x : (T,) m, of the contact along the finger, NaN without contact"""
         expected, found = self.nets.expected_error(change, rectified), {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
@@ -237,22 +238,21 @@ class Translator:
 
     def bound(self, expected: np.ndarray, x: np.ndarray, surface: str, kind: str = "signed") -> np.ndarray:
         """Return the bound (T,) m that 95 of 100 largest node errors stay below, by `card.error_bound`.
-        expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger, NaN without
+        expected : (T,) m, expected errors; x : (T,) m, of the contact along the finger, NaN without contact
         surface : "biotac", the source's, or "digit", the target's; kind : "signed" or "rectified" signals"""
         return error_bound(expected, x, self.card["error_bounds"][kind][surface])
 
     def out_of_range(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Mark (T,) bool frames of change (T, 19) counts of which any `SignalDistance` exceeds its share `IN_RANGE`
-        of the validation's contacts.
-        rectified : (T,) bool or one for all, true where signs are lost"""
+        """Mark (T,) bool frames in which some `SignalDistance` exceeds that of the share `IN_RANGE` of validation
+        contacts. change : (T, 19) counts; rectified : (T,) bool or one for all, true if signs are lost"""
         return np.any(self._distances(change, rectified) > self._quantile(rectified, **IN_RANGE), axis=0)
 
     def _confidence(
         self, change: np.ndarray, flags: np.ndarray, rectified: np.ndarray, explained: np.ndarray
     ) -> np.ndarray:
-        """Return the confidence (T,); see `Translation`. change : (T, e) counts; rectified : (T,) bool; explained :
-        (T,), NaN without contact. Each distance to the training's signals lowers it: by nothing up to the distance's 95
-        % quantile, to zero at the outermost."""
+        """Return `Translation.confidence` (T,). change : (T, e) counts; rectified : (T,) bool; explained : (T,), NaN
+        without contact; flags : (T,). Each distance from the training's signals lowers it: by nothing up to the
+        distance's 95 % quantile, to zero at the outermost."""
         usual, far = (self._quantile(rectified, **dict.fromkeys(DISTANCES, level)) for level in (0.95, 1.0))
         near = np.clip((far - self._distances(change, rectified)) / (far - usual), 0, 1).min(axis=0)
         doubted = ((flags & np.uint16(UNTRAINED)) > 0) | bool(doubt(self.card))
@@ -260,13 +260,13 @@ class Translator:
         return (near * np.interp(np.nan_to_num(explained, nan=1.0), EXPLAINED, WITHIN)).astype(np.float32)
 
     def _distances(self, change: np.ndarray, rectified: np.ndarray | bool) -> np.ndarray:
-        """Stack `layers.SignalDistance` to (distances, T), of change (T, e) counts, rectified (T,) or one for all."""
+        """Return `SignalDistance` stacked, (distances, T), of change (T, e) counts, rectified (T,) or one for all."""
         distance = self.nets.signal_distance(np.asarray(change, np.float32), rectified)
         return np.stack([getattr(distance, name) for name in DISTANCES])
 
     def _quantile(self, rectified: np.ndarray | bool, **level: float) -> np.ndarray:
-        """Return quantiles (distances, T), or (distances, 1) for one `rectified`, over validation frames of that kind.
-        rectified : (T,) bool or one, the frames' kind; level : of each distance by its name, 0 to 1"""
+        """Return the distances' quantiles over validation frames, (distances, T), or (distances, 1) if `rectified` is
+        one bool. rectified : (T,) bool or one, the frames' kind; level : of each distance by its name, 0 to 1"""
         table = self.card["distance"]
         limits = {
             kind: np.array([[np.interp(level[name], table["levels"], table[kind][name])] for name in DISTANCES])
@@ -275,7 +275,7 @@ class Translator:
         return np.where(rectified, limits["rectified"], limits["signed"])
 
     def _beyond_digit(self, displacement: np.ndarray) -> np.ndarray:
-        """Mark (T,) contacts of the BioTac without counterpart on the gel: the dent's centre unrolls beyond it.
+        """Mark (T,) bool the contacts on the BioTac that unroll to places beyond the gel, by the dent's centre.
         displacement : (T, N, 3) m of the skin's nodes"""
         moved = accuracy.lengths(displacement)
         peak = moved.max(axis=1, keepdims=True)

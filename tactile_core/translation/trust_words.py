@@ -1,4 +1,4 @@
-"""Words for flags: a line on how far a frame's translation can be trusted, and sentences on whole recordings."""
+"""Words for flags: a line that says how far a frame's translation can be trusted, and sentences on whole recordings."""
 
 from __future__ import annotations
 
@@ -53,23 +53,23 @@ DENIED = "PDC shows another pressure than that of the contact: drift, rest under
 
 
 def is_guess(confidence: float, flags: int, expected_error: float = 0.0, dent: float = 0.0) -> bool:
-    """Return true if a frame is a guess, by its confidence 0..1, the bits of its flags, or the error of its shape.
-    expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 where unknown"""
+    """Return true if a frame is a guess: by its confidence 0..1, the bits of its flags, or a large error of its shape.
+    expected_error, dent : m, largest expected error and displacement of a node; NaN or below 0 if unknown"""
     doubted = confidence < LOW_CONFIDENCE or any(flags & bit for bit in _DOUBTS)
     return bool(doubted or (dent > 0 and expected_error > MOST_OF_DENT * dent))
 
 
 def remarks(flags: int) -> list[str]:
-    """Return the words of a frame's flags, the gravest first."""
+    """Return what each of a frame's flags means, a few words each, the gravest first."""
     return [words for bit, words in (_DOUBTS | _REMARKS).items() if flags & bit]
 
 
 def in_words(
     confidence: float, flags: int, expected_error: float, dent: float, force: Sequence[float] | np.ndarray
 ) -> str:
-    """Return a frame's line: "guess: rectified recording, expected error 0.40 mm of 1.20", or "no contact".
-    confidence : 0..1; flags : bits; expected_error, dent : m, NaN or below 0 where unknown
-    force : (3,) N of the translation, zero without contact, where no error is stated"""
+    """Return a frame's line, such as "guess: rectified recording, expected error 0.40 mm of 1.20", or "no contact".
+    confidence : 0..1; flags : bits; expected_error, dent : m, NaN or below 0 if unknown
+    force : (3,) N of the translation, zero without contact, when no error is stated"""
     reasons = remarks(flags)
     touching = bool(np.any(force))
     guess = is_guess(confidence, flags, expected_error if touching else 0.0, dent)

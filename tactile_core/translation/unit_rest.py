@@ -1,4 +1,4 @@
-"""Estimate a unit's readings without contact from recordings that may hold no quiet part at all."""
+"""Estimate a unit's electrode readings without contact from recordings that may hold no quiet part at all."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ THICKNESSES = 1.0, 0.7, 0.5, 0.35  # of the films over a typical unit's, that ar
 
 @dataclass(frozen=True)
 class UnitRest:
-    """Rest of a unit.
+    """Readings of a unit without contact.
     counts : (19,); spread : (19,) counts, half the range of levels in the less pressed half of the recordings (or the
         middle half)
-    pdc : counts, None where the recordings have none
-    recordings : number that rest was averaged over, 0 for a recording of the rest itself
-    film : thickness, divided by a typical unit's, None where it was not looked for"""
+    pdc : counts of the fluid's pressure, None if the recordings have none
+    recordings : number that counts are averaged over, 0 for a recording of the rest itself
+    film : thickness, divided by a typical unit's, None if it was not looked for"""
 
     counts: np.ndarray
     spread: np.ndarray
@@ -47,7 +47,7 @@ class UnitRest:
 
 @dataclass(frozen=True)
 class Simulated:
-    """The changes (P, e) counts in simulated contacts of a unit that reads rest (e,) counts without contact."""
+    """Changes (P, e) counts in simulated contacts of a unit that reads rest (e,) counts without contact."""
 
     changes: np.ndarray
     rest: np.ndarray
@@ -56,11 +56,11 @@ class Simulated:
 def find_rest(recordings: Sequence[Recording]) -> UnitRest:
     """Find one unit's rest in recordings that may all be of contacts.
 
-    Each recording gives the level of its window of lowest fluid pressure; the least pressed quarter of the levels is
-    averaged. If a recording has no PDC, each electrode's median over the recordings is taken instead: that works while
-    different contacts leave different electrodes unloaded (on two real fingers, trials 01 to 03 of the PHAC set, 17 and
-    34 counts rms from the result by pressure; the least squeezed recordings by the sum of counts: 32 and 49). Raises
-    TactileError for fewer than three recordings, and for recordings that are not raw."""
+    Each recording gives the electrodes' level while its fluid pressure is lowest; the least pressed quarter of the
+    levels is averaged. If a recording has no PDC (fluid pressure), each electrode's median over the recordings is taken
+    instead: that works while different contacts leave different electrodes unloaded (on two real fingers, trials 01 to
+    03 of the PHAC set, 17 and 34 counts rms from the result by pressure; the least squeezed recordings by the sum of
+    counts: 32 and 49). Raises TactileError for fewer than three recordings, and for recordings that are not raw."""
     if len(recordings) < FEWEST:
         advice = "Give more recordings of the unit, among them softly touched ones"
         raise TactileError("rest of the unit", f"{len(recordings)} recordings", f"at least {FEWEST}", advice)
@@ -80,8 +80,8 @@ def find_rest(recordings: Sequence[Recording]) -> UnitRest:
 
 
 def read_rest(path: str, columns: ColumnMap | None = None) -> UnitRest:
-    """Read the rest of a unit from a recording of it untouched; columns : its map, or None. Raises TactileError for a
-    recording that is not raw, or in which an electrode moves more than drift does."""
+    """Read the rest of a unit from a recording of it untouched; columns : map of its columns, or None. Raises
+    TactileError for a recording that is not raw, or in which an electrode moves more than drift does."""
     recording = read(path, columns)
     readings = _raw(recording)
     spread = np.ptp(np.quantile(readings, [0.01, 0.99], axis=0), axis=0)
@@ -115,7 +115,7 @@ def find_rest_sp(recordings: Sequence[Recording], simulated: Simulated) -> UnitR
 
 
 def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: float) -> tuple[np.ndarray, float]:
-    """Move rest (e,) counts to where simulated contacts explain readings (n, e) counts best; also return the mean share
+    """Return rest (e,) counts moved to where simulated contacts explain readings (n, e) counts best, and the mean share
     of the changes' squares that they leave. film : thickness, divided by a typical unit's"""
     share = np.inf
     for _ in range(STEPS):
@@ -139,7 +139,7 @@ def _pressure(recording: Recording) -> np.ndarray | None:
 
 
 def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the level (19,) counts of the recording's window of lowest pressure, and that pressure, counts of PDC.
+    """Return the recording's level (19,) counts in its window of lowest pressure, and that pressure, counts of PDC.
     pdc : (T,) counts, the recording's fluid pressure"""
     electrodes = _raw(recording)
     n = min(window_frames(recording.rate), len(electrodes))
@@ -149,7 +149,7 @@ def _least_pressed(recording: Recording, pdc: np.ndarray) -> tuple[np.ndarray, f
 
 
 def _raw(recording: Recording) -> np.ndarray:
-    """Repaired counts (T, 19). Raises TactileError for a recording of another kind."""
+    """Return repaired counts (T, 19). Raises TactileError for a recording of another kind than raw counts."""
     electrodes = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = detect(electrodes)
     if kind != "raw":

@@ -92,7 +92,7 @@ def _split(data: bytes, where: str | os.PathLike) -> tuple[dict, bytes]:
 
 
 def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """Build a JSON object; raises ValueError for a repeated key."""
+    """Return a JSON object's pairs as a dict. Raises ValueError for a repeated key."""
     if len({key for key, _ in pairs}) != len(pairs):
         raise ValueError("a name is given twice")
     return dict(pairs)
@@ -101,7 +101,7 @@ def _unique(pairs: list[tuple[str, object]]) -> dict[str, object]:
 def _entry(
     name: str, entry: object, body: int, where: str | os.PathLike
 ) -> tuple[np.dtype, tuple[int, ...], tuple[int, int]]:
-    """Return dtype, shape and byte range of one tensor, checked against each other and against the body's size."""
+    """Return one tensor's dtype, shape and byte range. Raises TactileError if these or the body's size do not agree."""
     place = f"{os.fspath(where)}, tensor {name}"
     if not isinstance(entry, dict) or set(entry) != {"dtype", "shape", "data_offsets"}:
         raise TactileError(place, f"header entry {str(entry)[:80]}", "dtype, shape and data_offsets", ADVICE)
@@ -123,12 +123,12 @@ def _entry(
 
 
 def _counts(values: object) -> bool:
-    """Return true for a list of integers from 0 (JSON's true is not one)."""
+    """Return true for a list of whole numbers from 0 (JSON's true is not one)."""
     return isinstance(values, list) and all(type(value) is int and value >= 0 for value in values)
 
 
 def _check_spans(spans: list[tuple[int, int, str]], body: int, where: str | os.PathLike) -> None:
-    """Check that rising spans (begin, end, name) of tensors fill `body` bytes without overlap or hole."""
+    """Raise TactileError unless rising spans (begin, end, name) of tensors fill `body` bytes, no hole, no overlap."""
     position = 0
     for begin, end, name in spans:
         if begin != position:
@@ -152,8 +152,8 @@ def read_bytes(path: str | os.PathLike) -> bytes:
 def read_verified(
     path: str | os.PathLike, expected_sha256: str, shapes: dict[str, tuple[int, ...]]
 ) -> dict[str, np.ndarray]:
-    """Read arrays of a safetensors file whose hash and tensor shapes are known. Raises TactileError with what was found
-    and expected: the shapes for an intact file of others, which say more than a hash."""
+    """Read the arrays of a safetensors file. Raises TactileError for another hash or other tensor shapes than expected;
+    for an intact file of other shapes it names the shapes, which say more than the hash."""
     data = read_bytes(path)
     found = sha256(data)
     if found == expected_sha256:
@@ -170,7 +170,7 @@ def read_verified(
 def check_shapes(
     tensors: dict[str, np.ndarray], shapes: dict[str, tuple[int, ...]], where: str | os.PathLike
 ) -> dict[str, np.ndarray]:
-    """Return the tensors if their names and shapes are as expected; else TactileError naming the first that is not."""
+    """Return the tensors if names and shapes are as expected. Raises TactileError that names the first that is not."""
     for name in sorted(tensors.keys() | shapes.keys()):
         found = f"shape {tensors[name].shape}" if name in tensors else "nothing"
         expected = f"shape {tuple(shapes[name])}" if name in shapes else "no such tensor"
