@@ -79,7 +79,7 @@ class ContactFrame:
         return np.where(total[:, None] > 0, place, 0).astype(np.float32)
 
     def cells(self, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Round places (T, 2), in PLACE_UNIT cells from the middle, to cells of the lattice (T, 2) int; also return the
+        """Round place (T, 2), in PLACE_UNIT cells from the middle, to cells of the lattice (T, 2) int; also return the
         remainders (T, 2), in cells, from -1 to 1. NaN counts as the middle."""
         at = np.where(np.isfinite(place), place, 0) * np.float32(PLACE_UNIT) + self._middle
         cell = np.rint(np.minimum(np.maximum(at, 0), 2 * self._middle))
