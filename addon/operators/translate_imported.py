@@ -2,6 +2,7 @@
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...tactile_core.errors import TactileError
 from ...tactile_core.translation import gel_place
@@ -98,11 +99,14 @@ class TACTILE_OT_translate(JobOperator):
 def _gel_beside(skin: bpy.types.Object, sensor: str) -> tuple[bpy.types.Object, bool]:
     """Return the gel of the kind ``sensor`` beside a skin, and true if it was missing and has been added.
 
-    An old gel keeps its LEDs, coating and camera as the user set them.
+    An old gel keeps its LEDs, coating and camera as the user set them; of several, as of a copied pair, it is the one
+    nearest to where this skin's would be added.
     """
     group = properties.home_of(skin)
     there = (thing for thing in group.objects if thing.tactile.role == "DIGIT")
-    same = next((thing for thing in there if properties.sensor_name(thing) == sensor), None)
+    place = skin.location + Vector((0.0, digit_objects.BESIDE * skin.tactile.per_metre, 0.0))
+    found = [thing for thing in there if properties.sensor_name(thing) == sensor]
+    same = min(found, key=lambda thing: (thing.location - place).length, default=None)
     return same or digit_objects.add_gel(group, skin.tactile.per_metre, skin, sensor), same is None
 
 

@@ -57,6 +57,19 @@ def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw):
     assert np.abs(draw(copy) - before)[..., 0].mean() > 10 and np.abs(draw(gel) - before).max() <= 1
 
 
+def test_a_copied_pair_is_translated_by_itself(imported):
+    skin = imported(frames="70:90")
+    bpy.ops.tactile.translate()
+    gel = bpy.context.object
+    duplicate(skin, gel)
+    for thing in bpy.context.selected_objects:
+        thing.location.y = {"BIOTAC": 70, "DIGIT": 105}[thing.tactile.role]
+    skin, copy = (bpy.context.scene.objects[f"{thing.name}.001"] for thing in (skin, gel))
+    bpy.context.view_layer.objects.active, skin.tactile.frames = skin, "80:90"
+    bpy.ops.tactile.translate()
+    assert len(copy.data.shape_keys.key_blocks) == 11 < len(gel.data.shape_keys.key_blocks)
+
+
 def test_a_copy_alone_has_the_calibration_s_lights_and_says_so(gel, draw, capfd):
     copy = duplicate(gel)
     drawn, coating = draw(copy), gel.material_slots[0].material
