@@ -1,4 +1,4 @@
-"""Speed against error of every stage, in one run on one machine: a table, a plot, rows.
+"""Measure speed and error of every stage, in one run on one machine; write a table, a plot and rows.
 
     python scripts/benchmark.py                      everything; writes docs/benchmark.*
     python scripts/benchmark.py --quick --json FILE  under three minutes; writes FILE alone
@@ -7,9 +7,9 @@
 Stages: contact mechanics by tier and sensor; translation; conditions that are hard for it; pictures by preset; the
 whole chain from signals to pictures; pictures by others' programs, where they are installed.
 Each method is measured in a process of its own: CPU time on one core, peak memory, and the error on a held-out set
-beside that of doing nothing. Then stated bounds on the error are compared with measured errors: exits with 1 where a
-bound of 95 % holds for under 90 or over 98 %. Methods that need a library that is missing are left out and
-named. Needs the extras [fem] and [render].
+beside that of doing nothing. Then stated bounds on the error are compared with measured errors: exits with 1 if a
+bound of 95 % holds for under 90 or over 98 %. Methods whose library is missing are left out and named. Needs the
+extras [fem] and [render].
 """
 
 from __future__ import annotations
@@ -72,10 +72,11 @@ def main(arguments: list[str] | None = None) -> int:
 def stage_measured(
     stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
 ) -> Iterator[Method]:
-    """Measure every method of a stage, with ``quick`` on less; for those that cannot run, ``missing`` gets why.
+    """Measure every method of a stage, each in a process of its own. quick : on less data
 
-    file : where the first method of pictures and chain leaves the others' truth
-    only : words that name a stage, or a stage and a method; none for all"""
+    file : to which the first method of pictures and of chain writes the truth for the other methods
+    missing : gets method -> reason for each that cannot run
+    only : texts that name a stage, or a stage and a method; none for all"""
     names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
     wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
     if wanted and stage in LEAVE_TRUTH:
@@ -94,14 +95,14 @@ def stage_measured(
 
 
 def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """Measure one method of a stage, to be called in a process of its own; None for one that only writes the others'
-    truth to ``file``. quick : on less data"""
+    """Measure one method of a stage in the present process; None for a method that only writes the truth for the others
+    to ``file``. quick : on less data"""
     measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
     return measure(name, quick, file) if stage in LEAVE_TRUTH else measure(name, quick)
 
 
 def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
-    """Measure every method of every stage that the command line's options ask for; missing : as ``stage_measured``'s"""
+    """Measure every method that the command line's options ask for; missing : gets method -> why it could not run"""
     methods = []
     with tempfile.TemporaryDirectory() as scratch:
         for stage in STAGES:

@@ -1,1 +1,1 @@
-"""Benchmarks, and scripts that make the data that ships; no part of the package. Scripts here are run by their path."""
+"""Benchmarks, and scripts that make files of the package. They are no part of the package and are run by their path."""

@@ -1,3 +1,1 @@
-"""Scripts that make files of the package: the fast tier's correction, test contacts, the print of a ball for
-calibration.
-"""
+"""Scripts that make files of the package: the fast tier's correction, test contacts, the gel's rise under a ball."""

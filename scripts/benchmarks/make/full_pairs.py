@@ -1,7 +1,7 @@
-"""Solve a press of the test set: paired contacts, the same force on both sensors, by the full tier of mechanics.
+"""Solve a press of the test set: contacts at the same force on both sensors, by the full tier of mechanics.
 
-The rows are those of ``pair_sampling``, but for what only the full tier knows: it needs no correction, and the film
-over the electrodes is that of its own deformed inner skin. Press i draws all it needs from (seed, i).
+The rows are like those of ``pair_sampling``. But the full tier needs no correction, and the fluid film over the
+electrodes is computed from its own deformed inner skin. Press i draws all it needs from (seed, i).
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ _TRIES = 12  # reductions by a fifth to a depth that both sensors bear: to a fou
 
 @dataclasses.dataclass(frozen=True)
 class TestPress:
-    """Press ``number`` of the test set. which : of the indenters; depth : m, on the BioTac; slide : (2,) m or None"""
+    """Press ``number`` of the test set. which : index of the scene's indenter; depth : m, greatest, on the BioTac
+    slide : (2,) m, along and across the finger, from the greatest depth on; None for none"""
 
     __test__ = False  # not a test, whatever pytest takes its name for
 
@@ -52,8 +53,8 @@ Pair = tuple[np.ndarray, Solution, Solution]  # slide (2,) m, and both sensors' 
 
 
 def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
-    """Draw press ``number`` from ``seed``, in ``REGION_X`` if odd. Raises TactileError without a box, a ring and other
-    bodies in the scene."""
+    """Draw press ``number`` from ``seed``; one with an odd number has x below ``REGION_X``. Raises TactileError unless
+    the scene has a box, a ring and other bodies."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))
     which = _turn(scene, number)
     indenter = scene.indenters[which].build()
@@ -70,8 +71,8 @@ def draw_press(scene: Scene, seed: int, number: int) -> TestPress:
 
 
 def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) -> float:
-    """Return the depth, m, on the BioTac, reduced by fifths until the DIGIT bears its force by the fast tier.
-    friction : Coulomb's coefficient"""
+    """Return ``depth``, m, on the BioTac, reduced by fifths until the fast tier solves a contact of the same force on
+    the DIGIT too. friction : Coulomb's coefficient"""
     for _ in range(_TRIES):
         try:
             force = solve(SOURCE, indenter, place, depth=depth, friction=friction).axial_force
@@ -84,7 +85,7 @@ def _borne(indenter: Indenter, place: Placement, depth: float, friction: float) 
 
 
 def _turn(scene: Scene, number: int) -> int:
-    """Index of the indenter whose turn it is: balanced for any number of presses."""
+    """Return the index of the indenter whose turn it is, so that all come about equally often. Raises TactileError."""
     built = [spec.build() for spec in scene.indenters]
     boxes, rings = ([i for i, one in enumerate(built) if isinstance(one, kind)] for kind in (Box, Ring))
     others = [i for i in range(len(built)) if i not in boxes + rings]
@@ -98,9 +99,9 @@ def _turn(scene: Scene, number: int) -> int:
 
 
 def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Solve a press; return arrays of each contact, as a file of pairs has them (``pairs_writer.units``), and a record.
+    """Solve a press; return the arrays of each contact by name, as in a file of pairs, and a record of scalars.
 
-    The record: wanted () contacts; lost () str, why the last are missing, else empty; seconds () of this process.
+    The record: wanted, number of contacts; lost, text on why the last ones are missing, or empty; seconds of CPU.
     """
     began = time.process_time()
     rows: list[dict[str, np.ndarray]] = []
@@ -123,7 +124,7 @@ def full_rows(scene: Scene, press: TestPress) -> tuple[list[dict[str, np.ndarray
 
 
 def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float) -> Iterator[Pair]:
-    """Yield slide and both contacts of each step; raises TactileError where the next one is not found on one sensor.
+    """Yield slide and both sensors' contacts of each step. Raises TactileError at a step that is not found on one.
     steps : pairs of depth m and slide (2,) m; friction : Coulomb's coefficient"""
     on_biotac, trouble = _on_biotac(press, steps, friction)
     if on_biotac:
@@ -140,8 +141,8 @@ def _pairs(press: TestPress, steps: list[tuple[float, np.ndarray]], friction: fl
 def _on_biotac(
     press: TestPress, steps: list[tuple[float, np.ndarray]], friction: float
 ) -> tuple[list[Solution], TactileError | None]:
-    """Return the contacts found, and the error that ended them or None; for steps and friction see ``_pairs``. A slide
-    keeps its depth under the surface."""
+    """Return the contacts found on the BioTac, and the error that ended them or None. While it slides, the indenter
+    keeps its depth under the surface. steps : pairs of depth m and slide (2,) m; friction : Coulomb's coefficient"""
     pose, surface, found = pose_at(SOURCE, press.indenter, press.place), sensors.biotac_surface(), []
     drops = [surface_drop(surface, press.indenter, pose, pose.slid(*slide)) for _, slide in steps]
     asked = [Step(max(depth + drop, 0.0), slide=tuple(to)) for (depth, to), drop in zip(steps, drops, strict=True)]

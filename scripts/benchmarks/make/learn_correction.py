@@ -1,5 +1,5 @@
-"""Make the fast tier's correction: full-tier contacts on a sample of presses, and a kernel ridge regression of its
-forces and fields on contacts known in both tiers."""
+"""Make the fast tier's correction: solve sample presses in the full tier, learn by kernel ridge regression what the
+fast tier's forces and displacements lack."""
 
 from __future__ import annotations
 
@@ -58,8 +58,9 @@ _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no 
 
 
 class Known(NamedTuple):
-    """n samples. x : (n, f) features; log_ratio : (n,), ln of full tier's force over fast's; fold : (n,), held out in
-    fields : (n, g, 3), full less fast displacement over depth, at g = LINES^2 places; rubbing : (n,) bool, friction"""
+    """Samples to learn from, n contacts. x : (n, f) features; log_ratio : (n,), ln of full tier's force over fast's
+    fields : (n, g, 3), full less fast displacement, divided by depth, at g = LINES^2 places
+    fold : (n,), the fold of cross-validation that holds the sample out; rubbing : (n,) bool, true with friction"""
 
     x: np.ndarray
     log_ratio: np.ndarray
@@ -73,23 +74,26 @@ class Known(NamedTuple):
 
 
 def mirrored(field: np.ndarray) -> np.ndarray:
-    """Mirror ``field`` (..., LINES * LINES, 3), vectors at places first along x, then along z, across z = 0."""
+    """Mirror ``field`` (..., LINES * LINES, 3), vectors on a flattened grid (along x, along z), at z = 0."""
     grid = field.reshape(*field.shape[:-2], LINES, LINES, 3)[..., :, ::-1, :]
     return (grid * [1.0, 1.0, -1.0]).reshape(field.shape)
 
 
 class Choice(NamedTuple):
-    """Kernel ridge regression's settings: ``width`` of the kernel, ``ridge`` over the mean of the kernel's diagonal."""
+    """Settings of kernel ridge regression. width : of the kernel, in standard deviations of a feature
+    ridge : divided by the mean of the kernel's diagonal"""
 
     width: float
     ridge: float
 
     def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
-        """Return the kernel (n, m) of scaled features a (n, j), b (m, j) with friction a_rubs (n,), b_rubs (m,)."""
+        """Return the kernel (n, m) between contacts a and b, scaled features a (n, j), b (m, j); a_rubs (n,), b_rubs
+        (m,) : whether each has friction"""
         return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
-        """Fit weights (n, k) of scaled features (n, f), with friction ``rubbing`` (n,), to goals (n, k)."""
+        """Return the weights (n, k) of n contacts that fit goals (n, k).
+        scaled : (n, f) features; rubbing : (n,), whether each contact has friction"""
         near = self.near(scaled, scaled, rubbing, rubbing)
         return np.linalg.solve(near + self.ridge * np.eye(len(near)) * np.trace(near) / len(near), goals)
 
@@ -122,8 +126,8 @@ def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
-    """Choose settings by held-out presses, those with friction if ``kind`` is true, else those without: for forces by
-    all features, for forces by the ``ESSENTIAL`` ones, for fields."""
+    """Return the settings with the least error on held-out presses: for forces by all features, for forces by the
+    ``ESSENTIAL`` ones alone, for fields. kind : true for presses with friction, false for those without"""
     coarse = known.fields[:, ::7].reshape(len(known.x), -1)  # enough points of the grid to choose by
     forces = np.clip(known.log_ratio, -MOST, MOST)[:, None]
     every = [Choice(width, ridge) for width in _WIDTHS for ridge in _RIDGES]
@@ -136,8 +140,8 @@ def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
 
 
 def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
-    """Return errors (m, k) of goals (n, k) of the samples of one kind in each fold, learned from the rest.
-    kind : true for those with friction; parts : the features that are used, a slice or their indices"""
+    """Return errors (m, k) of predicted goals of the m samples of one kind, each predicted from the other folds.
+    kind : true for those with friction; parts : slice or indices of the features to use; goals : (n, k), of all"""
     error, rubbing = np.zeros_like(goals), rubs(known.x)
     for f in np.unique(known.fold):
         rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)
@@ -148,18 +152,18 @@ def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.
 
 
 def _size(error: np.ndarray) -> float:
-    """Return the sum of median and mean of each row's root mean square, of an error (m, k)."""
+    """Return the median plus the mean of the root mean squares of an error's rows, (m, k)."""
     size = np.sqrt((error**2).mean(axis=1))
     return float(np.median(size) + size.mean())
 
 
 @dataclasses.dataclass(frozen=True)
 class Sample:
-    """Contact in the full and the fast tier.
+    """One contact, solved in the full and in the fast tier.
 
-    press : number of its press; friction : Coulomb's coefficient; features : (f,), and frame : of the fast contact
-    depth : m; ratio : force of the full tier over that of the fast, along the motion
-    fast, full : displacement (n, 3) float32 m of the surface's nodes, in either tier"""
+    press : number of its press; friction : Coulomb's coefficient; features : (f,), frame : of the fast tier's contact
+    depth : m; ratio : force of the full tier along the motion, divided by that of the fast tier
+    fast, full : (n, 3) float32 m, displacement of the surface's nodes in each tier"""
 
     press: int
     friction: float
@@ -172,10 +176,10 @@ class Sample:
 
 
 def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[str, np.ndarray]:
-    """Solve the full tier's contacts of a press at its ``SHARES`` with Coulomb's ``friction``, as far as they converge.
+    """Solve a press in the full tier at ``SHARES`` of its depth, until one does not converge; return arrays by name.
 
-    By name: depths (k,) m wanted; of the c <= k that converged displacement (c, n, 3) float32 m, force (c, 3) N,
-    iterations (c,), steps (c,), of load, and seconds (c,)."""
+    depths (k,) m; of the first c <= k, which converged: displacement (c, n, 3) float32 m, force (c, 3) N,
+    iterations (c,), steps (c,) of load, seconds (c,) of CPU. friction : Coulomb's coefficient"""
     pose = pose_at(sensor, press.indenter, press.place)
     deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
@@ -200,8 +204,8 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
 def paired(
     sensor: Sensor, number: int, press: RandomContact, friction: float, full: dict[str, np.ndarray]
 ) -> Iterator[Sample]:
-    """Solve press ``number`` in the fast tier at the depths of ``full_press``'s contacts, ``full``; yield a sample of
-    each contact that both tiers hold. friction : Coulomb's coefficient"""
+    """Solve press ``number`` in the fast tier at the depths of ``full``, which ``full_press`` returned; yield a sample
+    of each contact that is valid in both tiers. friction : Coulomb's coefficient"""
     compliance, pose = compliance_of(sensor), pose_at(sensor, press.indenter, press.place)
     problem = ContactProblem(compliance, press.indenter, pose, float(full["depths"][-1]), friction)
     contact = None
@@ -221,7 +225,7 @@ def paired(
 
 
 def _holds(problem: ContactProblem, contact: Contact) -> bool:
-    """Return true if a contact is valid, with the indenter in front of the surface."""
+    """Return true if a contact converged and the indenter does not pass through the surface."""
     if not contact.converged:
         return False
     try:
@@ -232,8 +236,8 @@ def _holds(problem: ContactProblem, contact: Contact) -> bool:
 
 
 def residual_on_grid(sensor: str, at: PatchFrame, residual: np.ndarray) -> np.ndarray:
-    """Interpolate a residual (n, 3) at a sensor's nodes to the g = LINES^2 places of the patch frame ``at``: (g, 3) in
-    the nodes' own axes and the residual's unit; 0 beyond the surface."""
+    """Interpolate a residual (n, 3) at sensor nodes to the g = LINES^2 grid places of the patch frame ``at``; return
+    it (g, 3) in the axes of the surface there, 0 beyond the surface."""
     import scipy.interpolate
 
     local = np.einsum("kji,kj->ki", correction.node_frames(sensor), residual)
@@ -249,7 +253,7 @@ def _triangulation(sensor: str):  # noqa: ANN202
 
 
 def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Correction, list[Row]]:
-    """Learn a sensor's correction; also return rows of its errors on held-out presses (five folds by press)."""
+    """Learn a sensor's correction; return it, and rows of its errors on held-out presses (five folds by press)."""
     samples = list(samples)
     known = Known(
         np.array([s.features for s in samples]), np.log([s.ratio for s in samples]),
@@ -276,7 +280,8 @@ def learn(sensor: str, samples: Iterable[Sample]) -> tuple[Correction, list[Row]
 
 
 def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms (n,) and fields (n, g, 3) of the samples of one kind, each learned from the other folds."""
+    """Return the predicted log_ratio (n,) and fields (n, g, 3) of the samples of one kind, each from the other folds;
+    0 for samples of the other kind. kind : true for those with friction"""
     log_factor, fields = np.zeros(len(known.x)), np.zeros_like(known.fields)
     for f in range(_FOLDS):
         rest = known.select_rows(known.fold != f)
@@ -287,8 +292,8 @@ def _guessed_apart(known: Known, kind: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.ndarray) -> np.ndarray:
-    """Return ``Learned.trust``: the share of predictions for held-out presses that leaves the least squares.
-    which : (n,) bool, samples that count; log_guess : (n,), guess : (n, g, 3), predictions of log_ratio and fields"""
+    """Return ``Learned.trust``: by depth, the share of a prediction to apply, as it leaves held-out presses the least
+    squared error. which : (n,) bool, samples to use; log_guess : (n,), guess : (n, g, 3), predicted log_ratio, field"""
     rows, depth, log_ratio = [], known.x[which, 0], np.clip(known.log_ratio[which], -MOST, MOST)
     for _, _, here in _bins(depth):
         pairs = (log_guess[which][here], log_ratio[here]), (guess[which][here], known.fields[which][here])
@@ -298,8 +303,8 @@ def _trust(known: Known, which: np.ndarray, log_guess: np.ndarray, guess: np.nda
 
 
 def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> list[float]:
-    """Return rms and largest shape error m, relative force error; each after the correction, then before.
-    factor : of force, field : (g, 3) of shape, the sample's correction"""
+    """Return rms and largest shape error, m, and relative force error after the correction, then the three before it.
+    factor : correction of the force; field : (g, 3), correction of the shape"""
     truth = sample.full.astype(float)
     counts = np.linalg.norm(truth, axis=1) > _SIGNIFICANT
     after = correction.add_field(sensor, sample.fast, sample.frame, field, sample.depth) - truth
@@ -311,7 +316,8 @@ def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> li
 
 
 def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
-    """Ends of each bin of depth over thickness that holds enough contacts, and which (n,) bool those are."""
+    """Yield lower and upper end of each bin of depth (n,) (over the thickness) with enough contacts, and a mask (n,)
+    bool of these."""
     for low, high in itertools.pairwise((0.0, *_BINS)):
         here = (depth > low) & (depth <= high)
         if here.sum() >= _LEAST:
@@ -319,8 +325,8 @@ def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
 
 
 def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -> Iterator[Row]:
-    """Yield median errors with the correction, beside those without it, in bins of depth (n,). errors : (n, 6) of
-    ``_errors``; friction : Coulomb's coefficient, all contacts'"""
+    """Yield median errors with the correction, and without it as baseline, in bins of depth (n,) over thickness.
+    errors : (n, 6), by ``_errors``; friction : Coulomb's coefficient of all contacts"""
     measures = ("shape_rms", 0, 3, 1e6, "um"), ("shape_max", 1, 4, 1e6, "um"), ("force_error", 2, 5, 100, "percent")
     for low, high, here in _bins(depth):
         for what, after, before, scale, unit in measures:

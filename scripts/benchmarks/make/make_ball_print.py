@@ -44,8 +44,8 @@ def main() -> int:
 
 
 def prints(radius: float, depths: np.ndarray, nodes: int) -> np.ndarray:
-    """Return the flat layer's rise, divided by depth, (n, nodes) float32 under a ball of ``radius`` m at depths (n,) m.
-    nodes : number of places, distances from the axis of 0, STEP, ... times sqrt(2 radius depth)"""
+    """Return the rise (n, nodes) float32 of a flat layer under a ball of ``radius`` m at depths (n,) m, over depth.
+    nodes : number of places; they lie 0, STEP, 2 STEP, ... times sqrt(2 radius depth) from the ball's axis"""
     mesh = disc_mesh(DIGIT.half_width, DIGIT.thickness, radius, SPACING[radius] * radius, FINE_DEPTH * radius, GROWTH)
     contact = pressed(mesh, DIGIT.descriptor.material, Sphere(radius), radius)
     place = STEP * np.arange(nodes)

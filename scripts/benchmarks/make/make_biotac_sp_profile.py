@@ -34,7 +34,7 @@ def main() -> int:
 
 
 def table(name: str = "biotac_sp") -> str:
-    """Return the CSV of radii, mm, by x, mm, and angle, deg; the skin's thickness and middle are of sensor ``name``."""
+    """Return a CSV text of radii, mm, by x, mm, and angle, deg. name : sensor with the skin's thickness and middle"""
     skin = skin_of(name)
     middle, thick = 1e3 * sum(skin.descriptor.skin.outer_poles) / 2, 1e3 * skin.thickness
     outer, core = 1e3 * RESTING, 1e3 * CORE
@@ -55,9 +55,9 @@ def table(name: str = "biotac_sp") -> str:
 
 
 def _radius(x: np.ndarray, theta: np.ndarray, front: np.ndarray, back: np.ndarray) -> np.ndarray:
-    """Return the radius (stations, angles) mm about the centre of two half ellipsoids; nan beyond.
-    x : (stations,) mm; theta : (angles,) rad from the pad; front, back : (3,) mm, semi-axes of its half and the
-        other"""
+    """Return the radius (stations, angles) mm, from the x axis, of two half ellipsoids about one centre; nan beyond.
+    x : (stations,) mm; theta : (angles,) rad from the pad; front, back : (3,) mm, semi-axes of the pad's half, the
+        other's"""
     height = np.where(np.abs(theta) <= np.pi / 2, front[2], back[2])
     across = 1 / np.hypot(np.sin(theta) / front[1], np.cos(theta) / height)
     inside = 1 - (x / front[0]) ** 2
@@ -65,9 +65,9 @@ def _radius(x: np.ndarray, theta: np.ndarray, front: np.ndarray, back: np.ndarra
 
 
 def _shifted(x: np.ndarray, theta: np.ndarray, axes: np.ndarray, centre: float) -> np.ndarray:
-    """Return the distance (stations, angles) mm along rays from the skin's centre to an ellipsoid ``-centre`` mm
-    higher.
-    x : (stations,) mm; theta : (angles,) rad from the pad; axes : (3,) mm, its semi-axes"""
+    """Return the distance (stations, angles) mm along rays from the skin's axis to an ellipsoid; nan if they miss it.
+    x : (stations,) mm; theta : (angles,) rad from the pad; axes : (3,) mm, the ellipsoid's semi-axes
+    centre : mm, height of the skin's axis over the ellipsoid's centre"""
     inside = 1 - (x / axes[0]) ** 2
     a = (np.sin(theta) / axes[1]) ** 2 + (np.cos(theta) / axes[2]) ** 2
     b = -centre * np.cos(theta) / axes[2] ** 2  # the ray goes down by cos(theta) from the height ``centre``

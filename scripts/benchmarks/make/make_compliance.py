@@ -1,10 +1,10 @@
-"""Condense the sensors that ship and write them compressed, so that nobody waits for their matrices.
+"""Condense the sensors' compliance matrices and write them compressed, so that users need not wait for them.
 
     python scripts/benchmarks/make/make_compliance.py                    a minute and 2.4 GB per sensor
     python scripts/benchmarks/make/make_compliance.py digit --out DIR
 
-Raise ``_FORMAT`` of tactile_core/mechanics/fast/compliance.py first where a file changes, so that no cache keeps arrays
-of the old one.
+If a file is to change, first raise ``_FORMAT`` of tactile_core/mechanics/fast/compliance.py, so that no cache keeps
+arrays of the old one.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def write(path: Path, solid: compliance.Solid, even: Half, odd: Half, step: float) -> None:
-    """Pack the halves of a solid into a file; step : m/N, to which their entries are rounded"""
+    """Pack the even and the odd half of a solid's compliance into a file; step : m/N, to which entries are rounded"""
     import h5py
 
     basis = basis_of(solid, even, step)
@@ -70,8 +70,8 @@ def write(path: Path, solid: compliance.Solid, even: Half, odd: Half, step: floa
 
 
 def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
-    """Order the unknowns: touched nodes, sensing points, electrode feet and fluid (no clusters), the other nodes.
-    half : of the solid, whichever; step : m/N, to which entries are rounded"""
+    """Order the unknowns: touched nodes, sensing points, electrode feet and fluid (in no clusters), other nodes.
+    half : either half of the solid's compliance; step : m/N, to which entries are rounded"""
     rows, columns = solid.lattice.shape
     number = np.arange(len(solid.lattice.rest))
     places = np.column_stack(np.divmod(number, columns)).astype(float)
@@ -103,8 +103,8 @@ def basis_of(solid: compliance.Solid, half: Half, step: float) -> Basis:
 
 
 def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
-    """Cluster points at places (n, 2), row and column; return ``Segment.clusters``, renumbered, and the order (n,) to
-    put points in: largest clusters' details first."""
+    """Cluster points at places (n, 2), row and column, as a tree. Return ``Segment.clusters`` in new numbers of points,
+    and the order (n,) that gives these numbers: points that describe large clusters first."""
     clusters: list[tuple[np.ndarray, np.ndarray]] = []
     level = np.zeros(len(places), int)
     linear = np.column_stack([np.ones(len(places)), places])
@@ -131,7 +131,7 @@ def tree(places: np.ndarray) -> tuple[list[tuple[np.ndarray, np.ndarray]], np.nd
 
 
 def rounded(half: Half, basis: Basis) -> np.ndarray:
-    """Round a half's upper triangle in a basis to steps (n, rows) uint32; 0, -1, 1, -2 ... are stored as 0, 1, 2, 3."""
+    """Return a half's upper triangle in a basis, (n, rows) uint32, in rounding steps; 0, -1, 1, -2 are 0, 1, 2, 3."""
     touched, rows, unknown = basis.touched, basis.rows, basis.unknown
     order = np.empty(touched, int)
     order[np.argsort(unknown[:touched])] = np.arange(touched)

@@ -3,8 +3,8 @@
     python scripts/benchmarks/make/make_contact_patterns.py [WEIGHTS]     of the weights that ship, or of others
 
 The tables hold the reference signals of the weights, counts against rest with the sign of a raw reading
-(``sensors.COUNT_SIGN``), and the fluid's pressure that the weights give for them. They show a recording's polarity and
-whether it can be of a sensor as simulated. Run it again when the weights were trained again.
+(``sensors.COUNT_SIGN``), and the fluid's pressure that the weights give for them. By them a reader tells a recording's
+polarity, and whether its sensor is like the simulated one. Run it again when the weights were trained again.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from tactile_core.translation.translate import load_translator
 
 
 def main(arguments: list[str]) -> int:
-    """Write the tables, by networks in a folder or those that ship, beside the sensor; returns the exit status."""
+    """Write the tables beside the sensor's descriptor, by the networks in the folder arguments[0] or those that ship;
+    return the exit status."""
     folder = arguments[0] if arguments else networks.WEIGHTS_FOLDER
     signals = reference_signals.read(folder).typical.astype(np.float16)
     pressures = load_translator(folder).nets.pressure(signals.astype(np.float64)).astype(np.float32)

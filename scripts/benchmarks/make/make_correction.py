@@ -30,8 +30,8 @@ SENSORS = "digit", "biotac"
 
 
 def file_of(folder: pathlib.Path, sensor: str, seed: int, number: int, friction: float) -> pathlib.Path:
-    """Return the path, in ``folder``, of the file of press ``number``'s contacts in the full tier.
-    seed : of the presses; friction : Coulomb's coefficient"""
+    """Return the path of the file in ``folder`` that holds the full tier's contacts of a press.
+    seed, number : of the random contact; friction : Coulomb's coefficient"""
     return folder / f"{sensor}_{seed}_{number:05d}_friction_{friction:g}.npz"
 
 

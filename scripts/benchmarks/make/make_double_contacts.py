@@ -1,4 +1,4 @@
-"""Make scenes/training/double_contacts.npz: two balls at once, 5 to 12 mm apart, on both sensors (fast tier).
+"""Make scenes/training/double_contacts.npz: contacts of two balls, 5 to 12 mm apart, on both sensors (fast tier).
 
     python scripts/benchmarks/make/make_double_contacts.py --out double_contacts.npz
 
@@ -32,7 +32,8 @@ STEPS = 4  # of the way in, for friction
 
 
 def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
-    """Draw two balls; return, for each, the ball, its place, and the force, N, that sets its depth there alone."""
+    """Draw two balls; return each ball, its place, and the force, N: the ball goes as deep as that force takes it when
+    it presses alone."""
     while True:
         places = random.uniform([-17e-3, -6e-3], [1e-3, 6e-3], (2, 2))
         forces = np.exp(random.uniform(*np.log(FORCES), 2))
@@ -49,7 +50,7 @@ def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
 
 
 def solved(sensor: str, balls: list[tuple[Sphere, Placement, float]]) -> Solution:
-    """Press both balls into a sensor at once, each as deep as its force takes it at its place alone; fast tier."""
+    """Press both balls into a sensor at once, each as deep as its force takes it alone; return the last contact."""
     ends = []
     for ball, place, force in balls:
         pose = pose_at(sensor, ball, place)

@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def draw(figure: Figure, recording: tactile.Recording, touch: tactile.Translation, frame: int) -> None:
-    """Draw the five panels of one frame of a recording, and of the touch translated from it."""
+    """Draw the five panels for one frame of a recording and of ``touch``, its translation."""
     truth = recording.truth
     skin, gel = truth.displacement_biotac[frame], truth.displacement_digit[frame]
     largest = max(np.linalg.norm(each, axis=1).max() for each in (skin, gel))

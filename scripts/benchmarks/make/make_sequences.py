@@ -3,12 +3,12 @@
     python3 scripts/benchmarks/make/make_sequences.py [--out FILE] [--each 20] [--seed 3]
 
 Each sequence is 40 frames with one of the training's nine indenters, anywhere on the gel, up to 30 degrees off the
-normal: rest, force up to 0.2 to 2 N, 20 frames in which it stays (press), leans over by 20 degrees and moves with it
-(roll), or slides by 1 to 4 mm with the training's friction (slide), force down, rest. Presses and slides go on from the
-contact before; a roll's frames are presses of their own. Sequences that a sensor does not bear are drawn again. A
-few minutes on one core. The full tier would take 3 s per frame and sensor, 4 hours in all. The fast tier, which the
-training pairs are of too, is 7 to 8 um off it in the median of the test contacts and 30 um in deep ones
-(docs/accuracy.md), so rows of this set do not show what it misses.
+normal. It rests, the force rises to 0.2 to 2 N, and for 20 frames the indenter stays (press), leans over by 20 degrees
+and moves with it (roll), or slides by 1 to 4 mm with the training's friction (slide); the force falls, and it rests.
+Contacts of presses and slides go on from the one before; a roll's are solved alone. A sequence that cannot be solved on
+a sensor is drawn again. A few minutes on one core; the full tier would take 3 s per frame and sensor, 4 hours in all.
+The fast tier, which also solved the training pairs, differs from it by 7 to 8 um in the median of the test contacts and
+by 30 um in deep ones (docs/accuracy.md); results on this set do not show that error.
 """
 
 from __future__ import annotations
@@ -64,13 +64,13 @@ def main() -> int:
 
 
 def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Join the arrays (40, ...) by name of rows, one for each of S sequences, to arrays (S, 40, ...)."""
+    """Stack the arrays of S sequences: return name -> array (S, 40, ...). rows : name -> array (40, ...) of each"""
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 
 def sequence(scene: Scene, motion: str, random: np.random.Generator) -> dict[str, np.ndarray]:
-    """Draw and solve one sequence; return its arrays (40, ...), see ``described``, 6 frames of them at rest. It is
-    drawn again where a contact fails or touches nothing. motion : one of ``MOTIONS``"""
+    """Draw and solve one sequence; return its arrays (40, ...) by name, see ``described``. It is drawn again if a
+    contact cannot be solved or touches nothing. motion : one of ``MOTIONS``"""
     while True:
         indenter = scene.indenters[int(random.integers(len(scene.indenters)))].build()
         place, force = draw_place(random, scene.pairs), float(np.exp(random.uniform(*np.log(FORCES))))
@@ -96,8 +96,8 @@ SENSORS = ("biotac", "digit")
 
 
 def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) -> list[Contact]:  # noqa: ANN001
-    """Solve a roll on both sensors: the indenter leans from -LEAN / 2 to LEAN / 2 and moves by ROLLED ``ahead``.
-    forces : (F,) N; moved : (F,), share of the way, 0 to 1; ahead : (2,), unit vector x, z; friction : coefficient"""
+    """Solve a roll on both sensors: the indenter leans over from -LEAN / 2 to LEAN / 2 and moves by ROLLED meanwhile.
+    forces : (F,) N; moved : (F,), share of the way, 0 to 1; ahead : (2,), its unit vector x, z; friction : Coulomb's"""
     contacts = []
     for force, share in zip(forces.tolist(), (moved - 0.5).tolist(), strict=True):
         x, z = np.array([place.x, place.z]) + share * ROLLED * ahead
@@ -107,10 +107,11 @@ def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) ->
 
 
 def described(contacts: list[Contact]) -> dict[str, np.ndarray]:
-    """Return the signals and what is judged of a sequence's contacts, with the frames of rest before and after.
+    """Return a sequence's signals and true contacts, by name, with frames of rest added before and after.
 
-    signal (40, 19) float16 counts; force (40,) float32 N, its size on the BioTac; center (40, 2) float32 m, of the dent
-    of the gel, NaN without contact; peak (40,) float32 m, its deepest node; patch (40, M / 8) uint8, packed bits"""
+    signal (40, 19) float16 counts; force (40,) float32 N, its size on the BioTac; of the gel: center (40, 2) float32 m,
+    of the dent, NaN without contact; peak (40,) float32 m, greatest depth; patch (40, M / 8) uint8, nodes in contact,
+    a bit each"""
     around = (REST, AFTER)
     gels = np.stack([digit.displacement for _, digit in contacts])
     center = accuracy.dent_center(gels, sensors.digit_surface().rest)

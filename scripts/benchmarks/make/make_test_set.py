@@ -2,10 +2,10 @@
 
     python3 scripts/benchmarks/make/make_test_set.py --work DIR --out FILE [--presses 210] [--seed 1] [--workers 1]
 
-Stop it at any time: presses that are solved stay in DIR and are not solved again. At its end all presses of this
-seed in DIR are merged into FILE, replacing it, with its card beside it; ``--presses 0`` solves none and merges what
-there is so far. Presses with an odd number lie in the region that networks can be kept from. About half a minute per
-press on one core. The set that ships has the presses 0 to 129, of which 11 found no contact.
+Stop it at any time: presses that are solved stay in DIR and are not solved again. In the end all presses of this seed
+in DIR are merged into FILE, which is replaced, with its card beside it; ``--presses 0`` solves none and merges what
+there is so far. Presses with an odd number lie in a region that training can leave out. About half a minute per press
+on one core. The set that ships has the presses 0 to 129; no contact was found for 11 of them.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Job = tuple[pathlib.Path, int, int]  # folder, seed, number
 
 
 def file_of(folder: pathlib.Path, seed: int, number: int) -> pathlib.Path:
-    """Return the path, in ``folder``, of the file of press ``number``'s contacts; seed : of the presses"""
+    """Return the path of the file in ``folder`` that holds the contacts of press ``number`` of a seed."""
     return folder / f"press_{seed}_{number:05d}.h5"
 
 
@@ -53,8 +53,8 @@ def solve_one(job: Job) -> str:
 
 
 def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
-    """Join the solved presses of a seed in a folder into ``out``, one file of pairs of the full tier, and write
-    its card beside it; returns the card."""
+    """Join a seed's solved presses, which lie in a folder, into one file of pairs, ``out``; write its card beside it,
+    and return the card."""
     files = sorted(folder.glob(f"press_{seed}_*.h5"))
     counts, wanted, lost = [], 0, {}
     for path in files:
@@ -74,7 +74,7 @@ def merge(folder: pathlib.Path, seed: int, out: pathlib.Path) -> dict:
 
 
 def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
-    """Write the file again in a third of the bytes: displacements in steps of STEP, packed as well as gzip can."""
+    """Write the file ``fine`` to ``out`` in a third of the bytes: displacements in steps of STEP, gzip at its best."""
     import h5py
 
     with h5py.File(fine) as source, h5py.File(out, "w") as file:
