@@ -28,10 +28,9 @@ def lengths(vectors: np.ndarray) -> np.ndarray:
 
 
 def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the root mean square (C,) m of predicted - true (C, n, 3) m over nodes whose true displacement is over 10
-    um.
+    """Return the root mean square error (C,) m of predicted from true (C, n, 3) m, over nodes that truly move by 10 um.
 
-    NaN where no node moves that much. The average over contacts is the rmsC of docs/sources.md, Networks."""
+    It is NaN if no node does. Its mean over contacts is called rmsC in docs/sources.md, Networks."""
     moving = lengths(true) > MOVING
     squares = np.where(moving, lengths(predicted - true) ** 2, 0.0).sum(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -39,7 +38,7 @@ def rms_in_contact(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def max_error(predicted: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the largest error (C,) m of any node: the length of predicted - true (C, n, 3) m."""
+    """Return the error (C,) m of the worst node: the largest length of predicted - true (C, n, 3) m."""
     return lengths(predicted - true).max(-1)
 
 
@@ -52,7 +51,7 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
     """Return the RMS error (C,) m of the depth over the core, nodes above 30 % of the true peak; NaN without contact.
 
     predicted, true : (C, n, 3) m, displacements of the nodes in C contacts
-    depth : function that gives the depth: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved"""
+    depth : function to nodes' depths: `height` on the DIGIT, `lengths` on the BioTac, whose pad is curved"""
     found, truth = depth(predicted), depth(true)
     peak = truth.max(-1, keepdims=True)
     core = (truth > CORE * peak) & (peak > MOVING)
@@ -61,7 +60,7 @@ def core_height_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = he
 
 
 def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> np.ndarray:
-    """Return the absolute error (C,) of the deepest node's depth, as a share of the true one; NaN without contact.
+    """Return the absolute error (C,) of the largest depth, as a share of the true largest depth; NaN without contact.
     predicted, true : (C, n, 3) m; depth : `height` on the DIGIT, `lengths` on the BioTac"""
     peak, truth = depth(predicted).max(-1), depth(true).max(-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -69,7 +68,7 @@ def peak_depth_error(predicted: np.ndarray, true: np.ndarray, depth: Depth = hei
 
 
 def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """Return the centre (C, 2) = (x, z) m of the dent, its core's depth-weighted mean; NaN where none moves 10 um.
+    """Return the centre (C, 2) = (x, z) m of the dent, its core's depth-weighted mean; NaN if no node moves by 10 um.
 
     displacement : (C, n, 3) m, of the nodes; rest : (n, 3) m, their places at rest
     """
@@ -77,7 +76,7 @@ def dent_center(displacement: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) -> np.ndarray:
-    """Return the mean (C, 2) m of a dent's core of places (n, 2) m by depth (C, n) m; NaN if none exceeds least m."""
+    """Return the mean (C, 2) m of places (n, 2) m over dents' cores, by depth (C, n) m; NaN if none is over least m."""
     peak = depth.max(-1, keepdims=True)
     weight = np.where((depth > CORE * peak) & (peak > least), depth, 0.0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -85,13 +84,13 @@ def core_center(depth: np.ndarray, places: np.ndarray, least: float = MOVING) ->
 
 
 def mean(values: np.ndarray) -> float | None:
-    """Return the mean of values (C,) without NaN; None where all are NaN (JSON has no NaN)."""
+    """Return the mean of the finite values (C,); None if there are none (JSON has no NaN)."""
     values = np.asarray(values)[np.isfinite(values)]
     return float(values.mean()) if len(values) else None
 
 
 def mesh_metrics(predicted: np.ndarray, true: np.ndarray, depth: Depth = height) -> dict[str, np.ndarray]:
-    """Compute four metrics (C,) of displacement predicted against true (C, n, 3) m, by name: rms_um, max_um,
+    """Return four metrics (C,) by name of displacements predicted against true (C, n, 3) m: rms_um, max_um,
     core_height_um, and peak_depth_percent; all but max_um are NaN without contact.
     depth : `height` on the DIGIT, `lengths` on the BioTac"""
     return {
@@ -112,11 +111,11 @@ def row(
     of: str = "",
     at_least: bool = False,
 ) -> Row:
-    """Make a row of a report: name, value, unit, target, ok, baseline, set (``of``, the data); four digits.
+    """Return a row of a report: name, value, unit, target, ok, baseline, set (``of``, the data); four digits.
 
-    value : None or NaN where nothing could be measured, which misses any target
+    value : None or NaN if nothing could be measured, which misses any target
     baseline : the value of doing nothing, or of the strongest simple answer
-    ok : |value| <= target, or value >= target for ``at_least``; None where there is no target
+    ok : true if |value| <= target, or, with ``at_least``, if value >= target; None without a target
     """
     ok = None
     if target is not None:
@@ -136,7 +135,7 @@ def line(row: Row) -> str:
 
 
 def failed(rows: list[Row]) -> list[Row]:
-    """Return the rows that miss their target, but for those in s, ms and MB, which vary with the machine."""
+    """Return the rows that miss their target, without those in s, ms and MB, which vary with the machine."""
     return [found for found in rows if found["ok"] is False and found["unit"] not in COSTS]
 
 
@@ -156,7 +155,7 @@ class Candidate(NamedTuple):
 def cheapest(candidates: Sequence[Candidate], bound: float, unit: str, what: str = "") -> Candidate:
     """Return the candidate of least cost whose error is at most the bound, in ``unit``.
 
-    what : the errors' subject, for the message. Raises TactileError, naming the most exact one, where none fits.
+    what : the errors' subject, for the message. Raises TactileError, which names the most exact one, if none is.
     """
     good = [each for each in candidates if each.error <= bound]
     if not good:

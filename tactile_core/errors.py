@@ -17,7 +17,7 @@ class TactileError(Exception):
     found : what is there
     expected : what should be there
     advice : what the user can do, an imperative sentence
-    second : moment in a recording that the error is of, s from its start; None for all else"""
+    second : s from a recording's start, the moment at which it is wrong; None for any other error"""
 
     second: float | None = None  # of a recording, where the error is of a moment in it
 
@@ -43,8 +43,8 @@ class TactileError(Exception):
 def finite_number(
     value: Any, where: str, expected: str, least: float = -math.inf, most: float = math.inf, advice: str = ""
 ) -> float:
-    """Return a value as a float; raises TactileError of where, expected, advice unless it is a finite number from
-    ``least`` to ``most``. Decimals and fractions are none: numpy's functions fail on those."""
+    """Return a value as a float. Raises TactileError, of where, expected and advice, unless it is a finite number from
+    ``least`` to ``most``. Decimal and Fraction are refused: numpy's functions fail on those."""
     try:
         known = isinstance(value, int | float) or hasattr(value, "__array__")
         number = float(value) if known and not isinstance(value, bool) else math.nan
@@ -56,7 +56,7 @@ def finite_number(
 
 
 def numbers(values: Any, where: str) -> Any:
-    """Return values as an array of real numbers; raises TactileError, which names ``where``, for anything else."""
+    """Return values as an array of real numbers. Raises TactileError, which names them ``where``, for anything else."""
     import numpy as np
 
     if np.ma.is_masked(values):
@@ -71,7 +71,7 @@ def numbers(values: Any, where: str) -> Any:
 
 
 def path_text(value: Any, where: str, expected: str = "a file's name", advice: str = "") -> str:
-    """Return a file's name as text; TactileError of where, expected, advice unless it is text or an ``os.PathLike``."""
+    """Return a file's name as text. Raises TactileError of where, expected, advice for neither text nor a path."""
     if not isinstance(value, str | os.PathLike):
         raise TactileError(where, f"a {type(value).__name__}", expected, advice)
     return os.fspath(value)

@@ -125,7 +125,8 @@ def _stopped(stop: KeyboardInterrupt, left: str) -> int:
 
 
 def _check_out(options: argparse.Namespace) -> None:
-    """Refuse an empty --out, as from a script's unset variable: it would mean the current folder."""
+    """Raise TactileError for an empty --out, as from a script's unset variable (it would mean the current folder), and
+    for other empty paths."""
     if getattr(options, "out", None) == "":
         raise TactileError("--out", "an empty name", "a file or folder to write", "Name one")
     for name in PATHS:

@@ -64,7 +64,7 @@ def counted(number: int, thing: str) -> str:
 
 
 def complain(text: str) -> None:
-    """Print an error in one line on stderr, after "error: "."""
+    """Print an error as one line on stderr, after "error: "."""
     say("error: " + text)
 
 
@@ -96,7 +96,7 @@ EVERY = 10.0  # s between two lines of progress in a log
 
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
-    """Yield a callback (done, in all): a bar on a terminal or if `forced`, else a line every ten seconds.
+    """Yield a callback (done, in all) that shows progress: a bar on a terminal or if `forced`, else a line every 10 s.
     name : of the work, before the numbers; unit : what is counted, in the singular"""
     if not forced and not sys.stderr.isatty():
         yield _lines(name, unit)

@@ -1,4 +1,4 @@
-"""A training's state on disk, without pickle: one NPZ of arrays, with a JSON text among them."""
+"""Save and restore a training's state on disk, without pickle: one NPZ of arrays, with a JSON text among them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ ADVICE = "Remove the file to start again, or train into another folder"
 class State:
     """State of a training.
     identity : what must be equal to resume it: data, seed, options, versions
-    stage, epoch : the next to run; log : rows (stage, epoch, train, validation)
-    arrays : ``model/...``, weights, and ``optimiser/...``, moments"""
+    stage, epoch : indices of the next to run; log : rows (stage, epoch, training loss, validation loss)
+    arrays : weights as ``model/...``, the optimiser's moments as ``optimiser/...``"""
 
     identity: dict
     stage: int = 0
@@ -35,7 +35,7 @@ class State:
 
 
 def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: torch.optim.Optimizer | None) -> None:
-    """Write the state, with the model and the optimiser as they are now."""
+    """Write the state to a file, with the weights of model and the moments of optimiser as they are now."""
     arrays = {f"model/{name}": tensor.cpu().numpy() for name, tensor in model.state_dict().items()}
     if optimiser is not None:
         for index, values in optimiser.state_dict()["state"].items():
@@ -48,7 +48,7 @@ def save(path: str | os.PathLike, state: State, model: nn.Module, optimiser: tor
 
 
 def read(path: str | os.PathLike, identity: dict) -> State:
-    """Read the state in the file, or return an initial one without a file. Raises TactileError for a damaged file or
+    """Read the state in the file; return an initial one if there is no file. Raises TactileError for a damaged file or
     a training of another identity: data, seed, options, versions."""
     if not os.path.exists(path):
         return State(identity)
@@ -72,7 +72,7 @@ def _of_kind(value: Any, kind: type) -> Any:
 
 
 def restore(state: State, model: nn.Module, path: str | os.PathLike) -> None:
-    """Put the saved weights into the model; raises TactileError if they do not fit."""
+    """Put the saved weights into the model. Raises TactileError, which names path, if they do not fit."""
     saved = {name: array for name, array in state.arrays.items() if name.startswith("model/")}
     weights = {name.removeprefix("model/"): torch.from_numpy(array.copy()) for name, array in saved.items()}
     try:
@@ -82,7 +82,7 @@ def restore(state: State, model: nn.Module, path: str | os.PathLike) -> None:
 
 
 def restore_optimiser(state: State, optimiser: torch.optim.Optimizer) -> None:
-    """Put the saved moments into the optimiser; nothing to do at the start of a stage."""
+    """Put the saved moments into the optimiser; at the start of a stage there are none, and it stays as it is."""
     values: dict[int, dict[str, torch.Tensor]] = {}
     for name, array in state.arrays.items():
         kind, *rest = name.split("/")

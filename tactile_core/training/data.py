@@ -1,4 +1,4 @@
-"""Training contacts as a training step needs them: signals as a sensor reads them, surfaces, forces."""
+"""Contacts in the form that a training step needs: simulated readings of a sensor, surfaces' codes, forces."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ from .surface_codec import SILENT, SurfaceCodec, across, image_of_electrodes, to
 class Batch:
     """A batch of B contacts of e electrodes.
 
-    rows : (B,) contact indices; SILENT none, C + i mirrored i   signal : (B, e + 1) counts; last 1 if rectified
-    biotac, digit : (B, K + 4) inputs of the mesh encoders       force : (B, 3) N
-    pressure : (B, 1) Pa                                         state : (B, STATE) of the contact, 0 without one
-    signed : (B,) as rows, but SILENT where the signal has lost its sign: such a signal fits several places"""
+    rows : (B,) contact indices; SILENT for none, C + i for the mirror image of contact i
+    signed : (B,) rows, with SILENT for signals that have lost their signs: such a signal fits several places
+    signal : (B, e + 1) counts, and 1 if rectified; biotac, digit : (B, K + 4) inputs of the mesh encoders
+    force : (B, 3) N; pressure : (B, 1) Pa; state : (B, STATE) of the contact, 0 without one"""
 
     rows: np.ndarray
     signed: np.ndarray
@@ -38,8 +38,9 @@ class Batch:
 
 
 class Contacts:
-    """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i.
-    frames : "biotac" (source), "digit" (target) -> moving frame; generator : of the bases' random start
+    """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i of
+    C.
+    frames : moving frames by "biotac" (source) and "digit" (target); generator : of the bases' random start
     biotac, digit : `SurfaceCodec` of these; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
     rest : (e,) counts of the unit that changes are from
     device : where batches go; the contacts themselves stay in the host's memory"""
@@ -62,25 +63,26 @@ class Contacts:
         )  # fmt: skip
 
     def with_silence(self, rows: np.ndarray) -> np.ndarray:
-        """Append silent samples to contacts' indices rows (B,), the share ``options.silence`` of them, at least one."""
+        """Append SILENT to contact indices rows (B,), by the share ``options.silence`` of them, at least once."""
         return np.concatenate([rows, np.full(max(1, round(self.options.silence * len(rows))), SILENT)])
 
     def drawn(self, rng: np.random.Generator) -> np.ndarray:
-        """Draw an epoch's rows (B,) in order: contacts of the split or their mirror images, and silent samples."""
+        """Draw an epoch's rows (B,): training contacts in random order, some mirrored, and silent samples among
+        them."""
         rows = rng.permutation(self.with_silence(self.split.train))
         turned = (rng.random(len(rows)) < self.options.mirrored) & (rows != SILENT)
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate readings (B, 20) of rows (B,): counts, 1 if unsigned; rectified, unit : shares so, of real units"""
+        """Simulate readings (B, 20) of rows (B,), `measured`; rectified, unit : shares of readings, see `measured`"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]
         return measured(true, rng, self.options, rectified, unit, self.rest)
 
     def batch(self, rows: np.ndarray, signal: np.ndarray) -> Batch:
-        """Return the contacts by indices rows (B,), SILENT for none and C + i for the mirror image of i, as a `Batch`.
-        signal : (B, 20), changes in counts and, last, 1 where they are rectified; of `read`"""
+        """Return the contacts of rows (B,), with SILENT for none and C + i for the mirror image of i, as a `Batch`.
+        signal : (B, 20) of `read`: changes in counts and, last, 1 if they are rectified"""
         at, turned = self._which(rows)
         force = self.pairs.force[at]
         force[turned] = across(force[turned])
@@ -94,13 +96,13 @@ class Contacts:
         return Batch(rows, signed, *(each.to(self.device) for each in read))
 
     def _which(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rows (B,) of the pairs, 0 for silent samples, and which (B,) are mirrored."""
+        """Return the pairs' indices (B,) of rows (B,), 0 for silent samples, and a mask (B,) of those mirrored."""
         contacts = len(self.pairs.press)
         return np.maximum(rows, 0) % contacts, rows >= contacts
 
 
 def _depth(pairs: Pairs) -> np.ndarray:
-    """Depth (C,) float32 m of each contact's deepest node of the gel."""
+    """Return the depth (C,) float32 m of each contact's deepest node of the gel."""
     return pairs.displacement_digit[:, :, 1].max(1) * np.float32(pairs.scale_digit)
 
 
@@ -108,13 +110,13 @@ def measured(
     change: np.ndarray, rng: np.random.Generator, options: Options, rectified: float = 0.0, unit: float = 0.0,
     rest_counts: np.ndarray = REST_COUNTS,
 ) -> np.ndarray:  # fmt: skip
-    """Simulate a sensor's reading (B, 20) of a true change (B, 19) counts: the change, and 1 where it is rectified.
+    """Simulate a sensor's reading (B, 20) of a true change (B, 19) counts: the change, and 1 if it is rectified.
 
-    Rectified changes have the sign of a thinning film, as the networks read them. Simulated are a gain error for each
+    Rectified changes get the sign of a thinning film, as the networks read them. Simulated are a gain error for each
     channel, noise, whole counts and the ends of 12 bits. The rest lies near that of a typical unit (``rest_counts``,
-    (19,)) and between whole counts, as the mean of many readings does.
+    (19,)) and between whole counts, like the mean of many readings.
     unit : share of frames with a real unit's uncertainty: wider gains, an error of the rest
-    rectified : share of frames that lose their sign, as from unknown units whose tare cannot be corrected after
+    rectified : share of frames that lose their sign, like those of unknown units, whose tare cannot be corrected after
         rectifying: wider gains, an error of the rest, missing channels
     Both have an error proportional to the signal's size too, as no simulated contact is quite like a real one."""
     folded = rng.random((len(change), 1)) < rectified

@@ -1,4 +1,4 @@
-"""Report a training's errors on presses it never saw, and its loss curves; measure : of `Measure`."""
+"""Report a training's errors on presses it never saw, and its loss curves. measure : a `Measure`, in all functions"""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 
 class Measure:
-    """The exported networks, and the test presses, rows (C,), with their signals change (C, 19) counts, noise included.
+    """The exported networks, and the test presses: their rows (C,), and their signals change (C, 19) counts with noise.
     bodies : surfaces of the sensors; seed : of the training, by which noise is drawn"""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
@@ -49,12 +49,12 @@ class Measure:
         self.change = self.read(self.rows, 2)
 
     def read(self, rows: np.ndarray, stream: int) -> np.ndarray:
-        """Return signed signals (C, 19) counts of contacts ``rows`` (C,) with noise; stream : number that seeds it"""
+        """Return signed signals (C, 19) counts, with noise, of contacts ``rows`` (C,); stream : number that seeds it"""
         return self.contacts.read(rows, np.random.default_rng([self.seed, stream]))[:, :-1]
 
 
 def error_rows(measure: Measure, model: Model) -> list[Row]:
-    """Return the card's rows (name, value, unit, target, baseline, set) of each step, the chain, the direct network."""
+    """Return the card's rows of errors (`accuracy.row`) for each step, the chain and the direct network."""
     pairs, rows = measure.contacts.pairs, measure.rows
     columns = translation_metrics(measure.networks, pairs, rows, measure.change, measure.bodies)
     columns |= direct_columns(model, measure)
@@ -67,7 +67,7 @@ def error_rows(measure: Measure, model: Model) -> list[Row]:
 
 
 def direct_columns(model: Model, measure: Measure) -> Columns:
-    """Return `mesh_columns`, named "direct", of `Model.directly`, a single network, which the chain must beat."""
+    """Return `mesh_columns`, named "direct", of ``model.directly``, the single network that the chain must beat."""
     pairs = measure.contacts.pairs
 
     def answer(part: slice) -> Columns:
@@ -82,7 +82,7 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """Return SVB's row of a report: rms over electrodes of reconstruction less noisy signal, mean over contacts."""
+    """Return the row of SVB's error against the noisy signal, rms over electrodes, mean over contacts."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))
@@ -90,7 +90,7 @@ def signal_rows(measure: Measure) -> list[Row]:
 
 
 def silence(measure: Measure) -> dict[str, np.ndarray]:
-    """Translate T frames of noise alone, untracked; return biotac_m, digit_m (T,), largest displacements; force_N."""
+    """Translate T frames of noise, each alone; return (T,) largest displacements biotac_m, digit_m, and force_N."""
     nets, change = measure.networks, measure.read(np.full(SILENT_FRAMES, SILENT), 3)
     signal = nets.encode_signal(change)
     state = nets.contact(signal)
@@ -103,7 +103,7 @@ def silence(measure: Measure) -> dict[str, np.ndarray]:
 
 
 def silence_rows(measure: Measure) -> list[Row]:
-    """Make report rows of the means of `silence`, um and N; their baseline is 0."""
+    """Return report rows of the means of `silence`, um and N; their baseline is 0."""
     values = silence(measure)
     largest = [(f"silence_{name}_max_um", 1e6 * values[f"{name}_m"]) for name in SURFACES]
     named = [*largest, ("silence_force_N", values["force_N"])]
@@ -111,7 +111,7 @@ def silence_rows(measure: Measure) -> list[Row]:
 
 
 def silence_quantiles(measure: Measure) -> dict[str, list[float]]:
-    """Return "levels" and, by the names of `silence`, the quantiles at them of noise alone: less may be no contact."""
+    """Return quantiles of noise alone by `silence`'s names, and their "levels": smaller results may be no contact."""
     return {"levels": list(QUANTILES), **{name: quantiles(value) for name, value in silence(measure).items()}}
 
 
@@ -121,8 +121,8 @@ def quantiles(values: np.ndarray) -> list[float]:
 
 
 def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
-    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses: "signed", "rectified" ->
-    mahalanobis, residual, largest -> quantiles. Rectified signals scatter more, and would hide unusual signed ones."""
+    """Return quantiles at QUANTILES of `Networks.signal_distance` on validation presses, by kind ("signed",
+    "rectified"), then by distance. Rectified signals scatter more, and would hide unusual signed ones."""
     contacts, found = measure.contacts, {}
     for kind, share in SHARES.items():
         random = np.random.default_rng([measure.seed, 5])
@@ -133,8 +133,8 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `card.fit_bounds` on validation presses; return "signed", "rectified" -> "biotac", "digit" -> numbers.
-    silence : `silence_quantiles`"""
+    """Fit `card.fit_bounds` on validation presses; return numbers by kind ("signed", "rectified"), then by "biotac",
+    "digit". silence : of `silence_quantiles`"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():
@@ -149,7 +149,7 @@ def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[
 
 
 def write_log(path: Path, history: list[list]) -> None:
-    """Write the losses of every epoch as CSV; history : rows (stage, epoch, train, validation)"""
+    """Write the losses of every epoch as CSV; history : rows (stage, epoch, training loss, validation loss)"""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["stage", "epoch", "train", "validation"])
@@ -158,7 +158,7 @@ def write_log(path: Path, history: list[list]) -> None:
 
 
 def draw_losses(path: Path, history: list[list]) -> None:
-    """Draw a PNG, a plot a stage: losses over epochs, logarithmic. history : rows (stage, epoch, train, validation)"""
+    """Draw losses over epochs, logarithmic, a plot for each stage, as PNG; history : rows as for `write_log`"""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

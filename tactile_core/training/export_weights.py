@@ -39,7 +39,7 @@ UNITS = {
 def export(
     model: Model, contacts: Contacts, parts: dict[str, np.ndarray], bodies: Bodies, seed: int, folder: Path
 ) -> dict:  # fmt: skip
-    """Write one safetensors file per network and the card; returns the card. The errors in the card are those of the
+    """Write one safetensors file per network and the card; return the card. The errors in the card are those of the
     files: `networks.py` computes them from the rounded weights.
     parts : tensors of the network that separates two contacts; bodies : the sensors' surfaces; seed : of drawn noise"""
     model.cpu()
@@ -77,13 +77,13 @@ def export(
 
 
 def _rest_entry(contacts: Contacts) -> dict[str, list[float]]:
-    """Return the rest counts that changes are from, for a sensor whose own table has none."""
+    """Return the rest counts from which changes are counted, for a sensor whose own table has none; else nothing."""
     known = places_of(contacts.pairs.pair[0]).rest_counts
     return {} if np.isfinite(known).all() else {REST: [round(float(value), 2) for value in contacts.rest]}
 
 
 def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndarray]:
-    """Return the tensors of network `net` under the names of `networks.py`, in float16; scale, turn in float32."""
+    """Return the tensors of network `net` by the names of `networks.py`, float16; scale and turn are float32."""
     state = {name: tensor.numpy().astype(np.float16) for name, tensor in getattr(model, net).state_dict().items()}
     if net == "SVB" or net in POSTERIORS:
         return state
@@ -95,7 +95,7 @@ def net_tensors(net: str, model: Model, contacts: Contacts) -> dict[str, np.ndar
 
 
 def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
-    """Return the sizes in the card, network -> name -> number, from which `card.tensor_shapes` knows every shape."""
+    """Return the card's sizes by network and name, from which `card.tensor_shapes` derives every shape."""
     options = contacts.options
     head = {"width": FORCE_WIDTH, "blocks": FORCE_BLOCKS}
     common = {"width": options.width, "blocks": options.blocks}
@@ -117,15 +117,15 @@ def net_sizes(contacts: Contacts) -> dict[str, dict[str, int]]:
 
 
 def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
-    """Return, for the card, a surface's numbers of rows, columns, half, nodes, wide and near basis fields, by name."""
+    """Return a surface's sizes for the card: rows, columns, half, nodes, and numbers of wide and near basis fields."""
     frame, wide, near = surface.frame, len(surface.wide), len(surface.near)
     lattice = {"rows": frame.rows, "columns": frame.columns, "half": frame.half, "nodes": surface.nodes}
     return {**lattice, "wide": wide, "near": near}
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Compute `Networks.signal_distance`'s tensors: distance.mean (K,), .whitening (K, K), of training latents, and
-    distance.residual (e,), SVB's. seed : of the noise drawn for the signals"""
+    """Return `Networks.signal_distance`'s tensors, "distance.": mean (K,), whitening (K, K), of training latents;
+    residual (e,), SVB's rms error in validation. seed : of the noise drawn for the signals"""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
@@ -142,9 +142,9 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
 
 
 def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
-    """Return the fluid's pressure, (1,) Pa, for each count of the electrodes' summed rectified changes: the median over
-    training contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) this law of one number does
-    better than networks, large and small (docs/train.md)."""
+    """Return the fluid's pressure, (1,) Pa, per count of the sum of rectified changes: the median over training
+    contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) this law of one number does better than
+    networks, large and small (docs/train.md). seed : of the noise"""
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
     signal = contacts.read(rows, np.random.default_rng([seed, 7]), rectified=1.0)
@@ -154,12 +154,12 @@ def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
 
 
 def assemble(tensors: dict, sizes: dict) -> Networks:
-    """Return the numpy networks of tensors, network -> name -> array, and their sizes; no card is needed."""
+    """Return the numpy networks of tensors, by network and name, and sizes, by network; no card is needed."""
     return Networks(tensors, {"nets": {net: {"sizes": sizes[net]} for net in tensors}})
 
 
 def versions(device: torch.device) -> dict[str, str]:
-    """Return versions that the numbers depend on: device, tactile, torch, numpy, python."""
+    """Return what the numbers depend on: device, and versions of tactile, torch, numpy, python."""
     return {
         "device": label(device),
         "tactile": __version__,
@@ -170,12 +170,12 @@ def versions(device: torch.device) -> dict[str, str]:
 
 
 def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, object]]:
-    """Write each network's file of tensors, network -> name -> array; return file, sha256, sizes, shapes by network."""
+    """Write a file of tensors for each network; return the card's entries by network: file, sha256, sizes, shapes."""
     return {net: write_net(folder, net, own, sizes[net]) for net, own in tensors.items()}
 
 
 def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dict[str, int]) -> dict[str, object]:
-    """Write the file of network `net`; returns the card's entry: file, sha256, sizes, shapes.
+    """Write the file of network `net`; return the card's entry: file, sha256, sizes, shapes.
     tensors : by their names in `networks.py`; sizes : of `net_sizes`"""
     data = to_safetensors(tensors)
     write_bytes(folder / f"{net}.safetensors", data)
@@ -184,7 +184,7 @@ def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dic
 
 
 def pairs_entry(contacts: Contacts) -> dict[str, object]:
-    """Return, for the card, the training data's origin, largest pressure, and contacts and presses in each part."""
+    """Return the card's entry on the training data: origin, largest pressure, contacts and presses in each part."""
     pairs, split = contacts.pairs, contacts.split
     parts = {"train": split.train, "validation": split.validation, "test": split.test}
     return {

@@ -1,7 +1,7 @@
-"""Fine-tuning of S2MPN on a real sensor's recording that is labelled with places and forces.
+"""Fine-tune S2MPN on a real sensor's recording that is labelled with places and forces.
 
-Only S2MPN changes, or R2MPN where the recording is rectified. A label fixes the place of the dent and the force, three
-numbers of the contact's state. It says nothing of the dent's shape: the latent is held near its former value, on the
+Only S2MPN changes, or R2MPN for a rectified recording. A label fixes the place of the dent and the force, three numbers
+of the contact's state. It says nothing of the dent's shape: the latent is held near its former value, on the
 recording's own signals and on the typical simulated signals that ship with the weights."""
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
     Places are assumed in SynTouch's frame of the electrodes (docs/sources.md), in m or mm by their size, and are
     unrolled onto the gel; of forces only the magnitude is used, whatever their frame. seed : of the split into presses
-    Raises TactileError: no labels, places that are not on the skin, too few contacts."""
+    Raises TactileError for no labels, places that are not on the skin, or too few contacts."""
     recording = read(path)
     position, forces = recording.position, recording.force
     if position is None or forces is None:
@@ -98,8 +98,8 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
 
 def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (F, 2) on the gel's lattice, in its units, and which (F,) of the contacts are off the pad.
-    position : (F, 3) of the contacts, in SynTouch's frame, m or mm; path : of the file, for errors"""
+    """Return contacts' places (F, 2) on the gel's lattice, in tens of cells from its middle, and a mask (F,) of those
+    off the pad. position : (F, 3), in SynTouch's frame, m or mm; path : of the file, for errors"""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
     metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
@@ -124,7 +124,7 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
 
 
 def _presses(used: np.ndarray) -> np.ndarray:
-    """Return the press (F,) int, counted from 0, of each frame: runs of contact, or equal parts where runs are too few.
+    """Return the press (F,) int, from 0, of each frame: runs of contact or, if these are too few, equal parts.
     used : (F,) int, rising indices into the recording of the frames that are kept"""
     runs = np.cumsum(np.diff(used, prepend=used[0]) > 1)
     return runs if runs[-1] + 1 >= BLOCKS else np.arange(len(used)) * BLOCKS // len(used)
@@ -145,12 +145,13 @@ def fine_tune(
     progress: Progress | None = None,
     overwrite: bool = False,
 ) -> list[Row]:
-    """Write weights with S2MPN fine-tuned on the recording; returns the rows before and after on held-out presses.
+    """Write weights with S2MPN fine-tuned on the recording; return rows of errors before and after, on held-out
+    presses.
 
     out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of.
     weights_folder : the weights to begin with, None for those that ship; progress : takes the share done, a text
     seed : of the split and of the order of training; overwrite : true replaces weights in out_folder
-    Raises TactileError: a recording without labels or with too few contacts, weights that cannot be read, a folder that
+    Raises TactileError for a recording without labels or of too few contacts, unreadable weights, and a folder that
     holds weights already, unless `overwrite`."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
@@ -180,8 +181,8 @@ def fine_tune(
 def _train(
     nets: Networks, net: str, data: LabelledRecording, typical: np.ndarray, seed: int, progress: Progress
 ) -> dict[str, np.ndarray]:
-    """Return the tensors of `net`, rounded as they are written, of the best epoch on the validation presses.
-    typical : (P, 19) counts, signals of simulated contacts, whose posteriors are to stay as they were"""
+    """Return `net`'s tensors, rounded as they are written, after the epoch that is best on the validation presses.
+    typical : (P, 19) counts, signals of simulated contacts, whose states and latents are to stay as they were"""
     sizes = nets.sizes[net]
     module = ContactPosterior(*(sizes[name] for name in ("inputs", "outputs", "width", "blocks", "components")))
     module.load_state_dict({name: torch.from_numpy(array.copy()) for name, array in nets.tensors[net].items()})
@@ -193,7 +194,7 @@ def _train(
         spread = kept.std(0).clamp(min=1e-3)
 
     def loss(rows: Tensor) -> Tensor:
-        """Compute the errors of place and force, and the change of the shape, over frames rows (B,)."""
+        """Return the errors of place and force plus the change of the shape, over frames rows (B,)."""
         state = module.contact(latent[rows])
         found = module.given(latent[rows], state)
         miss = (state[:, :PLACE] - place[rows]).square().sum(-1).add(PLACE_FLOOR**2).sqrt().mean()
@@ -222,13 +223,14 @@ def _train(
 
 
 def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor:
-    """Map latent_signal (B, K) to the most plausible contact's state and latent_biotac, (B, STATE + L)."""
+    """Map latent_signal (B, K) to the likeliest contact's state and latent_biotac, joined to (B, STATE + L)."""
     state = module.contact(latent_signal)
     return torch.cat([state, module.given(latent_signal, state)], -1)
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
-    """Rows of the median error of place and force on held-out presses; baseline: always the training's median."""
+    """Return rows of the median errors of place and force on held-out presses; the baseline is to answer always with
+    the training presses' median. when : for the rows' set, "before" or "after" the fine-tuning"""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
     latent = nets.encode_signal(data.change[test], data.rectified)
@@ -246,7 +248,7 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
-    """Write the weights folder: all files of the source but the tuned network's, and last the card with a note on it.
+    """Write the weights folder: the source's files but for the tuned network, its own, and last the card with a note.
     card : of the source; state : the tuned network's tensors; note : entry "fine_tuned" of the new card"""
     for name in [*(f"{net}.safetensors" for net in card["nets"] if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))

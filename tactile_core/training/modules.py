@@ -1,4 +1,4 @@
-"""The five networks in torch. Tensor names are those of `networks.py`, which holds the same forward passes in numpy."""
+"""The networks in torch. Tensor names are those of `networks.py`, which holds the same forward passes in numpy."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ class Residual(nn.Module):
 
 
 class ContactPosterior(nn.Module):
-    """S2MPN or R2MPN: the posterior of a contact given a signal's latent, and the BioTac's latent given both. A mixture
-    of C Gaussians (`components`) over the contact's state (mixture density network, Bishop 1994) and a network from
-    signal and state to the latent of the BioTac's dent: shapes are never averaged over places and depths."""
+    """S2MPN or R2MPN: the posterior of a contact given a signal's latent, and the BioTac's latent given both: a mixture
+    of C Gaussians (`components`) over the contact's state (mixture density network, Bishop 1994), and a network from
+    signal and state to the latent of the BioTac's dent. So shapes are never averaged over places and depths."""
 
     def __init__(self, inputs: int, outputs: int, width: int, blocks: int, components: int) -> None:
         super().__init__()
@@ -81,7 +81,7 @@ class ContactPosterior(nn.Module):
         return weight.log_softmax(-1), rest[:, 0], LEAST_SPREAD + rest[:, 1].clamp(*SPREAD_LIMITS).exp()
 
     def surprise(self, latent: Tensor, state: Tensor) -> Tensor:
-        """Return -log density (B,), nats, of latent's (B, K) mixture at state (B, STATE), but for a constant."""
+        """Return -log density (B,), nats, but for a constant, of state (B, STATE) in the mixture by latent (B, K)."""
         weight, mean, spread = self.mixture(latent)
         away = (state[:, None] - mean) / spread
         density = -0.5 * away.square().sum(-1) - spread.log().sum(-1)
@@ -125,7 +125,7 @@ class Vae(nn.Module):
         return self.posterior(x)[0]
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Draw a latent (B, L) from the posterior of x (B, inputs), reparameterised; also return its KL divergence from
+        """Draw a latent (B, L) from the posterior of x (B, inputs), reparameterised; also return the KL divergence from
         N(0, 1), mean over B (Kingma and Welling 2014, appendix B)."""
         mean, logvar = self.posterior(x)
         noise = torch.randn(mean.shape, generator=generator).to(mean.device)  # the same numbers on any device
@@ -136,9 +136,9 @@ class Vae(nn.Module):
 class MeshVae(Vae):
     """MVB or MVD: a latent is the place of the dent and a code of its shape in the frame that moves with it.
 
-    The place is measured on the mesh, not learned. The decoder, and networks that start from a latent, also get the
-    remainder of the place after rounding to cells (`placed`), which a shape on a lattice depends on.
-    surface : converts places to cells and coefficients to fields"""
+    The place is measured on the mesh, not learned. The decoder, and networks that start from a latent, also read what
+    is left of the place after rounding to cells (`placed`), which a shape on a lattice depends on.
+    surface : the `SurfaceCodec` that converts places to cells and coefficients to fields"""
 
     def __init__(self, surface: SurfaceCodec, latent: int, width: int, blocks: int) -> None:
         modes = surface.modes.shape[1]
@@ -151,25 +151,26 @@ class MeshVae(Vae):
         return torch.cat([x[:, self.modes : self.modes + PLACE], super().mean(x)], -1)
 
     def sample(self, x: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """Sample a latent (B, L) of x (B, K + 4), and the KL divergence, like `Vae.sample`; no noise on the place."""
+        """Draw a latent (B, L) of x (B, K + 4), no noise on its place; also return the KL divergence of
+        `Vae.sample`."""
         code, divergence = super().sample(x, generator)
         return torch.cat([x[:, self.modes : self.modes + PLACE], code], -1), divergence
 
     def placed(self, latent: Tensor) -> Tensor:
-        """Append to a latent (B, L) the remainder of its place after rounding to whole cells: (B, L + 2)."""
+        """Append to a latent (B, L) what is left of its place after rounding to whole cells; return (B, L + 2)."""
         return torch.cat([latent, self.surface.cells(latent[:, :PLACE])[1]], -1)
 
     def loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute `SurfaceCodec.loss` of the decoded latent (B, L) against the contacts of rows (B,)."""
+        """Return `SurfaceCodec.loss` of the decoded latent (B, L) against the contacts of rows (B,)."""
         cell, left = self.surface.cells(latent[:, :PLACE])
         return self.surface.loss(self.decoder(torch.cat([latent, left], -1)), cell, rows)
 
     def shape_loss(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Compute `loss` of latent (B, L), whose place is replaced by the true one of the contacts ``rows`` (B,)."""
+        """Return `loss` of latent (B, L) with its place replaced by the true one of the contacts ``rows`` (B,)."""
         return self.loss(torch.cat([self.surface.true_place(rows).to(latent.device), latent[:, PLACE:]], -1), rows)
 
     def astray(self, latent: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, cells, of the places that begin latent (B, L) from those of rows (B,)."""
+        """Return the mean distance, cells, of the places that latent (B, L) begins with from those of rows (B,)."""
         return self.surface.astray(latent[:, :PLACE], rows)
 
     def field(self, latent: Tensor) -> Tensor:
@@ -180,20 +181,20 @@ class MeshVae(Vae):
 
 
 def signal_vae(latent: int, electrodes: int = ELECTRODES) -> Vae:
-    """Make SVB, of sizes after ACROSS (a paper: docs/sources.md, Networks): electrodes + 1 inputs, 256, 128, 64, the
-    latent, and back, on compressed signals. The last input says whether the signals are rectified."""
+    """Return SVB, with the layers of ACROSS (a paper: docs/sources.md, Networks): electrodes + 1 inputs, 256, 128, 64,
+    the latent, and back, on compressed signals. The last input says whether the signals are rectified."""
     encoder = Plain((electrodes + 1, *SIGNAL_HIDDEN, 2 * latent))
     return Vae(encoder, Plain((latent, *SIGNAL_HIDDEN[::-1], electrodes)))
 
 
 def compress(signal: Tensor) -> Tensor:
-    """Convert signal (B, 20), changes in counts and 1 where rectified, to SVB's input: arcsinh(counts / 15), and 1."""
+    """Convert signal (B, 20), changes in counts and 1 if rectified, to SVB's input: arcsinh(counts / 15), and 1."""
     return torch.cat([torch.asinh(signal[:, :-1] / COUNT_SCALE), signal[:, -1:]], -1)
 
 
 def initialise(module: nn.Module, generator: torch.Generator) -> None:
     """Draw all weights from the generator: uniform in +-1/sqrt(inputs), torch's own range for Linear. Layers that end a
-    branch start at zero, so that a residual MLP starts as its linear skip."""
+    branch become zero, so that a residual MLP starts as its linear skip."""
     for name, layer in module.named_modules():
         if isinstance(layer, nn.Linear):
             bound = 1.0 / math.sqrt(layer.in_features)
@@ -209,8 +210,8 @@ WARM_UP = 0.02  # share of a training over which the learning rate rises (assume
 
 
 def take_step(optimiser: torch.optim.Optimizer, loss: Callable[[], Tensor], share: float, rate: float) -> float:
-    """Take a step of training by ``loss()``, gradients clipped to a norm of 1; returns the loss.
-    share : of the training that this step completes; the learning rate rises to ``rate``, then falls as a cosine"""
+    """Take a step of training by ``loss()``, gradients clipped to a norm of 1; return the loss. share : of the training
+    that this step completes; the learning rate rises to ``rate`` at first, then falls as a cosine"""
     for group in optimiser.param_groups:
         group["lr"] = rate * min(1.0, share / WARM_UP) * 0.5 * (1.0 + math.cos(math.pi * share))
     optimiser.zero_grad()

@@ -1,6 +1,6 @@
-"""The networks together, and the stages they are trained in.
-A stage's loss is a function of model, contacts, a batch of them, options, and the generator that posteriors are sampled
-with; it returns the number (a tensor of no axes) that training reduces."""
+"""The networks together, and the stages in which they are trained.
+The loss of a stage takes the model, all contacts, a batch of them, options, and the generator that posteriors are
+sampled with; it returns the number (a tensor of no axes) that training minimises."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ CELL_WEIGHT = 4.0  # weight of the place's error against the code's, in the late
 
 
 class Model(nn.Module):
-    """The networks and heads that ship, and the direct network that the chain is compared with (not shipped)."""
+    """All networks that ship, and the direct network with which the chain of them is compared (not shipped)."""
 
     def __init__(self, options: Options, contacts: Contacts, generator: torch.Generator) -> None:
         super().__init__()
@@ -55,7 +55,7 @@ class Model(nn.Module):
         return biotac, self.to_target(state, biotac)
 
     def given(self, signal: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """Map signal (B, 20), the contact's state (B, STATE) to latent_source, and to the state's -log density (B,)."""
+        """Map signal (B, 20) and the contact's state (B, STATE) to latent_source and the state's -log density (B,)."""
         latent, rectified = self.SVB.mean(compress(signal)), signal[:, -1:] > 0
         biotac = torch.where(rectified, self.R2MPN.given(latent, state), self.S2MPN.given(latent, state))
         surprises = (net.surprise(latent, state) for net in (self.R2MPN, self.S2MPN))
@@ -66,7 +66,7 @@ class Model(nn.Module):
         return self.M2MPN(self.MVB.placed(latent_source))
 
     def to_target(self, state: Tensor, latent_source: Tensor) -> Tensor:
-        """Map a contact's state (B, STATE) and latent_source (B, L) to latent_target (B, L') at the state's place."""
+        """Map latent_source (B, L) to latent_target (B, L') at the place of the contact's state (B, STATE)."""
         return torch.cat([state[:, :PLACE], self.across(latent_source)[:, PLACE:]], -1)
 
     def back(self, latent_target: Tensor) -> Tensor:
@@ -78,7 +78,7 @@ class Model(nn.Module):
         return self.SVB.decoder(self.B2SPN(self.MVB.placed(latent_source)))
 
     def expected_error(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20) to the logarithm (B, 2) of the largest node error on BioTac and DIGIT, over ERROR_UNIT."""
+        """Map signal (B, 20) to log(largest node error / ERROR_UNIT), (B, 2), on BioTac and DIGIT."""
         seen = compress(signal)
         latent = self.SVB.mean(seen)
         change = seen[:, :-1]
@@ -87,7 +87,7 @@ class Model(nn.Module):
         return self.error(torch.cat([latent, left, size, seen[:, -1:]], -1))
 
     def directly(self, signal: Tensor) -> Tensor:
-        """Map signal (B, 20), as of `from_signal`, to the latent (B, L') that `direct_decoder` decodes to the gel."""
+        """Map signal (B, 20), see `from_signal`, to the latent (B, L') that `direct_decoder` decodes to the gel."""
         return self.direct(compress(signal))
 
 
@@ -96,8 +96,8 @@ Loss = Callable[[Model, Contacts, Batch, Options, torch.Generator], Tensor]
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage of the training. nets : names of the networks that it changes, or of a part (``S2MPN.code``); loss : the
-    function whose result it reduces"""
+    """A stage of the training. nets : names of the networks that it changes, or of parts of them (``S2MPN.code``)
+    loss : the function whose result it minimises"""
 
     name: str
     nets: tuple[str, ...]
@@ -105,7 +105,7 @@ class Stage:
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Mean square error of the noisy signal's reconstruction, divided by its mean square, plus beta times KL."""
+    """Return the mean square error of the noisy signal's reconstruction, over its mean square, plus beta times KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
     change = signal[:, :-1]
@@ -114,21 +114,21 @@ def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, g
 
 
 def mvb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Error of the BioTac's reconstructed displacement, `SurfaceCodec.loss`, plus beta times the KL divergence."""
+    """Return the BioTac's reconstruction error, `SurfaceCodec.loss`, plus beta times the KL divergence."""
     latent, divergence = model.MVB.sample(batch.biotac, generator)
     return model.MVB.loss(latent, batch.rows) + options.beta * divergence
 
 
 def mvd_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Error of the DIGIT's reconstructed displacement, `SurfaceCodec.loss`, plus beta times the KL divergence."""
+    """Return the DIGIT's reconstruction error, `SurfaceCodec.loss`, plus beta times the KL divergence."""
     latent, divergence = model.MVD.sample(batch.digit, generator)
     return model.MVD.loss(latent, batch.rows) + options.beta * divergence
 
 
 def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Sum of the true contact's negative log likelihood, nats, `latent_loss` of the BioTac's latent, and `svb_loss`.
-    (By likelihood a contact is not estimated fainter than its signal makes it.) SVB trains along, to keep what
-    separates contacts."""
+    """Return the sum of the true contact's negative log likelihood, nats, `latent_loss` of the BioTac's latent, and
+    `svb_loss`. (By likelihood a contact is not estimated fainter than its signal makes it.) SVB trains along, to keep
+    what separates contacts."""
     with torch.no_grad():
         target = model.MVB.mean(batch.biotac)
     found, surprise = model.given(batch.signal, batch.state)
@@ -136,15 +136,15 @@ def s2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def m2mpn_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the map from the BioTac's latent to the DIGIT's, both means of frozen autoencoders."""
+    """Return `latent_loss` of the map from the BioTac's latent to the DIGIT's, both means of frozen autoencoders."""
     with torch.no_grad():
         biotac, target = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     return latent_loss(model.across(biotac), target)
 
 
 def latent_loss(found: Tensor, target: Tensor) -> Tensor:
-    """Return the weighted mean of two errors of latents found against target (B, L): of their places (CELL_WEIGHT) and
-    of the rest, the shape's code (1). Each is the mean square error divided by the target's mean square."""
+    """Return the weighted mean of two errors of latents found against target (B, L): of their places, weight
+    CELL_WEIGHT, and of the shape's code, weight 1. Each is the mean square error over the target's mean square."""
     error, size = (found - target).square(), target.square()
     place, code = (
         error[:, part].mean() / size[:, part].mean().clamp(min=LEAST_SIZE)
@@ -154,8 +154,8 @@ def latent_loss(found: Tensor, target: Tensor) -> Tensor:
 
 
 def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the whole chain: a frozen chain is 23-26 % worse than signal -> DIGIT directly (docs/sources.md,
-    Networks).
+    """Return the loss of the whole chain, trained together: a frozen one is 23-26 % worse than signal -> DIGIT directly
+    (docs/sources.md, Networks).
 
     Shapes are compared at the contact's true place, and places separately: a dent beside its place would otherwise be
     made fainter to reduce the error. The gel's place is the state's, trained by its likelihood before and fixed here.
@@ -173,7 +173,7 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Mean relative error of the force from the BioTac's latent: once of the true mesh, once of signal and contact."""
+    """Return the mean relative error of the force from the BioTac's latent, of true meshes and as found by signals."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)
@@ -184,20 +184,21 @@ def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 def pressure_loss(
     model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator
 ) -> Tensor:
-    """Mean square error of asinh(the fluid's pressure / PRESSURE_SCALE), from noisy signals, rectified left out.
-    (Relative errors in its place biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
+    """Return the mean square error of asinh(the fluid's pressure / PRESSURE_SCALE), from noisy signals, not rectified.
+    (Relative errors instead biased uncertain pressures low: estimates for slides were a sixth lower still.)"""
     signed = batch.signal[:, -1:] == 0
     error = model.pressure(compress(batch.signal)[:, :-1]) - torch.asinh(batch.pressure / PRESSURE_SCALE)
     return (signed * error.square()).sum() / signed.sum().clamp(min=1)
 
 
 def length(vectors: Tensor) -> Tensor:
-    """Return the length (B,) of vectors (B, 3), with a gradient at zero."""
+    """Return the length (B,) of vectors (B, 3); at zero it has a gradient."""
     return (vectors.square().sum(-1) + 1e-12).sqrt()
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of ``Model.expected_error``: mean absolute error of the logarithms, so that it learns the median error."""
+    """Return the mean absolute error of ``Model.expected_error``'s logarithms, which makes it learn the median
+    error."""
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)
@@ -206,14 +207,14 @@ def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def largest_error(vae: MeshVae, latent: Tensor, rows: np.ndarray) -> Tensor:
-    """Return the largest node error (B,) m of displacements decoded from latent (B, L) against the true ones of
-    contacts ``rows`` (B,), at least ERROR_FLOOR; vae : of the surface"""
+    """Return the largest node error (B,) m, at least ERROR_FLOOR, of displacements decoded from latent (B, L), against
+    the true ones of contacts ``rows`` (B,). vae : of the surface"""
     error = vae.field(latent) - vae.surface.true(rows)
     return error.square().sum(-1).amax(-1).sqrt().clamp(min=ERROR_FLOOR).to(latent.device)
 
 
 def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of the reverse direction: DIGIT mesh to BioTac mesh, BioTac mesh to the noisy signal."""
+    """Return the loss of the reverse direction: DIGIT mesh to BioTac mesh, and BioTac mesh to the noisy signal."""
     with torch.no_grad():
         biotac, digit = model.MVB.mean(batch.biotac), model.MVD.mean(batch.digit)
     signed = batch.signal[:, -1:] == 0
@@ -228,7 +229,7 @@ def back_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, 
 
 
 def direct_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Loss of one network from signal to DIGIT, which the chain must beat."""
+    """Return the loss of the one network from signal to DIGIT, which the chain must beat."""
     found, decoder = model.directly(batch.signal), model.direct_decoder
     return decoder.loss(found, batch.rows) + options.astray * decoder.astray(found, batch.signed)
 

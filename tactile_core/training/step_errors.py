@@ -31,22 +31,23 @@ class Bodies:
 
 
 def our_bodies(source: str = SOURCE, target: str = TARGET) -> Bodies:
-    """Return the surfaces of a skin, source, and a gel, target, as this version has them."""
+    """Return this version's surfaces of a skin, source, and a gel, target."""
     return Bodies(sensors.sensor_surface(target), unrolling.unrolled_nodes(source))
 
 
 def true_displacement(pairs: Pairs, sensor: str, rows: np.ndarray) -> np.ndarray:
-    """Return displacements (B, n, 3) float32 m of a surface, sensor "biotac" or "digit", in rows (B,) of pairs."""
+    """Return displacements (B, n, 3) float32 m of rows (B,) of pairs, on the surface of sensor "biotac" or "digit"."""
     steps, step = getattr(pairs, f"displacement_{sensor}")[rows], getattr(pairs, f"scale_{sensor}")
     return steps.astype(np.float32) * np.float32(step)
 
 
 def translation_metrics(nets: Networks, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return the errors of every step for contacts by indices rows (C,) into pairs, read as ``change`` (C, 19) counts.
+    """Return every step's errors on the contacts rows (C,) of pairs, read as ``change`` (C, 19) counts.
 
     Steps: ``MVB``, ``MVD`` (each mesh through its autoencoder), ``M2MPN`` (BioTac mesh to DIGIT mesh), ``S2MPN``
     (signal to BioTac mesh), ``chain`` (signal to DIGIT mesh); reverse ``D2B`` (DIGIT mesh to BioTac mesh), and ``B2S``,
-    ``D2S`` (meshes to signal), ``force``, ``pressure``. Columns as ``MVB_max_um``; ``baseline_*`` : no displacement."""
+    ``D2S`` (meshes to signal), ``force``, ``pressure``. Columns are, say, ``MVB_max_um``; ``baseline_*`` : no
+    displacement."""
     return joined(_part(nets, pairs, rows[part], change[part], bodies) for part in parts(len(rows)))
 
 
@@ -60,7 +61,7 @@ def parts(count: int) -> list[slice]:
 
 
 def joined(columns: Iterator[Columns]) -> Columns:
-    """Join the columns (B,) of consecutive parts of contacts, by name, into columns of all."""
+    """Join the columns of consecutive parts of contacts, each by name, into columns of all contacts."""
     found = list(columns)
     return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
 
@@ -108,9 +109,9 @@ def error_columns(
     silent: float,
     rectified: bool = False,
 ) -> Columns:
-    """Return columns (B,): ``biotac_max_m``, largest node error by signals, ``biotac_expected_m``; the same of digit.
-    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs
-    ``x_m`` is the contact's place along the gel; NaN where no node moves by ``silent`` m."""
+    """Return columns (B,): ``biotac_max_m``, largest node error of the translation, ``biotac_expected_m``, its
+    estimate; the same of digit; ``x_m``, the contact's place along the gel, NaN if no node moves by ``silent`` m.
+    rows : (B,) indices into the pairs' contacts; change : (B, 19) counts, as read; rectified : true if without signs"""
     biotac, digit = nets.likely_latents(nets.encode_signal(change, rectified), rectified)
     answers = {SOURCE: nets.decode_source(biotac), TARGET: nets.decode_target(digit)}
     truth = {name: true_displacement(pairs, name, rows) for name in answers}
@@ -126,9 +127,9 @@ PEAK_FROM = 0.3e-3  # m: as much of the peak depth
 
 
 def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy.Depth = accuracy.height) -> Columns:
-    """Return errors of displacement found (C, n, 3) m against the true one: ``rms_um`` of moving nodes, ``max_um``,
-    ``core_height_um``, ``peak_depth_percent`` (NaN for true ones below PEAK_FROM). name : before each column's
-    depth : displacement (C, n, 3) m -> each node's depth (C, n) m, by which core and peak are found"""
+    """Return errors of displacement found (C, n, 3) m from the true one: ``rms_um`` of moving nodes, ``max_um``,
+    ``core_height_um``, ``peak_depth_percent`` (NaN for true peaks below PEAK_FROM). name : prefix of the columns
+    depth : function from displacement (C, n, 3) m to depth (C, n) m, by which core and peak are found"""
     metrics = accuracy.mesh_metrics(found, true, depth)
     deep = depth(true).max(-1) > PEAK_FROM
     metrics["peak_depth_percent"] = np.where(deep, metrics["peak_depth_percent"], np.nan)
@@ -137,7 +138,7 @@ def mesh_columns(name: str, found: np.ndarray, true: np.ndarray, depth: accuracy
 
 def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodies) -> Columns:
     """Compare the contact patch of gels found (C, M, 3) m with the true patch (C, M) bool: ``iou``, intersection over
-    union (NaN below LEAST_PATCH true nodes), ``position_mm`` between middles. name : before each column's"""
+    union (NaN below LEAST_PATCH true nodes), ``position_mm`` between middles. name : prefix of the columns"""
     predicted = contact_patch(found, bodies.digit)
     with np.errstate(invalid="ignore", divide="ignore"):
         overlap = (predicted & patch).sum(-1) / (predicted | patch).sum(-1)
@@ -151,7 +152,7 @@ def digit_columns(name: str, found: np.ndarray, patch: np.ndarray, bodies: Bodie
 
 
 def _skin_offset(found: np.ndarray, true: np.ndarray, bodies: Bodies) -> np.ndarray:
-    """Return the distance (C,) m, on the unrolled pad, between the dents' middles of skins found, true (C, N, 3) m."""
+    """Return the distance (C,) m, on the unrolled pad, of the dents' middles of skins found and true (C, N, 3) m."""
     on_pad = np.isfinite(bodies.unrolled[:, 0])
     places = bodies.unrolled[on_pad]
     first, second = (accuracy.core_center(accuracy.lengths(each[:, on_pad]), places, 0.0) for each in (found, true))
@@ -165,7 +166,7 @@ BASELINES = {"MVB": "baseline_biotac", "S2MPN": "baseline_biotac", "D2B": "basel
 
 
 def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median: bool = False) -> float | None:
-    """Return the mean over bins of depth of the mean over indenters of the mean (or median) of values; None for none.
+    """Return the mean over bins of depth of the mean over indenters of mean (or median) values; None without any.
     values : (C,), NaN left out; depth : (C,) m; indenter : (C,) int, index of each contact's indenter"""
     middle = np.median if median else np.mean
     bins = []
@@ -180,8 +181,8 @@ def in_bins(values: np.ndarray, depth: np.ndarray, indenter: np.ndarray, median:
 def metric_rows(
     columns: Columns, pairs: Pairs, rows: np.ndarray, set_name: str, targets: dict[str, float]
 ) -> list[Row]:
-    """Return a report's row per metric over the contacts rows (C,) that press without sliding, averaged as `in_bins`.
-    columns : metric -> (C,); targets : metric -> limit, in the metric's unit; set_name : of these contacts"""
+    """Return a report's row for each metric over the contacts rows (C,) that do not slide, averaged by `in_bins`.
+    columns : (C,) by metric; targets : limits by metric, in its unit; set_name : name of these contacts"""
     still = ~pairs.slide[rows].any(-1)
     depth, indenter = pairs.depth_biotac[rows], pairs.indenter[rows]
     found = []
@@ -207,7 +208,7 @@ def _baseline(columns: Columns, name: str) -> np.ndarray:
 
 
 def metric_row(name: str, value: float | None, baseline: float | None, target: float | None, set_name: str) -> Row:
-    """Make one row of a report; the unit is the last word of name. Larger is better for an intersection over union.
+    """Return one row of a report; the unit is the last word of name. Larger is better for an intersection over union.
     value, baseline, target : the metric, that without a translation, its limit, or None; set_name : of contacts"""
     unit = name.rsplit("_", 1)[1].replace("percent", "%").replace("iou", "1")
     target = None if value is None else target
@@ -215,7 +216,7 @@ def metric_row(name: str, value: float | None, baseline: float | None, target: f
 
 
 def slices(pairs: Pairs, rows: np.ndarray) -> Iterable[tuple[str, np.ndarray]]:
-    """Yield name and mask (C,) over ``rows`` (C,) of each subset: lighter than 0.1 mm, by depth, deeper, sliding."""
+    """Yield a name and a mask (C,) over ``rows`` (C,) for each subset: below 0.1 mm deep, by depth, deeper, sliding."""
     depth, sliding = pairs.depth_biotac[rows], pairs.slide[rows].any(-1)
     yield "lighter than 0.1 mm", (depth < BINS[0]) & ~sliding
     for low, high in zip(BINS[:-1], BINS[1:], strict=True):

@@ -1,4 +1,4 @@
-"""One sensor's displacements for training: in the nodes' own frames, as coefficients, with a loss."""
+"""Encode one sensor's displacements for training, in the nodes' own frames, as coefficients; compute their loss."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ SAME = 1e-4  # rad: angles closer than this are one
 
 
 def image_of_nodes(frame: ContactFrame) -> np.ndarray:
-    """Return each node's mirror image (n,); nodes behind the lattice (poles) are their own. Raises ValueError for a
-    lattice whose columns have no images."""
+    """Return the index (n,) of each node's mirror image; nodes behind the lattice (poles) are their own. Raises
+    ValueError for a lattice whose columns have no images."""
     columns, angle = np.arange(frame.columns), frame.turn[: frame.columns].astype(float)
     image = columns[::-1]
     if angle.any():  # columns stand round an axis, where the first is its own image if it lies behind
@@ -34,7 +34,7 @@ def image_of_nodes(frame: ContactFrame) -> np.ndarray:
 
 @functools.cache
 def image_of_electrodes(sensor: str = SOURCE) -> np.ndarray:
-    """Return, for each electrode of a sensor, the index (19,) of the one nearest to its mirror image in z."""
+    """Return for each electrode of a sensor the index (19,) of the one nearest to its mirror image in z."""
     at = electrodes(sensor)
     return np.square(at[:, None] * [1, 1, -1] - at).sum(-1).argmin(axis=1)
 
@@ -60,9 +60,9 @@ Fields = Callable[[np.ndarray], Tensor]  # contact indices (B,) -> (B, size) in 
 class SurfaceCodec:
     """Displacements of one sensor, their moving frame and linear bases, in the host's memory.
 
-    data : (D, n, 3) int16 in the sensor's own frame, times ``unit`` m; contact D + i is contact i mirrored
-    wide : (K, 3n) orthonormal rows, of the whole surface; near : (K', 3w) of the window's w nodes, of what is left by
-        ``wide``
+    data : (D, n, 3) int16 in the sensor's own frame, in ``unit`` m; contact D + i is contact i mirrored
+    wide : (K, 3n) orthonormal rows, fields of the whole surface; near : (K', 3w), fields of the window's w nodes, for
+        what ``wide`` leaves
     place : (C, 2) of dents, C = 2 D if mirrored, or D; modes : (C, K + K') coefficients over ``scale`` (K + K',) m
     total : (C,) m2, sum of squared displacements; moving : (C,) number of nodes that move, at least FEWEST
     baseline : m, loss of no displacement, mean over training contacts
@@ -98,7 +98,7 @@ class SurfaceCodec:
         return self.data.shape[1]
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
-        """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m and in the nodes' own frames."""
+        """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m, in the nodes' own frames."""
         values, turned = np.rint(self.frame.to_local(self.data[rows % len(self.data)])), rows >= len(self.data)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
@@ -116,8 +116,8 @@ class SurfaceCodec:
         return torch.from_numpy(self.frame.windows(fields, self.cell[rows])).flatten(1)
 
     def _tapered(self, rows: np.ndarray) -> Tensor:
-        """Return the near basis's input of rows (B,), faded toward the window's edge, where decoded gel would have a
-        step."""
+        """Return what ``wide`` leaves of rows (B,) in the window, (B, 3w) mm, faded toward its edge, where decoded gel
+        would have a step."""
         fade = torch.from_numpy(self.frame.fade())
         return (
             self._rest_in_window(rows, self._whole(rows)).view(len(rows), *fade.shape, 3) * fade[:, :, None]
@@ -132,32 +132,32 @@ class SurfaceCodec:
         return torch.stack([squares.sum(-1), (squares > MOVING**2).sum(-1).clamp(min=FEWEST).float()], -1)
 
     def inputs(self, rows: np.ndarray) -> Tensor:
-        """Return the encoder's input (B, K + K' + 4) of rows (B,): coefficients, place, remainder; zero if silent."""
+        """Return the encoder's input (B, K + K' + 4) of rows (B,): coefficients, place, remainder; 0 if silent."""
         at = np.maximum(rows, 0)
         place = torch.from_numpy(np.concatenate([self.place[at], self.left[at]], -1))
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Round place (B, 2) to cells (B, 2) and remainders (B, 2), which carry gradients: `ContactFrame.cells`."""
+        """Round place (B, 2) to cells (B, 2); also return remainders (B, 2), with gradients: `ContactFrame.cells`."""
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))
         return cell.long(), (at - cell).clamp(-1.0, 1.0)
 
     def true_place(self, rows: np.ndarray) -> Tensor:
-        """Return the places (B, 2), row and column in tens of cells, of the dents of rows (B,); 0 for silent ones."""
+        """Return the true places (B, 2) of rows' (B,) dents, row and column in tens of cells; 0 for silent ones."""
         return torch.from_numpy(self.place[np.maximum(rows, 0)]) * touching(rows)
 
     def astray(self, place: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean distance, cells, from place (B, 2) to that of rows (B,); silent samples count LEAST_AWAY."""
+        """Return the mean distance, cells, of place (B, 2) from that of rows (B,); silent ones count LEAST_AWAY."""
         away = PLACE_UNIT * (place - self.true_place(rows).to(place.device)) * touching(rows).to(place.device)
         return (away.square().sum(-1) + LEAST_AWAY**2).sqrt().mean()
 
     def loss(self, modes: Tensor, cell: Tensor, rows: np.ndarray) -> Tensor:
-        """Return the mean error of modes (B, K + K'), over ``scale``, around cell (B, 2) against contacts rows (B,):
-        rms over moving nodes, 1 for no displacement.
+        """Return the mean error of modes (B, K + K'), coefficients over ``scale``, around cell (B, 2) against the
+        contacts rows (B,): rms over moving nodes, divided by that of no displacement.
 
-        The root is taken contact by contact, as in the reported metric, so that deep contacts do not dominate shallow
+        The root is taken contact by contact, like in the reported metric, so that deep contacts do not dominate shallow
         ones. The bases are orthonormal, so an error in coefficients is one of nodes; the part outside both bases is
         added. Only the product of errors in both bases is neglected (near fields are nearly orthogonal to wide ones,
         being their remainder)."""
@@ -169,7 +169,7 @@ class SurfaceCodec:
         return (squares / self.moving[at].to(device) + ROOT_FLOOR**2).sqrt().mean() / self.baseline
 
     def field(self, modes: Tensor, cell: Tensor) -> Tensor:
-        """Decode modes (B, K + K') around cell (B, 2) to displacement (B, n, 3) m in nodes' own frames, on host."""
+        """Decode modes (B, K + K') around cell (B, 2) to displacement (B, n, 3) m in nodes' own frames, on the host."""
         metres, wide, width = modes.cpu() * self.scale, len(self.wide), self.frame.width
         whole = (metres[:, :wide] @ self.wide).view(len(modes), -1, 3).numpy()
         near = (metres[:, wide:] @ self.near).view(len(modes), width, width, 3).numpy()
@@ -181,7 +181,8 @@ class SurfaceCodec:
         return values * (self.unit * touching(rows)[:, :, None])
 
     def _at_cells(self, rows: np.ndarray, cells: Tensor) -> Tensor:
-        """Return coefficients (B, K + K') m of contacts rows (B,) in windows around cells (B, 2), not their own."""
+        """Return coefficients (B, K + K') m of contacts rows (B,) in windows around cells (B, 2), not around their
+        own."""
         metres, cell = self.modes[rows] * self.scale, cells.cpu().numpy()
         moved = (cell != self.cell[rows]).any(-1)
         if moved.any():
@@ -194,7 +195,7 @@ class SurfaceCodec:
 
 
 def _in_parts(values: Callable[[np.ndarray], Tensor], rows: np.ndarray) -> Tensor:
-    """Compute values(rows), (n, ...), of rows (n,) in parts, written into one array: separate ones fragment memory."""
+    """Return values(rows), (n, ...), for rows (n,), computed in parts into one array: separate ones fragment memory."""
     parts = _parts(len(rows))
     first = values(rows[parts[0]])
     found = first.new_empty(len(rows), *first.shape[1:])
@@ -216,7 +217,7 @@ def touching(rows: np.ndarray) -> Tensor:
 def principal_basis(fields: Fields, rows: np.ndarray, modes: int, generator: torch.Generator) -> Tensor:
     """Return orthonormal rows (K, size), K = min(modes, contacts, size), that span most of the fields. They are not
     centred, so that no displacement has zero coefficients, and rounded to float16, the shipped dtype.
-    fields : contact indices (B,) -> (B, size) mm; rows : contacts to use"""
+    fields : function from contact indices (B,) to fields (B, size) mm; rows : contacts to use"""
     size = fields(rows[:1]).shape[1]
     modes = min(modes, len(rows), size)
     columns = min(modes + EXTRA, len(rows), size)

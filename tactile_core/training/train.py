@@ -1,4 +1,4 @@
-"""Training from a pairs file to a weights folder: data, model, stages, export, report.
+"""Train from a pairs file to a weights folder: data, model, stages, export, report.
 
 The same pairs, seed, options, device and machine give the same bytes, interrupted or not: every epoch draws its order,
 its noise and its posterior samples from generators seeded with (seed, stage, epoch), on one thread."""
@@ -52,14 +52,14 @@ def train(
     overwrite: bool = False,
     device: str = "cpu",
 ) -> dict:
-    """Train the five networks and the force estimate; returns the card.
+    """Train all networks of a translation; return the card.
 
     Writes out_folder/weights/<net>.safetensors and card.json (for `networks.load`), log.csv, loss.png; meanwhile
     checkpoint.npz, from which the next call with the same arguments continues.
     seed : of all that is drawn; options : sizes and lengths, None for the defaults; overwrite : true replaces weights
     progress : called with the share done (0..1) and a line of text
     bodies : the surfaces of the pairs; None: those of this version's sensors
-    frame : sensor, half a window's cells -> the frame that moves over its surface
+    frame : function from a sensor and half a window's cells to the frame that moves over its surface
     device : auto, cpu or cuda; contacts stay in the host's memory, networks and batches go there
     Raises TactileError if the pairs, the folder, the device or a checkpoint in the folder cannot be used."""
     options, out, where = options or Options(), Path(out_folder), device_of(device)
@@ -91,12 +91,12 @@ def train(
 
 
 def quiet(share: float, text: str) -> None:
-    """Log progress, the share done (0 to 1) and a line of text: the default callback."""
+    """Write progress to the log: the share done (0 to 1) and a line of text. It is the default callback."""
     log.info("%3.0f %% %s", 100 * share, text)
 
 
 def without(split: Split, pairs: Pairs, options: Options, path: str | os.PathLike) -> Split:
-    """Return the split less all contacts that ``options.without`` (indenters) and ``without_below_x`` keep apart.
+    """Return the split without the contacts that ``options.without`` (indenters) and ``without_below_x`` leave out.
     path : of the pairs, for errors. Raises TactileError for an unknown indenter, or a part that is left empty."""
     names = pairs.indenter_names
     for name in options.without:
@@ -160,7 +160,7 @@ def deterministic() -> Iterator[None]:
 
 
 def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress: Progress) -> list[list]:
-    """Run the stages that are left; returns the log rows (stage, epoch, train, validation).
+    """Run the stages that are left; return the log's rows (stage, epoch, training loss, validation loss).
     path : the checkpoint, read at first and written now and then; progress : takes the share done, a text"""
     identity = {
         "pairs": contacts.pairs.sha256,
@@ -182,7 +182,7 @@ def run_stages(model: Model, contacts: Contacts, seed: int, path: Path, progress
 def run_stage(
     stage: Stage, model: Model, contacts: Contacts, seed: int, state: checkpoint.State, path: Path, progress: Progress
 ) -> None:
-    """Train a stage's networks for its epochs, from state on, saved to path. progress : takes the share done, a text"""
+    """Train a stage's networks from state to its last epoch, saved to path; progress : takes the share done, a text"""
     options = contacts.options
     groups = [
         {"params": list(model.get_submodule(net).parameters()), "weight_decay": options.decay(net)}
@@ -208,7 +208,7 @@ def run_stage(
 def epoch_losses(
     stage: Stage, model: Model, contacts: Contacts, seed: int, index: int, epoch: int
 ) -> list[Callable[[], torch.Tensor]]:
-    """Return one function per step of pass ``epoch``, from 0; called in order, each returns the loss of its batch.
+    """Return a function for each step of pass ``epoch``, from 0; called in order, each returns its batch's loss.
     index : number of the stage; with seed and epoch it seeds what is drawn"""
     options = contacts.options
     rng = np.random.default_rng([seed, index, epoch])
@@ -228,8 +228,8 @@ def epoch_losses(
 def train_epoch(
     losses: list[Callable[[], torch.Tensor]], optimiser: torch.optim.Optimizer, epoch: int, epochs: int, rate: float
 ) -> float:
-    """Train for pass ``epoch`` of ``epochs`` over the data; returns the mean loss.
-    losses : of `epoch_losses`; rate : of learning, at its highest"""
+    """Train for pass ``epoch`` of ``epochs`` over the data; return the mean loss. Raises TactileError unless it is
+    finite. losses : of `epoch_losses`; rate : of learning, at its highest"""
     total = 0.0
     for step, loss in enumerate(losses):
         total += take_step(optimiser, loss, (epoch * len(losses) + step + 1) / (epochs * len(losses)), rate)
@@ -239,7 +239,7 @@ def train_epoch(
 
 
 def validate(stage: Stage, model: Model, contacts: Contacts, seed: int, index: int) -> float:
-    """Compute, for the log, stage ``index``'s mean loss on validation presses, with equal noise to compare epochs."""
+    """Return stage ``index``'s mean loss on validation presses, for the log; equal noise makes epochs comparable."""
     rng = np.random.default_rng([seed, index, VALIDATION_SEED])
     generator = torch.Generator().manual_seed(seed)
     rows = contacts.with_silence(contacts.split.validation)

@@ -1,7 +1,7 @@
 """Train the network that separates the signals of two contacts, on sums of two simulated ones.
 
 Contacts far apart bend the skin independently, so the electrodes respond about as to the sum of both (the fluid, which
-both press, is neglected). A sum has no first and second: the error is that of the better order."""
+both press, is neglected). A sum has no first and second: the error counts in the order in which it is smaller."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SINGLES = 20_000  # contacts that determine the threshold for it
 
 @dataclass(frozen=True)
 class Presses:
-    """Simulated contacts: true changes signal (C, e) counts, place (C, 2) = (x, z) m on the gel, force (C,) N."""
+    """Simulated contacts: signal (C, e) counts, true changes; place (C, 2) = (x, z) m on the gel; force (C,) N."""
 
     signal: np.ndarray
     place: np.ndarray
@@ -43,9 +43,9 @@ def train_parts(
     presses: Presses, split: Split, options: Options, rest: np.ndarray, sensor: str, seed: int,
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Train on the split's training presses; returns tensors as `networks.py` names them.
+    """Train on the split's training presses; return the tensors by `networks.py`'s names. Equal arguments, equal
+    numbers.
     rest : (e,) counts of the unit that changes are from; sensor : whose electrodes, by name; seed : of what is drawn
-    The same arguments give the same numbers.
     progress : called now and then with the share done (0 to 1) and a line of text"""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)
@@ -67,8 +67,8 @@ def train_parts(
 
 
 def parts_sizes(electrodes: int) -> dict[str, int]:
-    """Return inputs, outputs, width, blocks of the `Residual` from ``network_input`` of so many electrodes to half the
-    difference of both parts' signals and the logit of there being two."""
+    """Return inputs, outputs, width, blocks of the `Residual` that maps ``network_input`` of so many electrodes to half
+    the difference of both parts' signals and the logit of there being two."""
     return {"inputs": 2 * electrodes, "outputs": electrodes + 1, "width": WIDTH, "blocks": BLOCKS}
 
 
@@ -89,7 +89,7 @@ def parts_loss(network: Residual, read: Tensor, first: Tensor, second: Tensor) -
 
 
 def _apart(parts: tuple[Tensor, Tensor], true: tuple[Tensor, Tensor]) -> Tensor:
-    """Return the squared error (B,) of both parts (B, e) from the true ones, fine scale, mean over electrodes."""
+    """Return the squared error (B,) of both parts (B, e) from the true ones, in asinh(counts / 3), mean over e."""
     fine = [torch.asinh(FINE * each / COUNT_SCALE) for each in (*parts, *true)]
     return ((fine[0] - fine[2]).square() + (fine[1] - fine[3]).square()).mean(-1)
 
@@ -98,8 +98,8 @@ def _drawn(
     presses: Presses, rows: np.ndarray, options: Options, rest: np.ndarray, image: np.ndarray,
     random: np.random.Generator,
 ) -> tuple[Tensor, Tensor, Tensor]:  # fmt: skip
-    """Draw a batch of contacts rows, half of it sums of two: the readings (B, e), and the true changes of both, counts.
-    rest : (e,) counts of the unit; image : (e,) int, the electrode that mirrors each"""
+    """Draw a batch of the contacts rows, half of it sums of two: return readings (B, e), and both contacts' true
+    changes (B, e), counts. rest : (e,) counts of the unit; image : (e,) int, the mirror image of each electrode"""
     first, second = random.choice(rows, (2, TRIES * BATCH // 2))
     apart = np.linalg.norm(presses.place[first] - presses.place[second], axis=1)
     ratio = presses.force[first] / presses.force[second]

@@ -1,4 +1,4 @@
-"""``tactile adapt``: rest, film, gains and stiffness of an unknown sensor, from its own recordings."""
+"""``tactile adapt``: fit rest, film, gains and stiffness of an unknown sensor to its own recordings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``tactile batch``: many recordings, in many processes or on many machines."""
+"""``tactile batch``: translate many recordings, in many processes or on many machines."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_cost(job: Job) -> None:
-    """Print what 1,000 frames of a job of translations hold and cost on one core; reads no input."""
+    """Print what 1,000 frames of a translation job take on one core, in time, memory and disk; reads no input."""
     from ...jobs import plan
     from ...jobs.engine.recipes import Translate
 
@@ -121,7 +121,7 @@ def _say_warnings(folder: Path) -> None:
 
 
 def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
-    """Return the next step after a job, or one part of it, that ended without a failure."""
+    """Return what to do next, in words, after a job or one part of it has ended without a failure."""
     from ...jobs.engine.recipes import Translate
 
     ours, name = isinstance(job.recipe, Translate), quote(str(folder))
@@ -132,7 +132,7 @@ def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
 
 
 def _job(folder: Path, options: argparse.Namespace) -> Job:
-    """Return the folder's job, or make one from the options. Raises TactileError where the two differ."""
+    """Return the folder's job, or make one from the options. Raises TactileError if they describe another job."""
     from ...jobs.engine import inputs
     from ...jobs.engine import job as jobs
 
@@ -160,7 +160,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 
 
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
-    """Return the recipe that the options describe, of these recordings."""
+    """Return the recipe by which the options translate the recordings of these paths."""
     from ...jobs import results, translate_shards
     from ...jobs.engine.recipes import SHARD_FRAMES, Prepare, Translate
     from ...recordings import electrode_gains

@@ -1,4 +1,4 @@
-"""``tactile calibrate``: a gel unit's camera, lights and colours, from photographs of a ball pressed into it."""
+"""``tactile calibrate``: fit a gel unit's camera, lights and colours to photographs of a ball pressed into it."""
 
 from __future__ import annotations
 
@@ -134,7 +134,8 @@ def _sheet_beside(out: str) -> Path:
 
 
 def _write_fit(out: str, done: Calibrated, apart: list[Evaluation]) -> int:
-    """Say what a fit found, and write it unless it explains nothing; apart : the held-out presses."""
+    """Print what a fit found, and write it unless it explains nothing (TactileError). apart : held-out presses'
+    evaluations"""
     from ...accuracy import HEADER, line
     from ...files import atomic
     from ...pictures.calibrate.checked_fit import check_worth
@@ -175,7 +176,7 @@ def _object(unit: Calibration, through: float) -> str:
 def _tell_test(
     options: argparse.Namespace, tried: list[Evaluation], photographs: Photographs, unit: Calibration
 ) -> int:
-    """Print the errors of a tested calibration, and write the files that the options ask for."""
+    """Print a tested calibration's errors, and write the files that the options ask for; returns the exit status."""
     from ...accuracy import HEADER, line
     from ...files import atomic
     from ...pictures.calibrate.evaluate import rows_of, sheet
@@ -199,7 +200,7 @@ def _tell_test(
 
 
 def _error(tried: list[Evaluation]) -> str:
-    """Describe the distance of pictures and photographs tried in the region of the press, beside the background's."""
+    """Describe in words the mean error of the pictures tried in the region of the press, and the background's."""
     from ...pictures.calibrate.evaluate import mean_metrics
 
     ours, baseline = (each["roi_l1"] for each in mean_metrics(tried))
@@ -207,5 +208,5 @@ def _error(tried: list[Evaluation]) -> str:
 
 
 def _way(mm: float, less: str, more: str) -> str:
-    """Describe a position along a direction: 1.2 mm left; less, more : words for below and above 0"""
+    """Return a coordinate, mm, in words: "1.2 mm left"; less, more : words for below and above 0"""
     return f"{abs(mm):.1f} mm {less if mm < 0 else more}"

@@ -76,14 +76,14 @@ UNIT = "--sensor", "--to", "--weights", "--calibration"
 
 
 def add(verb: argparse.ArgumentParser, *names: str, **words: str) -> None:
-    """Add shared options, ``names`` such as "--tare"; words : name -> the verb's words for the {name} in their help"""
+    """Add shared options ``names``, such as "--tare"; words : the verb's own words for each {name} in their help"""
     for name in names:
         option = OPTIONS[name]
         verb.add_argument(name, **option | {"help": option["help"].format_map({"among": "", **words})})
 
 
 def columns_of(options: argparse.Namespace) -> ColumnMap | None:
-    """Return the map of columns in the file that ``--columns`` names; None where it is not given."""
+    """Return the map of columns in the file that ``--columns`` names; None without this option."""
     if options.columns is None:
         return None
     from ...recordings.tables import column_map
@@ -98,7 +98,7 @@ def check_seed(seed: int) -> None:
 
 
 def prepare_words(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the fields of ``recordings.PrepareOptions`` from the arguments of a verb that prepares recordings."""
+    """Return the fields of ``recordings.PrepareOptions`` by name, from the options of a verb that prepares them."""
     return {
         "kind": options.kind,
         "tare": None if options.tare == "auto" else options.tare,

@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str], float | None]:
-    """Return the work on each recording, what translates and draws, the recordings, and --error in grey levels."""
+    """Return the conversions' options, their tools' options, the recordings' paths, and --error in grey levels."""
     from ...jobs import convert, results
     from ...jobs.error_budget import Budget, parse_budget
     from ...pictures import presets
@@ -152,7 +152,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
 
 
 def reverse(options: argparse.Namespace) -> int:
-    """Translate one gel's frames back for --reverse; returns the exit status."""
+    """Translate a gel's frames back to the BioTac, for --reverse; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import results
     from ...jobs.convert import reverse as translate_back

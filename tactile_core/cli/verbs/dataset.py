@@ -1,4 +1,4 @@
-"""``tactile dataset``: a public set of recordings to labelled DIGIT pictures with a card."""
+"""``tactile dataset``: convert a public set of recordings to labelled DIGIT pictures with a card."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """List, write a recipe, or convert; returns the exit status."""
+    """List the known sets, write a recipe, or convert a set; returns the exit status."""
     from ...jobs.dataset import recipe
 
     if options.new is not None:

@@ -1,4 +1,4 @@
-"""``tactile doctor``: what this machine can do, and how it could do more."""
+"""``tactile doctor``: tell what works on this machine, and how more would."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ except importlib.metadata.PackageNotFoundError: print(getattr(module, "__version
 
 @dataclasses.dataclass(frozen=True)
 class Library:
-    """Library to try. module : its name in Python; package : its name in the package index; use : what needs it
-    extra : extra of this package that installs it, "" if every installation has it"""
+    """A library that the toolkit may use. module : its name in Python; package : its name in the package index
+    use : what needs it; extra : extra of this package that installs it, "" if every installation has it"""
 
     module: str
     package: str
@@ -85,7 +85,7 @@ MISSING, BROKEN = "missing", "broken"  # in place of a version
 
 
 def report() -> Iterator[str]:
-    """Yield lines on this machine: versions, each library, and the variant of Mitsuba in use; raises nothing."""
+    """Yield lines on this machine: versions, each library, and the variant of Mitsuba in use. Never raises an error."""
     yield f"tactile {__version__}, Python {platform.python_version()}, {platform.platform()}, {os.cpu_count()} cores"
     found = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -97,7 +97,7 @@ def report() -> Iterator[str]:
 
 
 def try_library(library: Library) -> tuple[str, str]:
-    """Import a library; returns its version (or MISSING, BROKEN) and what is wrong, "" for nothing."""
+    """Import a library; return its version (or MISSING, BROKEN), and what is wrong or how to install it, else ""."""
     install = advice(library.extra) if library.extra else f"python -m pip install {library.package}"
     try:
         if importlib.util.find_spec(library.module) is None:
@@ -116,7 +116,7 @@ def try_library(library: Library) -> tuple[str, str]:
 
 
 def _mitsuba(works: bool) -> Iterator[str]:
-    """Yield the variant that is used, why, and how to get the faster one."""
+    """Yield lines on the variant of Mitsuba in use, why, and how to get the faster one; works : Mitsuba does"""
     if not works:
         yield "pictures: preset fast alone, which needs no Mitsuba"
         return

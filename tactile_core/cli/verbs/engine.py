@@ -21,7 +21,7 @@ ASSEMBLES = "the command that planned it, without --plan, which makes the result
 
 
 def place_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add ``--workers``, ``--cluster`` and ``--insecure``: where tasks are done."""
+    """Add ``--workers``, ``--cluster`` and ``--insecure``, which say where tasks run."""
     where = verb.add_mutually_exclusive_group()
     where.add_argument("--workers", type=int, metavar="N", help="processes on this machine; bytes stay the same")
     where.add_argument("--cluster", metavar="tcp://…|FILE.toml", help="a Dask scheduler, or a file that starts one")
@@ -45,7 +45,7 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raise TactileError for an option below 1, None excepted; names : attributes of options, whole numbers"""
+    """Raise TactileError for options below 1 (None is allowed); names : of whole-number attributes of options"""
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:
@@ -63,7 +63,7 @@ def part(text: str | None) -> tuple[int, int] | None:
 
 
 def place(folder: Path, options: argparse.Namespace) -> Place:
-    """Return the executor of the tasks of the job in `folder`: the cluster of the options, or else local workers."""
+    """Return where the job in `folder` runs its tasks: on the cluster of the options, or else in local workers."""
     if options.cluster is not None:
         from ...jobs.engine.dask_cluster import Cluster
 
@@ -74,7 +74,7 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
 
 
 def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
-    """Return a function from a job's folder to the executor that the options ask for, by default this process."""
+    """Return a function from a job's folder to where its tasks run by the options: by default, in this process."""
     if options.cluster is None and (options.workers or 1) == 1:
         from ...jobs.engine.local import InProcess
 
@@ -83,14 +83,14 @@ def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
 
 
 def tell_plan(planned: Path, folder: Path, after: str) -> None:
-    """Print the path of a plan, and how to run the parts of the job in `folder`; after : the command after those."""
+    """Print the path of a plan, and how to run the parts of the job in `folder`; after : what to run after the parts"""
     tell(str(planned))
     parts = f"tactile batch --out {quote(str(folder))} --array I/N"
     next_step(f"{parts}, for each I from 0 to N - 1, on any machines; then {after}")
 
 
 def plan_parts(out: str, job: Job) -> int:
-    """Write a job whose shards are merged into one result, and print how to make them; returns the exit status."""
+    """Write a job whose parts are merged into one result, and print how to run them; returns the exit status."""
     from ...jobs.engine import run as runs
 
     folder = runs.write(out, job)

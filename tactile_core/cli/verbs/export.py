@@ -1,4 +1,4 @@
-"""``tactile export``: a finished job in a layout that others read."""
+"""``tactile export``: write a finished job in a layout that other programs read."""
 
 from __future__ import annotations
 

@@ -90,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Refuse options that do not fit together, before any work."""
+    """Raise TactileError for options that do not fit together, before any work."""
     if options.frames and options.press:
         raise TactileError("--press", "given with --frames", "one of the two")
     if (options.frames is None) != (options.frame is None):

@@ -1,4 +1,4 @@
-"""``tactile pairs``: paired contacts of both sensors."""
+"""``tactile pairs``: simulate paired contacts of both sensors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``tactile render``: pictures by preset, from fast to physically based."""
+"""``tactile render``: draw pictures by a preset, from fast to physically based."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _run_in_parts(options: argparse.Namespace, asked: Options) -> int:
-    """Render in other processes, or write the plan of that."""
+    """Render in other processes, or only write the plan for that; returns the exit status."""
     from ...jobs.render_shards import plan, render_in_parts
 
     if options.plan:
@@ -126,7 +126,7 @@ def _done(folder: Path) -> int:
 
 
 def _calibration(file: str | None, gel: str | None) -> str | None:
-    """Return the calibration's file: the given one, checked for a named gel; else that gel's shipped one, or None."""
+    """Return the given calibration's path, checked for a named gel; without one that gel's shipped one, or None."""
     if gel is None:
         return file
     from ...sensors.calibration_file import calibration_path, load_calibration

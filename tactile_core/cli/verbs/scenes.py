@@ -1,4 +1,4 @@
-"""``tactile scenes``: the example scenes that ship, copied to where the pages' examples look for them."""
+"""``tactile scenes``: copy the example scenes that ship to where the pages' examples look for them."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _following(copied: list[Path]) -> str:
-    """Return a command that tries what was copied: a recording, or else a scene; "" for neither."""
+    """Return a command that tries what was copied: a recording, or else a scene; "" if it was neither."""
     for recording in (folder / f"{folder.name}.h5" for folder in copied):
         if recording.is_file():
             return f"tactile convert {quote(str(recording))} --out results"

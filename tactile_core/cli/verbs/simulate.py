@@ -92,7 +92,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _keep(text: str | None) -> tuple[str, ...]:
-    """Return names of ``scene_recording.outputs``; ``traction`` means both sensors'. Raises TactileError for others."""
+    """Parse --keep: return names of ``scene_recording.outputs``; ``traction`` stands for both sensors'. Raises
+    TactileError for other words."""
     from ...jobs import results
     from ...sensors import PAIR
     from ...simulation.scene_recording import DEFAULT, outputs
@@ -107,7 +108,7 @@ def _keep(text: str | None) -> tuple[str, ...]:
 
 
 def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mapping[str, TierChoice], Plan]:
-    """Choose the cheapest tiers within the bound of --error, or the fast one without it, and plan the simulation."""
+    """Return the cheapest tier for each sensor within the bound of --error (without it the fast one), and the plan."""
     from ...jobs.error_budget import parse_budget
     from ...jobs.plan import of_scene
     from ...simulation.scene_recording import sensors_of
@@ -119,7 +120,7 @@ def _planned(options: argparse.Namespace, keep: tuple[str, ...]) -> tuple[Mappin
 
 
 def _tiers(options: argparse.Namespace, keep: tuple[str, ...]) -> dict[str, Tier]:
-    """Return the tiers within the bound, and say why. Raises TactileError for a long simulation without consent."""
+    """Return the tier of each sensor, and say why. Raises TactileError for a long simulation without consent."""
     choices, cost = _planned(options, keep)
     for sensor, choice in choices.items():
         say(choice.describe(sensor))

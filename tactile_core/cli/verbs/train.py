@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _say_error(card: dict) -> None:
-    """Print the error of the weights on held-out presses, and a warning where it is hardly below the baseline."""
+    """Print the weights' error on held-out presses, and a warning if it is hardly below the baseline."""
     from ...translation.card import chain_error, doubt
 
     found = chain_error(card)
@@ -112,5 +112,5 @@ def _fine_tune(options: argparse.Namespace) -> int:
 
 
 def _convert(out: str) -> str:
-    """Return the command that converts with the weights of a training."""
+    """Return the command that converts a recording with the weights of the training in the folder ``out``."""
     return f"tactile convert touch.csv --out results --weights {quote(os.path.join(out, 'weights'))}"

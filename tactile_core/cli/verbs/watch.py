@@ -1,4 +1,4 @@
-"""``tactile watch``: a live view of a recording that is being made, or is played again."""
+"""``tactile watch``: show a recording live while it is being made, or is played again."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def _check_out(path: str) -> None:
 
 
 def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStack) -> list[Output]:
-    """List the outputs of frames: file and port, or without either a window. ``opened`` closes the port."""
+    """Return the outputs of frames: file and port, or a window if neither is asked for. ``opened`` closes the port."""
     outputs: list[Output] = []
     if options.serve is not None:
         from ...jobs.live import FrameServer
@@ -166,7 +166,8 @@ def _outputs(options: argparse.Namespace, path: str, opened: contextlib.ExitStac
 
 
 def _drawn(draw: Callable[[np.ndarray], bool]) -> Output:
-    """Return an output that draws a frame's pictures side by side; draw : takes (H, W, 3) uint8, false once closed"""
+    """Return an output that draws a frame's pictures side by side. draw : takes (H, W, 3) uint8, returns false once
+    closed"""
     import numpy as np
 
     return lambda shown, seen: draw(np.concatenate(list(seen.values()), axis=1))
@@ -186,8 +187,8 @@ def _file(path: str) -> Callable[[np.ndarray], bool]:
 
 
 def _window(title: str) -> Callable[[np.ndarray], bool]:
-    """Return a function that shows a picture (H, W, 3), False once the window is closed. TactileError without a
-    display."""
+    """Return a function that shows a picture (H, W, 3) and returns False once the window is closed. Raises TactileError
+    without a display."""
     from matplotlib import pyplot
 
     if pyplot.get_backend().lower() == "agg":
