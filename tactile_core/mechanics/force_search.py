@@ -1,4 +1,4 @@
-"""Search the depth at which a contact bears a given force."""
+"""Search for the depth at which a contact bears a given force."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LEAST_SHARE = 1e-3  # of the interval between two depths: the smallest step of 
 
 
 class UnreachableError(TactileError):
-    """Error for a depth beyond the limit, or a force that no depth within the limit gives."""
+    """Error for a depth beyond the limit, or for a force that no depth up to the limit gives."""
 
 
 _Found = TypeVar("_Found", bound=Any)  # a contact at a ``depth``, m, under a ``force`` (3,) N
@@ -37,13 +37,13 @@ def touch_at_force(
     guess: float | None = None,
     slid_to: float | None = None,
 ) -> _Found:
-    """Find the contact whose force along ``direction`` (3,), a unit vector, is ``force``, N, to a thousandth, by
-    secants of F^(2/3) and by bisection.
-    move : function of a depth, m, and a solved contact that solves the one at that depth, going on from the other
+    """Find the contact whose force along the unit vector ``direction`` (3,) is ``force``, N, to a thousandth, by
+    secants of F^(2/3) and bisection.
+    move : function of a depth, m, and a solved contact to start from; solves the contact at that depth
     last : the contact to begin from
     limit : m, greatest depth; guess : m, a depth near the one sought (None: an eighth of the limit)
-    slid_to : m, depth of first touch here; given if the indenter has slid since ``last``, else None
-    Raises TactileError, beginning with ``where``, if 30 steps find no depth; UnreachableError beyond the limit."""
+    slid_to : m, depth of first touch here if the indenter has slid since ``last``, else None
+    Raises TactileError, which begins with ``where``, if 30 steps find no depth; UnreachableError beyond the limit."""
     goal, before = _root(force), last
     low, high = (before.depth, _root(before.force @ direction)) if slid_to is None else (slid_to, 0.0), None
     lets_go = low[1] > goal  # the last contact bears more: go back toward first touch
@@ -67,22 +67,22 @@ def touch_at_force(
 
 
 def unreachable(where: str, force: float, limit: float) -> UnreachableError:
-    """Return the error for a force, N, that no depth within the limit, m, gives; ``where`` begins its text."""
+    """Return the error for a force, N, that no depth up to the limit, m, gives; ``where`` begins its text."""
     expected = f"a force that is found within {limit * 1e3:.2f} mm, {DEPTH_LIMIT:.0%} of the thickness here"
     return UnreachableError(where, f"force {force:g} N", expected, "Press less, or to a depth")
 
 
 def _root(force: float) -> float:
-    """Return force^(2/3), force in N, 0 for a negative one, which is nearly linear in depth (Hertz)."""
+    """Return force^(2/3), which is nearly linear in depth (Hertz); force : N, of a negative one 0"""
     return max(float(force), 0.0) ** (2 / 3)
 
 
 def _next_depth(
     low: tuple[float, float], high: tuple[float, float] | None, goal: float, limit: float, *, halve: bool = False
 ) -> float:
-    """Return the depth, m, to try next for F^(2/3) = goal, from two known pairs (depth, F^(2/3)): ``low`` below the
-    goal, and ``high`` above it, None if none is known yet.
-    limit : m, greatest depth, a quarter of which is the longest step up; halve : bisect instead of the secant's step"""
+    """Return the depth, m, to try next for F^(2/3) = goal, from known pairs (depth, F^(2/3)): ``low`` below the goal,
+    and ``high`` above it or None.
+    limit : m, greatest depth, a quarter of which is the longest step up; halve : true to bisect, not by secant"""
     if high is None:
         slope = low[1] / low[0] if low[0] else 0.0
         return low[0] + min((goal - low[1]) / slope if slope else np.inf, limit / 4)

@@ -15,8 +15,8 @@ _GAUSS = np.sqrt(0.6) * np.array([-1.0, 0, 1]), np.array([5.0, 8, 5]) / 9
 @functools.cache
 def node_areas(sensor: str) -> np.ndarray:
     """Return the area (n,) m2 of each resting surface node of a sensor: the integral of its shape function.
-    Faces are quadratic: an even pressure loads corners, edges and middles as 1 : 4 : 16; divided by these areas, which
-    have the same ratios, the nodal forces give the even pressure back. The array is shared and read-only."""
+    Faces are quadratic: an even pressure loads corners, edges and middles as 1 : 4 : 16. The areas have the same
+    ratios, so that nodal forces divided by them give the even pressure back. The array is shared and read-only."""
     mesh = solid_mesh(sensor)
     faces, areas = outer_faces(mesh), np.zeros(len(mesh.nodes))
     corners = mesh.nodes[faces].reshape(-1, 3, 3, 3)  # face, b along eta, a along xi, axis

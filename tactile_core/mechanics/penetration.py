@@ -29,17 +29,17 @@ _BETWEEN = np.stack(np.meshgrid([-0.5, 0.0, 0.5], [-0.5, 0.0, 0.5], indexing="ij
 
 
 class PenetrationError(TactileError):
-    """A body has passed between a surface's nodes; a finer surface may hold it."""
+    """Error for a body that has passed between a surface's nodes; a finer surface may hold it."""
 
 
 def penetration_between(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, *, closed: bool, share: float = _SHARE
 ) -> float:
     """Return the largest penetration, m, of an indenter through a surface ``grid`` (rows, columns, 3) m, at nodes and
-    halfway between; 0 if it reaches neither.
+    halfway between them; 0 if it reaches none of these.
 
     closed : true if the grid's last column joins the first; where : begins the error's text
-    Raises PenetrationError for one over 0.1 mm and over ``share`` of the indenter's ``depth``, m from first touch."""
+    Raises PenetrationError if it is over 0.1 mm and over ``share`` of the indenter's ``depth``, m from first touch."""
     columns = grid.shape[1]
     gap, _ = pose.distance(indenter, grid.reshape(-1, 3))
     near = np.array(np.divmod(np.flatnonzero(gap < _CLOSE), columns), float)
@@ -55,8 +55,8 @@ def penetration_between(
 
 
 def penetration(grid: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> float:
-    """Return the depth, m, of an indenter's foremost point under a surface ``grid`` (rows, columns, 3) m, negative
-    outside it; 0 if no node is near that point's line, or it is not of the body (the middle of a ring).
+    """Return how far, m, an indenter's foremost point lies under a surface ``grid`` (rows, columns, 3) m, negative
+    above it; 0 if no node is near that point's path, or the point is not on the body (the middle of a ring).
     closed : true if the grid's last column joins the first"""
     foremost = pose.support(indenter, pose.direction)
     met = None
@@ -69,11 +69,10 @@ def check_follows(
     where: str, grid: np.ndarray, indenter: Indenter, pose: Pose, depth: float, normals: np.ndarray, *,
     closed: bool, behind: float = BEHIND,
 ) -> None:  # fmt: skip
-    """Raise PenetrationError where an indenter, ``depth`` m beyond first touch, has passed in between a surface's
-    nodes.
+    """Raise PenetrationError if an indenter, ``depth`` m beyond first touch, has passed between a surface's nodes.
     where : begins the error's text; grid : (rows, columns, 3) m, the nodes; closed : true if its last column joins the
         first
-    normals : (k, 3), outward, of the indenter at the k nodes that carry force; of none where a body has passed them all
+    normals : (k, 3), outward, of the indenter at the k nodes that carry force; k is 0 if a body has passed them all
     behind : least allowed cosine between those normals and the motion; lower ones lie on the indenter's back"""
     if (normals @ pose.direction).min(initial=1.0) < behind:
         found = "the indenter has sunk in between the surface's nodes: some lie on its back"
@@ -105,7 +104,7 @@ _NEAR = 0.5e-3  # m, from the indenter to points whose curvature counts
 
 def sharpest(indenter: Indenter, pose: Pose, points: np.ndarray) -> float:
     """Return an indenter's least radius of curvature, m, at its tip and at those of ``points`` (n, 3) m that lie within
-    0.5 mm outside it; 10 um at least, infinity where none is so near."""
+    0.5 mm outside it; at least 10 um, and infinity if none is so near."""
     points = np.concatenate([points, pose.support(indenter, pose.direction)[None]])  # no node may be near a blade's
     gap, _ = pose.distance(indenter, points)
     near = (gap > -_LEAST_RADIUS) & (gap < _NEAR)

@@ -1,6 +1,6 @@
-"""Place an indenter at the same unrolled place and angle on both sensors; find first touch, and poses between poses.
+"""Place an indenter at the same unrolled place and angle on both sensors; find its first touch, and poses on a way.
 
-Depth counts from first touch; in per cent it is of the sensor's thickness there.
+Depth counts from first touch; per cent of depth are of the sensor's thickness there.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def same_place(first: Pose, second: Pose) -> bool:
 
 
 def same_line(first: Pose, second: Pose) -> bool:
-    """Return true if two poses have the same axes and differ along their direction of motion alone."""
+    """Return true if two poses have the same axes and places that differ along their direction of motion alone."""
     apart = second.apex - first.apex
     sideways = apart - (apart @ first.direction) * first.direction
     return bool(np.abs(sideways).max() < _SAME and np.array_equal(first.axes, second.axes))
@@ -102,8 +102,8 @@ def first_touch(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
 
 
 def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pose:
-    """Find first touch of an indenter that comes from outside along the direction of ``pose``, which may stand anywhere
-    on that line.
+    """Find first touch of an indenter that comes from outside along the direction of ``pose``, from anywhere on that
+    line.
     Raises TactileError if it passes the sensor by."""
     before = float((lattice.rest @ pose.direction).min() - pose.support(indenter, pose.direction) @ pose.direction)
     return first_touch(lattice, indenter, pose.moved(before))  # from just in front the search is short
@@ -112,7 +112,7 @@ def first_touch_on_line(lattice: Lattice, indenter: Indenter, pose: Pose) -> Pos
 def in_front(axes: np.ndarray, indenter: Indenter, pose: Pose, *, closed: bool) -> tuple[np.ndarray, np.ndarray] | None:
     """Find where the line on which an indenter's foremost point moves meets a surface, on the side met first.
     axes : (3, rows, columns) m, x, y, z of the surface's nodes; closed : true if its last column joins the first
-    Returns the place (1, 2), fractional row and column, and the point (1, 3) m; None with no node within 1 mm."""
+    Returns the place (1, 2), fractional row and column, and the point (1, 3) m; None if no node is within 1 mm."""
     foremost = pose.support(indenter, pose.direction)
     along, beside = _off_line(axes.reshape(3, -1).T, foremost, pose.direction)
     near = beside < _BESIDE
@@ -138,8 +138,8 @@ def _off_line(points: np.ndarray, start: np.ndarray, direction: np.ndarray) -> t
 
 
 def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose) -> tuple[Pose, np.ndarray]:
-    """Find the pose at first touch of the lattice's nodes or of ``more`` points (j, 3) m, and the numbers of at most 12
-    that are close then, nearest first; ``more`` are numbered from the lattice's last node on."""
+    """Find the pose at first touch of the lattice's nodes and of ``more`` points (j, 3) m. Also return the numbers of
+    at most 12 of them that are close then, nearest first; ``more`` are numbered after the lattice's nodes."""
     rest = np.concatenate([lattice.rest, more]) if len(more) else lattice.rest
     for clear in _CLEAR:
         away, reach = pose.moved(-clear), 2 * clear
@@ -172,8 +172,8 @@ def _on_nodes(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose
 
 
 def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, reach: float) -> tuple:
-    """Return nodes (k,) less than ``reach`` m outside an indenter, and their distances (k,) m. Points ``more`` (p, 3) m
-    follow, near or not, numbered from the lattice's last node on."""
+    """Return nodes (k,) less than ``reach`` m outside an indenter, and their distances (k,) m. All points ``more`` (p,
+    3) m follow, near or not, numbered after the lattice's nodes."""
     nodes, gap = lattice.blocks.near(indenter, pose, reach)
     if len(more):
         nodes = np.concatenate([nodes, len(lattice.rest) + np.arange(len(more))])
@@ -182,9 +182,8 @@ def _near(lattice: Lattice, more: np.ndarray, indenter: Indenter, pose: Pose, re
 
 
 def _advance(indenter: Indenter, pose: Pose, points: np.ndarray) -> Pose:
-    """Move an indenter until it touches the first of the points (n, 3) m; by ``_FARTHEST`` at most, if it slides past
-    them all.
-    Newton's steps never overshoot a convex part; where one overshoots another part, the negative distance leads back.
+    """Move an indenter until it touches the first of the points (n, 3) m; if it slides past them all, by ``_FARTHEST``.
+    Newton's steps never overshoot a convex part; if one overshoots another part, the negative distance leads back.
     """
     own, travel, left = pose.to_own(points), 0.0, _FARTHEST
     ahead = pose.own_direction  # in its frame points come the other way
@@ -216,10 +215,10 @@ def friction_of(value: float, where: str) -> float:
 class Placement:
     """Place and angle of an indenter, the same for both sensors.
 
-    x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto them
+    x, z : m on the DIGIT's plane, along the finger and across it; on the BioTac, the place that unrolls onto (x, z)
     tilt : rad, between the indenter's axis and the surface normal; at most 0.8 either way
-    tilt_heading : rad, the way the indenter's upper end leans: 0 toward +x, pi / 2 toward -z
-    Raises TactileError for a larger tilt.
+    tilt_heading : rad, direction in which the indenter's upper end leans: 0 toward +x, pi / 2 toward -z
+    Raises TactileError for a larger tilt, and for numbers that are not finite.
 
     >>> tactile.Placement(x=2e-3, z=0.0, tilt=0.1)
     """
@@ -239,8 +238,8 @@ class Placement:
 
 
 def pose_at(sensor: str, indenter: Indenter, place: Placement) -> Pose:
-    """Find the pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z) of a
-    gel. The indenter's tilt is from the surface normal there."""
+    """Find the pose at first touch: on a gel at (x, z), on a skin at the place of its pad that unrolls onto (x, z). The
+    indenter's tilt is from the surface normal there."""
     point, outward = sensors.surface_point(sensor, place.x, place.z)
     pose = pose_on(indenter, point, outward, place.tilt, place.tilt_heading)
     return first_touch(sensors.sensor_surface(sensor), indenter, pose)

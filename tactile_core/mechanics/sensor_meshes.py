@@ -1,4 +1,4 @@
-"""Meshes of the two sensors for other tools: at rest, deformed, or with the solution of a contact."""
+"""Write meshes of the two sensors for other tools: at rest, deformed, or with the solution of a contact."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _VTK_NAMES = {"float32": "Float32", "float64": "Float64", "int32": "Int32", "int
 
 
 def vtk_order() -> np.ndarray:
-    """Return the node (27,) of a ``HexMesh`` cell, a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
+    """Return the node (27,) of a ``HexMesh`` cell, as a + 3 b + 9 c, at each place of VTK's triquadratic hexahedron.
     VTK counts corners, edges (of the bottom, of the top, then the upright ones), faces -x +x -y +y -z +z and the
     middle; bottom corners before top ones: Schroeder, Martin, Lorensen, The Visualization Toolkit,
     vtkTriQuadraticHexahedron."""
@@ -41,9 +41,9 @@ def vtk_order() -> np.ndarray:
 def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data | None = None) -> None:
     """Write a surface with outward unit normals, binary PLY: float32 x y z nx ny nz, then ``columns``.
 
-    nodes : (n, 3) m; faces : (m, 3) int, normals outward
+    nodes : (n, 3) m; faces : (m, 3) int, triangles, normals outward
     columns : values (n,) or (n, 3) by name, written as float32; a vector ``force`` becomes force_x force_y force_z
-    Raises TactileError for values of another length or not finite, and where the file cannot be written.
+    Raises TactileError for values of another length or not finite, and if the file cannot be written.
     """
     vertex = {"": nodes, "n": node_normals(nodes, faces)} | dict(columns or {})
     fields = {}
@@ -64,8 +64,8 @@ def write_ply(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, col
 
 
 def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> None:
-    """Write a surface, binary STL: triangles ``faces`` (m, 3) int, outward, of nodes (n, 3), m, and unit normals,
-    float32.
+    """Write a surface as binary STL: triangles and their unit normals, float32.
+    nodes : (n, 3) m; faces : (m, 3) int, outward
     Raises what ``write_ply`` raises."""
     corners = _checked(path, "nodes", nodes, len(nodes))[faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -78,13 +78,12 @@ def write_stl(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray) -> 
 def write_vtu(
     path: str | os.PathLike, mesh: HexMesh, solid: FiniteStrainSolid | None = None, state: State | None = None
 ) -> None:
-    """Write a volume of triquadratic hexahedra, at rest or with a solved ``state`` of its ``solid`` (give both or
-    none).
+    """Write a volume of triquadratic hexahedra at rest or, given both ``solid`` and ``state``, as solved.
     Points have ``clamped`` (0 or 1) and, if solved, ``displacement`` m (in ParaView: Warp By Vector), ``force`` N that
-    the outside exerts on each node (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and that
-    stress's ``von_mises`` Pa, see ``stress.at_nodes``; cells have ``von_mises``, mean over the cell's volume, and
-    ``pressure`` Pa at the cell's middle, compression positive.
-    Raises what ``write_ply`` raises, and FloatingPointError for a state that is turned inside out."""
+    the outside exerts on each node (contact, fluid, support), ``stress`` Pa (Cauchy, xx yy zz xy yz xz) and its
+    ``von_mises`` Pa, smoothed by ``stress.at_nodes``. Cells have ``von_mises``, mean over their volume, and
+    ``pressure`` Pa in their middle, compression positive.
+    Raises what ``write_ply`` raises, and FloatingPointError for a state with a cell turned inside out."""
     point_data: Data = {"clamped": mesh.clamped.astype(np.uint8)}
     cell_data: Data = {}
     if solid is not None and state is not None:
@@ -94,7 +93,7 @@ def write_vtu(
 
 
 def solid_data(solid: FiniteStrainSolid, state: State) -> tuple[Data, Data]:
-    """Return data of a solved state: at points displacement, force, stress, von_mises; of cells von_mises, pressure."""
+    """Return data of a solved state: at points displacement, force, stress, von_mises; in cells von_mises, pressure."""
     cauchy = stress.cauchy(solid, state)
     at_nodes = stress.at_nodes(solid, cauchy)
     six = [at_nodes[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))]
@@ -137,8 +136,7 @@ def write_cells(
 
 
 def _array(name: str, values: np.ndarray) -> str:
-    """Format values (n,) or (n, k) as one DataArray; VTK wants their number of bytes before them, in the same
-    base64."""
+    """Format values (n,) or (n, k) as one DataArray: base64 of their number of bytes and themselves, as VTK wants."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     text = base64.b64encode(struct.pack("<Q", len(little)) + little).decode()
     width = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
@@ -146,7 +144,7 @@ def _array(name: str, values: np.ndarray) -> str:
 
 
 def _checked(path: str | os.PathLike, name: str, values: np.ndarray, count: int) -> np.ndarray:
-    """Check ``count`` rows of values (count, ...) to be written; return them, floats but for nodes as float32."""
+    """Return values (count, ...) to write, floats but for nodes as float32; TactileError for other shapes or NaN."""
     values = np.asarray(values)
     if len(values) != count or values.ndim > 2:
         raise TactileError(path, f"{name} of shape {values.shape}", f"{count} rows")
@@ -166,13 +164,13 @@ SUFFIXES = (".ply", ".stl", ".vtu")
 
 
 def check_suffix(path: str | os.PathLike) -> None:
-    """Raise TactileError for a file name that ends in none of .ply, .stl and .vtu, in capitals or not."""
+    """Raise TactileError unless a file name ends in .ply, .stl or .vtu, in capitals or not."""
     if Path(path).suffix.lower() not in SUFFIXES:
         raise TactileError(path, f"the ending {Path(path).suffix!r}", " or ".join(SUFFIXES), "It chooses the format")
 
 
 def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
-    """Write the resting sensor: ``.vtu`` its volume, ``.ply`` and ``.stl`` its surface. Raises as the writers do."""
+    """Write the resting sensor: its volume to ``.vtu``, its surface to ``.ply`` or ``.stl``. Raises what writers do."""
     check_suffix(path)
     if Path(path).suffix.lower() == ".vtu":
         write_vtu(path, solid_mesh(sensor))
@@ -183,8 +181,8 @@ def write_rest(path: str | os.PathLike, sensor: Sensor) -> None:
 def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) -> None:
     """Write a solved contact on a sensor, in the format that the ending of ``path`` says.
 
-    Of a tier that solves the volume: ``.vtu`` that volume, ``.ply`` and ``.stl`` its surface at its own nodes, with the
-    force on each (N) and its von Mises stress (Pa). Of the fast tier the deformed surface, ``contact`` 1 where touched.
+    A tier that solves the volume: ``.vtu`` that volume; ``.ply`` and ``.stl`` its surface at its own nodes, with the
+    force on each (N) and its von Mises stress (Pa). The fast tier: the deformed surface, ``contact`` 1 where touched.
     Raises what the writers raise."""
     check_suffix(path)
     if solution.volume is None:
@@ -202,8 +200,8 @@ def write_solution(path: str | os.PathLike, sensor: Sensor, solution: Solution) 
 
 
 def outer_surface(mesh: HexMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the touchable side's mesh nodes (n,), ascending, and triangles (m, 3) of positions in that list, outward:
-    eight per quadratic face, fewer where an edge is one node."""
+    """Return the mesh nodes (n,) of the side that is touched, ascending, and outward triangles (m, 3) of positions in
+    that list: eight per quadratic face, fewer if one of its edges is a single node."""
     faces = outer_faces(mesh).reshape(-1, 3, 3)
     quads = [faces[:, i : i + 2, j : j + 2].reshape(-1, 4) for i in (0, 1) for j in (0, 1)]
     a, b, d, c = np.concatenate(quads).T
@@ -218,8 +216,8 @@ def write_surface(
 ) -> None:
     """Write a sensor's surface moved by ``displacement`` (n, 3) m, in the format that the ending of ``path`` says, with
     that displacement and ``columns``, (n,) or (n, 3) by name.
-    PLY and STL hold the deformed places; VTU the resting ones and the displacement beside them, as VTK's own tools
-    expect it. STL has no room for columns. Raises what the writers raise."""
+    PLY and STL hold deformed places; VTU holds the resting ones and the displacement beside them, as VTK's tools
+    expect. STL has no room for columns. Raises what the writers raise."""
     check_suffix(path)
     lattice = sensor_surface(sensor)
     columns = {"displacement": displacement, **columns}
@@ -230,7 +228,7 @@ def write_surface(
 
 
 def _write_triangles(path: str | os.PathLike, nodes: np.ndarray, faces: np.ndarray, columns: Data) -> None:
-    """Write a surface, nodes, faces, columns as in ``write_ply``, as PLY, or as STL, which has no room for columns."""
+    """Write a surface of nodes, faces, columns as in ``write_ply``: as PLY or, without columns, as STL, by ``path``."""
     if Path(path).suffix.lower() == ".stl":
         write_stl(path, nodes, faces)
     else:

@@ -1,4 +1,4 @@
-"""Find the contact behind a displaced surface: the traction on it, and the body that is pressed into it.
+"""Find the contact that has displaced a surface: the traction on it, and the body that is pressed into it.
 
 In the patch displacements are known and tractions are not; elsewhere the traction is zero. The sensor's linear
 compliance among the patch's nodes is inverted, regularised by a soft layer against noise of single nodes; nodes that
@@ -7,7 +7,7 @@ would pull are released.
 The body is found by mechanics alone, so also on parts of the pad that no network was trained on. The node of a skin
 that is displaced most was touched first and sticks: it has moved as the body has, which gives depth and lean. Each
 candidate body is pressed into the skin in this way, and moved until its load is centred where the skin's is. The one
-with the most similar dent is taken, with its force.
+whose dent is most similar is returned, with its force.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _LAYER = 1e-3
 def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) -> np.ndarray:
     """Return the traction (n, 3) Pa on a resting surface under displacement (n, 3) m, touched in ``patch`` (n,) bool.
 
-    Nodes of the patch that cannot be touched, or would pull, carry none. Linear elasticity of a gel, or of a
-    BioTac's skin with its fluid, without the core."""
+    Nodes of the patch that cannot be touched, or would pull, carry none. Linear elasticity of a gel, or of a BioTac's
+    skin with its fluid, without the core."""
     compliance, areas = compliance_of(sensor), node_areas(sensor)
     outward = sensors.rest_normals(sensor)
     nodes = np.flatnonzero(patch[compliance.touchable])
@@ -57,7 +57,7 @@ def pressing_traction(sensor: str, displacement: np.ndarray, patch: np.ndarray) 
 
 
 def _solved(sensor: str, block: np.ndarray, areas: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-    """Return the traction (k, 3) Pa of nodes with areas (k,) m2 under displacement (k, 3) m.
+    """Return the traction (k, 3) Pa on nodes with areas (k,) m2 under displacement (k, 3) m.
 
     block : (3 k, 3 k) m/N. Scaled by the areas' square roots, the system is symmetric and the layer uniform."""
     material, thickness = sensors.describe(sensor).material, sensors.thickness(sensor)
@@ -75,7 +75,7 @@ USUAL_RADIUS = 4e-3  # m, the median of translated patches of the test contacts
 
 @dataclass(frozen=True)
 class BodyContact:
-    """A body pressed into a sensor. body : its shape; place : where, and how it leans; force : N, along its motion"""
+    """A body pressed into a sensor. body : its shape; place : its place and lean; force : N, along its motion"""
 
     body: Indenter
     place: Placement
@@ -90,8 +90,8 @@ class BodyContact:
 
 
 def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Placement:
-    """Return the placement at ``x``, ``z``, m, of a press along ``motion`` (3,), of any length, into a surface of
-    outward unit normal ``outward`` (3,); its tilt is cut to 0.8 rad."""
+    """Return the placement at ``x``, ``z``, m, of a press along the vector ``motion`` (3,), of any length, into a
+    surface with outward unit normal ``outward`` (3,); its tilt is cut to 0.8 rad."""
     along, side = tangents(outward)
     up = -motion / np.linalg.norm(motion)
     tilt = float(np.arccos(np.clip(up @ outward, -1, 1)))
@@ -100,9 +100,9 @@ def leaning(x: float, z: float, motion: np.ndarray, outward: np.ndarray) -> Plac
 
 
 def patch_radius(points: np.ndarray, outward: np.ndarray) -> float:
-    """Radius, m, of the ball whose paraboloid fits a pressed patch best, 1.5 to 14 mm; 4 mm for a patch of less
-    than 5 nodes.
-    points : (k, 3) m of its nodes, displaced; outward : (3,), normal of the patch"""
+    """Return the radius, m, of the ball whose paraboloid fits a pressed patch best, 1.5 to 14 mm; 4 mm for under 5
+    nodes.
+    points : (k, 3) m, the patch's nodes, displaced; outward : (3,), normal of the patch"""
     if len(points) < LEAST_NODES:
         return USUAL_RADIUS
     height = outward / np.linalg.norm(outward)
@@ -127,7 +127,7 @@ MOVES = 2  # of each body toward the load's centre: its own is then within .07 m
 
 @dataclass(frozen=True)
 class _Dent:
-    """Dented skin: displacement (n, 3) m, its inward part (n,) m, pressure (n,) Pa, centre (2,) m of its load."""
+    """Dent of a skin: displacement (n, 3) m, its inward part (n,) m, pressure (n,) Pa, centre (2,) m of its load."""
 
     displacement: np.ndarray
     inward: np.ndarray
@@ -142,7 +142,7 @@ class _Dent:
 
 @dataclass(frozen=True)
 class _Trial:
-    """A body pressed into the skin at ``aim`` (x, z) m, its dent, and how unlike the one sought that is, 0 to 1."""
+    """A body pressed into the skin at ``aim`` (x, z) m, its dent, and how ``unlike`` that is the one sought, 0 to 1."""
 
     contact: BodyContact
     aim: np.ndarray
@@ -151,7 +151,7 @@ class _Trial:
 
 
 def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> BodyContact:
-    """Find the body pressed into a BioTac's skin: the most likely of `likely_contacts`, whose errors hold.
+    """Find the body pressed into a BioTac's skin: the most likely of `likely_contacts`, which raises TactileError.
     displacement : (3650, 3) m of the skin's nodes; bodies : shapes that it may be, beside a ball of any size
     >>> contact = skin_contact(displacement, [tactile.indenters.Sphere(2e-3)])
     >>> gel = contact.on_gel().displacement
@@ -162,11 +162,11 @@ def skin_contact(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> B
 def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -> list[BodyContact]:
     """Find how each of the bodies would be pressed into a BioTac's skin, by the fast tier; the most likely first.
 
-    displacement : (3650, 3) m of the skin
+    displacement : (3650, 3) m of the skin's nodes
     bodies : what may be pressed into it beside a ball, whose radius is found; each takes 20 to 30 ms of CPU, and one
         that cannot be pressed as deep is left out
 
-    Raises TactileError where nothing is pressed on the pad, and where no body can be pressed as deep.
+    Raises TactileError if nothing is pressed on the pad, and if no body can be pressed as deep.
     """
     dent = _dent(displacement)
     trials = [each for body in (*bodies, _ball(dent)) if (each := _trial(dent, body, dent.centre))]
@@ -179,8 +179,8 @@ def likely_contacts(displacement: np.ndarray, bodies: Iterable[Indenter] = ()) -
 
 
 def _dent(displacement: np.ndarray) -> _Dent:
-    """Describe the dent of a skin under displacement (n, 3) m. Raises TactileError where nothing presses on the pad,
-    and for another shape, sign, or values that are not finite."""
+    """Describe the dent of a skin under displacement (n, 3) m. Raises TactileError if nothing presses on the pad, and
+    for another shape, the wrong sign, or values that are not finite."""
     displacement, outward = numbers(displacement, "skin's displacement"), sensors.rest_normals(SENSOR)
     if (other := displacement.shape != outward.shape) or not np.isfinite(displacement).all():
         found = f"shape {displacement.shape}" if other else "values that are not finite"
@@ -207,8 +207,8 @@ def _ball(dent: _Dent) -> Sphere:
 
 
 def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
-    """Press a body at ``aim`` (x, z) m as deep and as leaning as the dent's deepest node has moved, which sticks to it;
-    None if that is impossible, or touches no node."""
+    """Press a body at ``aim`` (x, z) m, as deep and leaning as the dent's deepest node has moved, which sticks to it;
+    return None if that is impossible, or touches no node."""
     place = leaning(float(aim[0]), float(aim[1]), dent.motion, roll_up(aim, SENSOR)[1])
     try:
         solution = solve(SENSOR, body, place, depth=float(np.linalg.norm(dent.motion)))
@@ -219,7 +219,7 @@ def _trial(dent: _Dent, body: Indenter, aim: np.ndarray) -> _Trial | None:
 
 
 def _moved(dent: _Dent, trial: _Trial) -> _Trial:
-    """Press a trial's body again, its aim moved by how far its load's centre is off; return the likelier trial."""
+    """Press a trial's body again, its aim moved by the offset between load centres; return the likelier trial."""
     after = _trial(dent, trial.contact.body, trial.aim + dent.centre - trial.dent.centre)
     return trial if after is None or after.unlike > trial.unlike else after
 

@@ -19,7 +19,7 @@ TIERS: tuple[Tier, ...] = ("fast", "full", "reference")
 
 @dataclasses.dataclass(frozen=True)
 class Step:
-    """A point of a path: either ``depth``, m from first touch, or ``force``, N, along the motion; the other is None.
+    """A point of a path: either ``depth``, m from first touch, or ``force``, N along the motion; the other is None.
 
     slide : m, sideways from the place of first touch, along the indenter's own axes: one along the finger, one across
     """
@@ -31,7 +31,7 @@ class Step:
 
 @dataclasses.dataclass(frozen=True)
 class OnDemand:
-    """Functions that compute a ``Solution``'s costly properties, each that of the same name, when first asked for."""
+    """Functions that compute a ``Solution``'s costly properties of the same names, each when first asked for."""
 
     electrode_gaps: Callable[[], np.ndarray]
     films: Callable[[], np.ndarray]
@@ -47,12 +47,12 @@ class Solution(Summary):
     thickness : m, of the sensor at the place of first touch
     force : (3,) N, exerted by the indenter on the sensor; axial_force : N, along the motion; depth : m from first touch
     pressure : Pa, rise of the BioTac's fluid pressure, 0 for a gel
-    centre : (2,) = (x, z) m, of pressure, on the resting surface; NaN without contact
+    centre : (2,) = (x, z) m, centre of pressure on the resting surface; NaN without contact
     penetration : m, largest depth of a surface node in the indenter; of the fast tier, also of inner skin in the core
     slipping : share, 0 to 1, of touching nodes that slip; 0 without friction
     core_nodes : number of inner-skin nodes that press on the core; on_demand : functions behind the costly properties
-    load_steps : number since the solution before
-    volume : the solid and its state, of the full and the reference tier; None from the fast one
+    load_steps : number of load steps since the solution before
+    volume : the solid and its state, from the full and the reference tier; None from the fast one
     between : (m, 3) N, loads on the solid's nodes that stand for forces between nodes (penalty points); None without"""
 
     tier: Tier
@@ -76,13 +76,13 @@ class Solution(Summary):
 
     @functools.cached_property
     def electrode_gaps(self) -> np.ndarray:
-        """Thickness (e,) m of the fluid film over each electrode; (0,) on a gel. From the fast tier, that of its linear
+        """Thickness (e,) m of the fluid film over each electrode; (0,) on a gel. The fast tier gives that of its linear
         part, without the learned correction."""
         return self.on_demand.electrode_gaps()
 
     @functools.cached_property
     def films(self) -> np.ndarray:
-        """Thickness (k,) m of the fluid film at the nodes of the conducting sheet; (0,) on a gel. From the fast tier,
+        """Thickness (k,) m of the fluid film at the nodes of the conducting sheet; (0,) on a gel. The fast tier gives
         that of its linear part, without the learned correction."""
         return self.on_demand.films()
 
@@ -110,6 +110,6 @@ class Solution(Summary):
 
 
 def centre_of_pressure(places: np.ndarray, nodal_force: np.ndarray) -> np.ndarray:
-    """Return the centre (2,) = (x, z) m of places (k, 3) m, weighted by the size of nodal_force (k, 3) N, NaN for 0."""
+    """Return the mean (2,) = (x, z) m of places (k, 3) m, weighted by the size of nodal_force (k, 3) N; NaN if 0."""
     weight = np.linalg.norm(nodal_force, axis=1)
     return weight @ places[:, [0, 2]] / weight.sum() if weight.any() else np.full(2, np.nan)

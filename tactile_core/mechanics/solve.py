@@ -140,7 +140,7 @@ def _guessed_depths(
     sensor: Sensor, indenter: Indenter, pose: Pose, steps: list[Step], limit: float, friction: float
 ) -> list[float]:
     """Return the steps' depths, m: given ones, or those at which the fast tier reaches given forces; the limit, m, for
-    forces that it does not reach. friction : Coulomb's coefficient"""
+    the first force that it does not reach and forces after it. friction : Coulomb's coefficient"""
     if not any(step.force for step in steps):
         return [step.depth or 0.0 for step in steps]
     fast = _Fast(sensor, indenter, pose, 1.0, limit, friction)  # any thickness: only errors, not asked for, need it
@@ -154,8 +154,8 @@ def _guessed_depths(
 
 
 class _Fast:
-    """A path in the fast tier; ``to`` goes on from the step before. pose : at first touch
-    thick, limit : m, of the sensor there, and the greatest depth; friction : Coulomb's coefficient"""
+    """A path in the fast tier; each call of ``to`` starts from the contact before. pose : at first touch
+    thick : m, of the sensor there; limit : m, the greatest depth; friction : Coulomb's coefficient"""
 
     def __init__(
         self, sensor: Sensor, indenter: Indenter, pose: Pose, thick: float, limit: float, friction: float
@@ -164,7 +164,7 @@ class _Fast:
         self.press = CorrectedPress(compliance_of(sensor), indenter, pose, limit, friction)
 
     def to(self, step: Step) -> Solution:
-        """Solve the next step, see ``solve_path``; a given force is reached after the learned correction."""
+        """Solve the next step of the path; a given force is that after the learned correction."""
         pose, compliance = self.pose.slid(*step.slide), self.press.compliance
         if step.force:
             found = self.press.at_force(step.force, pose)

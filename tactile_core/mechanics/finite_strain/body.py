@@ -1,4 +1,4 @@
-"""The full and the reference tier: one finite-strain contact, on a mesh graded round it."""
+"""The solid of one contact in the full or the reference tier, on a mesh graded round that contact."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ _LEAST_HALF = 1.2  # lattice lines, half of the smallest fine part
 @dataclasses.dataclass(frozen=True)
 class Body:
     """A sensor's solid with all that a contact on it needs.
-    cavity : the fluid's, None on a gel; core_nodes : (k,), mesh nodes of the inner skin that may touch the rigid core
-    graded : the mesh, fine round the contact, which interpolates to the nodes of the sensor's surface lattice"""
+    cavity : the fluid's volume, None on a gel; core_nodes : (k,), mesh nodes of the inner skin that may touch the core
+    graded : the mesh, fine round the contact; it interpolates to the nodes of the sensor's surface lattice"""
 
     sensor: Sensor
     tier: Literal["full", "reference"]
@@ -49,10 +49,10 @@ class Body:
     def contact(
         self, indenter: Indenter, pose: Pose, depth: float, friction: float, *, every_edge: bool = False
     ) -> FiniteStrainContact:
-        """Return the contact problem of this body and an indenter that goes in by ``depth`` m at most from ``pose``,
-        its first touch.
-        friction : Coulomb's coefficient; every_edge : add penalty points also for edges that are near nodes at first
-            touch, not only for those near at full depth"""
+        """Return the contact problem of this body with an indenter that goes at most ``depth`` m in from ``pose``, its
+        first touch.
+        friction : Coulomb's coefficient
+        every_edge : true to add penalty points also at edges near nodes at first touch, not only at full depth"""
         mesh = self.solid.mesh
         distance, _ = pose.moved(depth).distance(indenter, mesh.nodes[mesh.surface])
         near = mesh.surface[distance < _REACH]
@@ -66,8 +66,8 @@ class Body:
         )  # fmt: skip
 
     def _faces(self, indenter: Indenter, poses: tuple[Pose, ...], near: np.ndarray) -> np.ndarray | None:
-        """Return faces (f, 9) of the mesh all of whose nodes are among ``near`` (k,), if the indenter is so sharp
-        there, in one of the poses, that nodes slide off it; else None."""
+        """Return the mesh's faces (f, 9) with all nodes among ``near`` (k,) if, in one of the poses, the indenter there
+        is so sharp that nodes slide off, yet not too sharp for penalty points; else None."""
         mesh = self.solid.mesh
         if not BENDS <= min(sharpest(indenter, pose, mesh.nodes[near]) for pose in poses) < BLUNT:
             return None
@@ -76,7 +76,8 @@ class Body:
 
     def penetration_depth(self, touch: ContactState, indenter: Indenter) -> float:
         """Return the indenter's largest penetration, m, at the surface's nodes and between them in a solved contact,
-        ``touch``. Raises PenetrationError where it is over 0.1 mm and 40 % of the depth, or nodes are behind it."""
+        ``touch``. Raises PenetrationError if it is over 0.1 mm and 40 % of the depth, or nodes are behind it.
+        """
         mesh = self.solid.mesh
         surface = self.graded.grid((mesh.nodes + touch.state.displacement)[mesh.surface])
         where, closed = f"{self.tier} tier, {self.sensor}", not sensors.is_gel(self.sensor)
@@ -103,9 +104,9 @@ def graded_body(
     tier: Literal["full", "reference"] = "full",
     spacing: float = 1.0,
 ) -> Body:
-    """Make a sensor's body, fine where the indenter, ``depth`` m beyond its ``pose`` at first touch, overlaps the
-    resting surface.
-    spacing : of the fine part's nodes, as a multiple of the tier's own (the reference tier's is half the full's)"""
+    """Make a sensor's body, its mesh fine where the indenter, ``depth`` m in from ``pose`` at first touch, overlaps it.
+    spacing : of the fine part's nodes, as a multiple of the tier's own (the reference tier's is half the full tier's)
+    """
     place = _footprint(sensor, indenter, pose, depth)
     footprint = dataclasses.replace(place, spacing=spacing * place.spacing, refine=1 if tier == "full" else 2)
     fine = graded(sensor, footprint)
@@ -124,7 +125,7 @@ def _first_share(sensor: str) -> float:
 
 
 def _footprint(sensor: Sensor, indenter: Indenter, pose: Pose, depth: float) -> Footprint:
-    """Row and column range of the lattice where the indenter, ``depth`` m in, overlaps the resting surface."""
+    """Return the rows and columns of the lattice where the indenter, ``depth`` m in, overlaps the resting surface."""
     lattice = sensors.sensor_surface(sensor)
     rows, columns = lattice.shape
     distance, _ = pose.moved(depth).distance(indenter, lattice.rest[: rows * columns])

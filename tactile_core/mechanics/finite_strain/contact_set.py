@@ -1,4 +1,4 @@
-"""The nodes that touch an obstacle: which, with what normal force, and with what friction.
+"""The nodes that touch an obstacle, and the normal force and friction on each.
 
 Coulomb friction by return mapping, as in elastoplasticity: a stiff spring at each touching node pulls toward its anchor
 on the indenter, with mu times the normal force at most, and then drags the anchor along (J. Simo, T. Laursen, Computers
@@ -22,10 +22,10 @@ _NO_WAY = np.zeros((0, 3))
 class ContactSet:
     """Contact of candidate nodes with one obstacle; changes in place during a load step.
     candidates : (m,) mesh nodes that may touch; active, slipping : (m,) bool, those that touch, and those that slip
-    anchor : (m, 3) m, in the indenter's frame, the place to which a touching node is tied
-    pressing : (k,) N, normal forces of the k active nodes, positive where they press; rubbing : (k, 3) N, friction on
-        them, in the sensor's frame
-    normals : (k, 3), out of the obstacle at those nodes; friction : Coulomb's coefficient; grip : N/m, the springs'
+    anchor : (m, 3) m, in the indenter's frame, the place to which a touching node's spring pulls it
+    pressing : (k,) N, normal forces of the k active nodes, positive if they press
+    rubbing : (k, 3) N, friction on them, in the sensor's frame; normals : (k, 3), out of the obstacle at them
+    friction : Coulomb's coefficient; grip : N/m, stiffness of each spring
     imbalance : largest change of a node's friction in the last ``follow``, over the largest normal force"""
 
     candidates: np.ndarray
@@ -50,7 +50,7 @@ class ContactSet:
 
     @classmethod
     def none(cls) -> ContactSet:
-        """Return a set without candidates, as of a body that nothing can touch."""
+        """Return a set without candidates, for a body that nothing can touch."""
         flags = np.zeros(0, bool)
         return cls(np.empty(0, int), flags, flags, _NO_WAY, np.empty(0), _NO_WAY, _NO_WAY)
 
@@ -70,7 +70,7 @@ class ContactSet:
         return self.friction > 0 and bool((self.active & self.slipping).any())
 
     def gaps(self, at: np.ndarray) -> np.ndarray:
-        """Return gaps (m,) m of all candidates, negative in the obstacle; at (n, 3) m: the mesh's nodes."""
+        """Return gaps (m,) m of all candidates, negative in the obstacle. at : (n, 3) m, the mesh's nodes"""
         return self.obstacle.distance(at[self.candidates])[0] if len(self.candidates) else np.empty(0)
 
     def carried(
@@ -83,12 +83,12 @@ class ContactSet:
         grip: float = 0.0,
         first_share: float = 0.0,
     ) -> ContactSet:
-        """Return the set that starts the next load step: nodes that touched, and those the moved obstacle overlaps.
-        obstacle : where it is moved to; None: without contact. before : its pose until now, needed with friction
+        """Return the set at the start of the next load step: nodes that touched, and those that the moved obstacle
+        overlaps. Anchors of slipping nodes are dragged to where friction holds them.
+        obstacle : at its new place; None: without contact. before : its pose until now, needed with friction
         candidates : (m,) mesh nodes that may touch; at : (n, 3) m, the mesh's nodes now
-        friction, grip : of the new set, see the class
-        first_share : where nothing touched, only nodes enter that overlap by this share of the largest overlap
-        Anchors of slipping nodes are dragged to where friction holds them."""
+        friction, grip : of the new set, as in the class
+        first_share : if nothing touched, only nodes enter that overlap by this share of the largest overlap"""
         m = len(candidates)
         if obstacle is None or not m:
             return ContactSet.none()
@@ -109,13 +109,13 @@ class ContactSet:
         return carried
 
     def _tie(self, fresh: np.ndarray, at: np.ndarray) -> None:
-        """Anchor candidates fresh (m,) bool where they meet the obstacle, which moves onto them in this load step.
-        at : (n, 3) m, the mesh's nodes now"""
+        """Anchor those candidates where ``fresh`` (m,) bool is true at the point where the obstacle, moving in this
+        load step, meets them. at : (n, 3) m, the mesh's nodes now"""
         last = self.obstacle.pose.to_own(at[self.candidates[fresh]])
         self.anchor[fresh] = first_contact(self.obstacle.indenter, self._stood[fresh], last)
 
     def begin(self, at: np.ndarray) -> np.ndarray:
-        """Find gaps and normals of the touching nodes for a step; return frames (k, 3, 3), the normal as first column.
+        """Find gaps and normals of touching nodes for a Newton step; return frames (k, 3, 3), first column the normal.
 
         at : (n, 3) m, the mesh's nodes now. One tangent is perpendicular to the axis of the normal's smallest
             component, as mirror symmetry needs."""
@@ -133,7 +133,7 @@ class ContactSet:
         return self._frames
 
     def _stretch(self, at: np.ndarray) -> None:
-        """Measure how far nodes, of all ``at`` (n, 3) m, are from their anchors, along the obstacle."""
+        """Find the springs' pulls, N, if none slips, from the mesh's nodes ``at`` (n, 3) m, along the surface."""
         away = at[self.nodes] - self.obstacle.pose.from_own(self.anchor[self.active])
         self._trial = -self.grip * (away - np.einsum("ki,ki->k", away, self.normals)[:, None] * self.normals)
 
@@ -148,10 +148,10 @@ class ContactSet:
         return np.where(slips, bound / np.maximum(size, 1e-30), 1.0)[:, None] * trial, slips
 
     def slide_share(self, move: np.ndarray, force: float, stiffness: float) -> float:
-        """Line search: return the share of a step after which friction balances all other forces along it, at most 1.
+        """Return the share, at most 1, of a step after which friction balances all other forces along it (line search).
 
-        Newton's steps overshoot where many nodes begin to slip. move : (k, 3) m, of the nodes, in ``begin``'s frames
-        force : N m, slope of the energy along the step at its start, without friction's; negative where it drives on
+        Newton's steps overshoot if many nodes begin to slip. move : (k, 3) m, of the nodes, in ``begin``'s frames
+        force : N m, slope of the energy along the step at its start, without friction's; negative if it drives on
         stiffness : N m, what the whole step adds to that slope, friction's part as linearised by ``gripping`` included
         """
         if not self.friction:
@@ -161,7 +161,7 @@ class ContactSet:
         stiffness -= float(np.einsum("ki,kij,kj->", along, self._gripping, along))
 
         def residual_force(share: float) -> float:
-            """Derivative, N m, of the energy by the share of the step."""
+            """Return the derivative, N m, of the energy with respect to the share of the step."""
             rubbing, _ = self._capped(self._trial - share * self.grip * along)
             return force + share * stiffness - float((along * rubbing).sum())
 
@@ -175,19 +175,19 @@ class ContactSet:
         return high
 
     def bending(self, at: np.ndarray) -> np.ndarray:
-        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals: pressing times the distance's
-        Hessian. at : (n, 3) m, the mesh's nodes; the Hessian is taken where those that touch will lie on the obstacle's
-        surface, for deep inside the curvature misleads."""
+        """Return the contact forces' stiffness (k, 3, 3) N/m from the turn of normals: ``pressing`` times the
+        distance's Hessian. It is taken where touching nodes will lie on the obstacle's surface, as the curvature deep
+        inside misleads. at : (n, 3) m, the mesh's nodes"""
         if not self.active.any():
             return np.empty((0, 3, 3))
         feet = at[self.nodes] - self._distance[:, None] * self.normals
         return self.pressing[:, None, None] * self.obstacle.curvature(feet)
 
     def gripping(self, along: float) -> np.ndarray:
-        """Return friction's stiffness (k, 3, 3) N/m: that of sticking springs, and of slipping ones across the pull.
+        """Return friction's stiffness (k, 3, 3) N/m: of sticking springs, and of slipping ones across their pull.
 
-        along : share of the secant's stiffness along the pull of slipping springs: 0 is Newton's method, more keeps
-        nodes from alternating between stick and slip.
+        along : share of the secant stiffness that slipping springs have along their pull: 0 is Newton's method, more
+            keeps nodes from alternating between stick and slip
         """
         self._gripping = np.zeros((int(self.active.sum()), 3, 3))
         if not self.friction:
@@ -202,9 +202,8 @@ class ContactSet:
         return self._gripping
 
     def prescribe(self, fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Prescribe the touching nodes' normal steps, which close gaps, and zero steps along fixed (k, 3) bool axes.
-        Returns which axes are prescribed (k, 3) bool, and the steps (k, 3) m along them, 0 along others; all, and
-        ``fixed``, in ``begin``'s frames."""
+        """Return which axes (k, 3) bool of touching nodes are prescribed, and steps (k, 3) m along them, 0 along
+        others: normal steps close gaps, steps along ``fixed`` (k, 3) bool axes are zero. All in ``begin``'s frames."""
         held, step = fixed.copy(), np.zeros(fixed.shape)
         if len(fixed):
             held[:, 0] = True
@@ -219,7 +218,7 @@ class ContactSet:
         return np.einsum("kji,kj->ki", self._frames, self.rubbing)
 
     def follow(self, reaction: np.ndarray) -> None:
-        """Update friction, if any node slips, to the normal forces of a reaction (k, 3) N, in ``begin``'s frames."""
+        """If any node slips, update friction to the normal forces of a reaction (k, 3) N in ``begin``'s frames."""
         if self.slips:
             self.pressing = reaction[:, 0].copy()
             before = self.rubbing
@@ -231,8 +230,8 @@ class ContactSet:
         self.pressing = reaction[:, 0].copy()
 
     def update(self, at: np.ndarray, tolerance: float) -> bool:
-        """Release touching nodes in tension, add others deeper in the obstacle than ``tolerance``, m; return true if
-        neither happened and touching nodes have gaps below it. at : (n, 3) m, the mesh's nodes now"""
+        """Release touching nodes in tension and add others deeper in the obstacle than ``tolerance``, m. Return true if
+        there were none and touching nodes' gaps are below it. at : (n, 3) m, the mesh's nodes now"""
         if not len(self.candidates):
             return True
         distance, normal = self.obstacle.distance(at[self.candidates])

@@ -32,9 +32,9 @@ _FAILURES = NoEquilibriumError, PenetrationError  # after which another way is t
 
 
 class LoadPath:
-    """A path of one indenter on one sensor; ``to`` goes on from the step before.
+    """A path of contacts of one indenter on one sensor; each call of ``to`` starts from the contact before.
     body, problem : the mesh in use now, and the contact on it; tier : ``full`` or ``reference``
-    pose : at first touch; thickness, limit : m, of the sensor there, and the greatest depth that forces are sought at
+    pose : at first touch; thickness : m, of the sensor there; limit : m, greatest depth in the search for a force
     depths : m, of the steps to come, guessed for forces; the mesh is made for the deepest
     friction : Coulomb's coefficient"""
 
@@ -67,9 +67,9 @@ class LoadPath:
         self.last = self.problem.start()
 
     def to(self, step: Step, guess: float) -> Solution:
-        """Solve the path's next step; guess : m, about the depth at which the force of a ``step`` by force is found.
-        Where no contact is found, tries in turn: a finer mesh, from the start (full tier); then, in a contact without
-        friction, friction that fades to 0; short steps from the start; penalty points at every edge (full tier)."""
+        """Solve the path's next step; guess : m, a depth near that at which a ``step`` by force reaches it.
+        If no contact is found, tries in turn: a finer mesh, from the start (full tier); then, without friction,
+        friction that fades to 0; short steps from the start and penalty points at every edge (full tier)."""
         before = self.last
         try:
             found = self._to(step, guess)
@@ -80,7 +80,7 @@ class LoadPath:
         return found
 
     def _otherwise(self, step: Step, guess: float, failure: TactileError) -> Solution:
-        """Solve the step in ``to``'s other ways from a guess; raise the failure, or the finer mesh's, if none can."""
+        """Solve the step in ``to``'s other ways; guess : m. If all fail, raises failure, or the finer mesh's error."""
         if self.tier == "full" and self.spacing == 1:
             self._remake(_FINER)
             try:
@@ -162,7 +162,7 @@ class LoadPath:
         )  # fmt: skip
 
     def _nodes_across(self, touch: ContactState) -> float:
-        """Count the nodes of the full tier's mesh across the contact where the indenter is sharpest."""
+        """Return how many nodes of the full tier's mesh lie across the contact, where the indenter is sharpest."""
         mesh = self.body.solid.mesh
         rest = mesh.nodes[mesh.surface]
         nearest = rest[int(np.argmin(touch.pose.distance(self.indenter, rest)[0]))]
@@ -173,19 +173,19 @@ class LoadPath:
 
 
 def _electrode_gaps(body: Body, touch: ContactState) -> np.ndarray:
-    """Film (e,) m over each electrode of a fluid sensor."""
+    """Return the film's thickness (e,) m over each electrode of a fluid sensor."""
     feet, inner = electrode_feet(body.sensor), skin_of(body.sensor).skin_surface("inner")
     at_feet = np.einsum("ek,ekj->ej", feet.weights, _inner_skin(body, touch)[inner.faces[feet.face]])
     return feet.gap + np.einsum("ej,ej->e", at_feet, feet.outward)
 
 
 def _films(body: Body, touch: ContactState) -> np.ndarray:
-    """Film (k,) m at the nodes of the conducting sheet."""
+    """Return the film's thickness (k,) m at the nodes of the conducting sheet."""
     return biotac_sheet(body.sensor).films(_inner_skin(body, touch))
 
 
 def _inner_skin(body: Body, touch: ContactState) -> np.ndarray:
-    """Displacement (n, 3) m of the inner skin's lattice."""
+    """Return the displacement (n, 3) m of the inner skin's lattice."""
     return body.graded.on_lattice(touch.state.displacement[body.solid.mesh.inner])
 
 

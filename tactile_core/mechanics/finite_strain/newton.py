@@ -35,17 +35,16 @@ _FAILURES = NotConvergedError, FloatingPointError, NotPositiveDefiniteError, np.
 
 
 class FiniteStrainContact:
-    """Contact of an indenter with a solid along a path of growing depth, or of poses.
+    """Contact of an indenter with a solid, along a path of growing depth or of poses.
 
     touchable : (m,) mesh nodes that the indenter may touch; pose : of the indenter at depth 0
     fixed : (3 n,) bool, degrees of freedom that do not move, xyz node by node; None: those of the clamped nodes
     cavity : incompressible fluid in the solid, or None; ``pre_inflation`` m3 is added to its volume at rest
-    core : a rigid body inside, that ``inner`` (k,) mesh nodes may come to touch, without friction; None: there is none
+    core : a rigid body inside that the mesh nodes ``inner`` (k,) may touch, without friction; None: there is none
     friction : Coulomb's coefficient, between indenter and sensor
     factor : solver for the solid's sparsity pattern; None: makes one; tolerance : when iterations end
-    first_share : the first active set of a press from rest is of nodes that overlap by this share of the largest
-        overlap
-    faces : (f, 9) quadratic faces of the surface that get penalty points where the contact fails, see ``PenaltyPoints``
+    first_share : a press from rest begins with the nodes that overlap by this share of the largest overlap
+    faces : (f, 9) quadratic faces of the surface that get ``PenaltyPoints`` if the contact fails
     """
 
     def __init__(
@@ -86,7 +85,7 @@ class FiniteStrainContact:
         """Solve the contact at ``depth`` m, reached from ``start`` (None: from rest) in load steps of at most ``step``
         m.
         A depth no greater than the start's returns the start. A step that fails is halved. Raises NoEquilibriumError,
-        which names the part of the way reached, if a sixteenth of a step fails, or more than 8 have failed."""
+        which states how far it came, if a sixteenth of a step fails, or more than 8 have failed."""
         touch = start or self.start()
         if depth <= touch.depth + 1e-12:
             return dataclasses.replace(touch, steps=0)
@@ -95,16 +94,16 @@ class FiniteStrainContact:
 
     def move(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
         """Solve the contact at another pose (a slide, a tilt, a lift), from the solved ``start``, in load steps of at
-        most ``step`` m of travel; a turn travels on an arm of 5 mm. Raises as ``press`` does."""
+        most ``step`` m of travel; a turn counts as travel on an arm of 5 mm. Raises what ``press`` does."""
         way = float(np.linalg.norm(pose.apex - start.pose.apex))
         turned = float(np.abs(pose.axes - start.pose.axes).max()) * _TURN_ARM
         touch = self._follow(start, pose, step / max(way, turned, 1e-12))
         return dataclasses.replace(touch, depth=float((pose.apex - self.pose.apex) @ self.pose.direction))
 
     def move_by_friction(self, pose: Pose, start: ContactState, step: float = 0.1e-3) -> ContactState:
-        """Solve a contact without friction at another pose, in load steps of ``step`` m, by continuation from one with
-        friction, which fades to 0 at that pose.
-        Friction keeps nodes from sliding off the indenter's edges on the way; the result is without friction."""
+        """Solve a contact without friction at another pose: go there from ``start`` with friction, in load steps of
+        ``step`` m, and let it fade to 0. On the way it keeps nodes from sliding off the indenter's edges.
+        Raises NoEquilibriumError."""
         touch = self._rubbed(_FADING[0]).move(pose, start, step)
         try:
             for friction in _FADING[1:]:
@@ -115,13 +114,13 @@ class FiniteStrainContact:
             raise NoEquilibriumError("finite-strain solver", found, "friction, or a smaller depth") from None
 
     def _rubbed(self, friction: float) -> FiniteStrainContact:
-        """Return this contact with friction, which needs no penalty points."""
+        """Return this contact problem with friction; it then needs no penalty points."""
         rubbed = copy.copy(self)
         rubbed.friction, rubbed._penalty = friction, None
         return rubbed
 
     def _follow(self, start: ContactState, pose: Pose, step: float) -> ContactState:
-        """Go straight to a pose, in load steps of at most a share ``step`` of the way.
+        """Go straight to a pose, in load steps of at most a share ``step`` of the way. Raises what ``press`` does.
 
         A load step that fails is tried once more with penalty points, then halved."""
         touch, done, size, steps, failures = start, 0.0, step, 0, 0
@@ -145,7 +144,7 @@ class FiniteStrainContact:
         return dataclasses.replace(self._stiffened(touch), steps=steps)
 
     def _solve(self, pose: Pose, start: ContactState, spring: float = _SPRING) -> ContactState:
-        """Solve one load step from a solved contact; spring : stiffness of penalty points, over a node's own."""
+        """Solve one load step from a solved contact. spring : stiffness of penalty points, over a typical node's"""
         state, fluid = start.state.copy(), start.fluid
         at = self._at(state)
         outer = start.outer.carried(
@@ -180,8 +179,8 @@ class FiniteStrainContact:
         raise NotConvergedError
 
     def _share(self, state: State, step: np.ndarray) -> float:
-        """Return the largest share of a step (n, 3) m, of 1, 1/2, 1/4 and 1/8, that leaves every Gauss point over 0.3
-        of its volume; FloatingPointError if none does."""
+        """Return the largest share of a step (n, 3) m, of 1, 1/2, 1/4 and 1/8, in which every Gauss point keeps over
+        0.3 of its volume. Raises FloatingPointError if there is none."""
         before = self.solid.deformation(state.displacement)[1]
         for share in _SHARES:
             if (self.solid.deformation(state.displacement + share * step)[1] > _KEPT_VOLUME * before).all():
@@ -189,8 +188,8 @@ class FiniteStrainContact:
         raise FloatingPointError("a cell would be turned inside out")
 
     def _push(self, start: ContactState, outer: ContactSet, at: np.ndarray, spring: float) -> Push:
-        """Return the push of the indenter on the penalty points; none where the contact is not ``guarded``.
-        at : (n, 3) m, the mesh's nodes now; spring : stiffness of a point, over a node's own"""
+        """Return the push of the indenter on the penalty points; none if the contact is not ``guarded``.
+        at : (n, 3) m, the mesh's nodes now; spring : stiffness of a point, over a typical node's"""
         if not (start.guarded and outer.obstacle and self._penalty):
             return NO_PUSH
         return self._penalty.push(outer.obstacle, at, spring * self._factor.stiffness)
@@ -218,7 +217,7 @@ class FiniteStrainContact:
     def _newton(
         self, state: State, outer: ContactSet, inner: ContactSet, fluid: float, push: Push, unrest: float
     ) -> tuple[np.ndarray, float, float, np.ndarray, float]:
-        """Solve for a Newton step. outer, inner : contact with indenter and core; fluid : its pressure, Pa
+        """Solve for a Newton step. outer, inner : contact with indenter and core; fluid : Pa, its pressure
         push : on penalty points; unrest : the last step's relative imbalance
         Returns the steps of displacement (n, 3) m and of the fluid's pressure Pa, the relative imbalance before them,
         the cells' pressure step (n_cells, 4) Pa, and the share of the step that friction allows."""
@@ -262,9 +261,9 @@ class FiniteStrainContact:
         return step, rise, max(imbalance, excess_share), lines.pressure_step(step), slide
 
     def _pull(self, system: LinearSystem, swell: np.ndarray, outer: ContactSet) -> tuple[np.ndarray, np.ndarray, float]:
-        """Solve the linear system of a Newton step for the step (n, 3) m, reactions (n, 3) N and rise of the fluid's
-        pressure, Pa.
-        swell : (n, 3) m2, gradient of the fluid's volume. Friction of ``outer`` follows the normal forces."""
+        """Solve a Newton step's linear system: return the step (n, 3) m, reactions (n, 3) N and the rise of the fluid's
+        pressure, Pa. Friction of ``outer`` is updated to the normal forces.
+        swell : (n, 3) m2, gradient of the fluid's volume"""
         rise, prescribed = 0.0, system.prescribed
         known = (system.matrix @ prescribed.ravel()).reshape(-1, 3)
         under_pressure = system.solve(swell) if self.cavity else swell

@@ -1,7 +1,7 @@
 """Penalty points, which keep a sharp indenter from penetrating between a surface's nodes.
 
-Nodes touch exactly (``contact_set``), but without friction they slide off edges, which then cut in between them. Where
-a contact lets the indenter through, or is not found, points halfway between nodes push back, each by a stiff spring
+Nodes touch exactly (``contact_set``), but without friction they slide off edges, which then cut in between them. If a
+contact lets the indenter through, or is not found, points halfway between nodes push back, each by a stiff spring
 (penalty method: P. Wriggers, Computational Contact Mechanics, 2006, chapter 6). Other contacts use nodes alone.
 """
 
@@ -23,7 +23,7 @@ _NEAR = 100e-6
 
 
 def _weights() -> np.ndarray:
-    """Weights (16, 9) of a face's nodes, for its points halfway between them."""
+    """Return weights (16, 9) of a face's 9 nodes for each of the 16 points halfway between them."""
     line, _ = quadratic(np.array([-1.0, -0.5, 0.0, 0.5, 1.0]))
     every = np.einsum("ib,ja->ijba", line, line).reshape(25, 9)
     return every[every.max(axis=1) < 1]
@@ -34,9 +34,9 @@ _WEIGHTS = _weights()
 
 @dataclasses.dataclass(frozen=True)
 class Push:
-    """Forces on k penalty points that an obstacle has reached.
-    nodes : (k, 9) int, of the mesh, and weights : (k, 9): each point is its nodes' weighted mean
-    force : (k, 3) N, of the obstacle on the points; stiffness : (k, 3, 3) N/m, minus its derivative by the point"""
+    """Forces of an obstacle on the k penalty points that it has reached.
+    nodes : (k, 9) int, of the mesh, and weights : (k, 9); each point is the weighted mean of its nodes
+    force : (k, 3) N, on the points; stiffness : (k, 3, 3) N/m, minus the force's derivative by the point's place"""
 
     nodes: np.ndarray
     weights: np.ndarray
@@ -49,13 +49,13 @@ class Push:
         return self.force.sum(axis=0)
 
     def loads(self, n: int) -> np.ndarray:
-        """Return the forces' loads (n, 3) N on a mesh's n nodes, shared out by the weights."""
+        """Return the loads (n, 3) N on a mesh's n nodes that the points' forces make, shared out by the weights."""
         loads = np.zeros((n, 3))
         np.add.at(loads, self.nodes, self.weights[:, :, None] * self.force[:, None])
         return loads
 
     def add_to(self, residual: np.ndarray, blocks: np.ndarray, pattern: BlockPattern) -> None:
-        """Subtract the loads from residual (n, 3) N, internal minus outer forces, and add their stiffness to the
+        """Subtract the loads from residual (n, 3) N (internal minus outer forces), and add the points' stiffness to the
         matrix's blocks (n_blocks, 3, 3) N/m, in the order of ``pattern``; both in place."""
         residual -= self.loads(len(residual))
         pairs = (self.weights[:, :, None] * self.weights[:, None])[..., None, None] * self.stiffness[:, None, None]

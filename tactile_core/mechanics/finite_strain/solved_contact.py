@@ -1,4 +1,4 @@
-"""A solved contact of a finite-strain solid: its state, when an iteration has found it, and errors where none has."""
+"""State of a contact of a finite-strain solid, criteria for when an iteration has found it, and errors if none has."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class ContactState:
     """A solved contact.
     depth : m, from the problem's own pose; pose : of the indenter now; state : of the solid
     outer, inner : contact of the surface with the indenter, and of the inner skin with the core
-    push : of the indenter on the penalty points; guarded : true if they are switched on
+    push : of the indenter on the penalty points; guarded : true if these are in use
     fluid : Pa, rise of the fluid's pressure
     iterations : Newton iterations of the last load step; steps : load steps since the start, failed ones counted"""
 
@@ -44,7 +44,7 @@ class Tolerance:
     """Criteria that end an iteration: gaps below ``gap``, and an imbalance below ``balance`` or a step below ``step``.
 
     gap : m; balance : residual over the largest internal nodal force, or the fluid's excess volume over its volume
-    step : m; after so small a step the balance is good, by quadratic convergence"""
+    step : m; after so small a step forces are in balance, by quadratic convergence"""
 
     gap: float
     balance: float
@@ -55,8 +55,8 @@ EXACT = Tolerance(1e-9, 1e-8, 1e-13)
 
 
 class NoEquilibriumError(TactileError):
-    """Error of a path of load steps that ends early: no equilibrium was found beyond its last contact."""
+    """Error of a path of load steps that ends early: beyond its last contact no equilibrium is found."""
 
 
 class NotConvergedError(Exception):
-    """Error of a load step whose iterations find no equilibrium: smaller steps are tried."""
+    """Error of one load step whose iterations find no equilibrium; the path then tries smaller steps."""

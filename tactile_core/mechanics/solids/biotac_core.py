@@ -15,7 +15,7 @@ _POINT_STEP = (0.05e-3, np.radians(1.0))  # m and rad between points that stand 
 
 
 class Core:
-    """Gap and normal of a core's surface r = R(x, theta), from a table, about the axis (y, z) = (``axis_y``, 0)."""
+    """Gap and normal of a core's surface r = R(x, theta), tabulated about the axis (y, z) = (``axis_y``, 0)."""
 
     def __init__(self, sensor: str) -> None:
         self.sensor, self._skin = sensor, skin_of(sensor)
@@ -23,8 +23,8 @@ class Core:
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the gap (n,) m, positive outside, and outward unit normal (n, 3) of the core at points (n, 3) m.
 
-        The gap is (r - R) / |grad (r - R)|, exact to first order, as is the normal where the gap is closed.
-        Beyond the table's ends the last radius is held."""
+        The gap is (r - R) / |grad (r - R)|, exact to first order, as is the normal at closed gaps. Beyond the table's
+        ends its last radius is used."""
         x, y, z = points.T
         axis_y, core = self._skin.axis_y, self._skin.descriptor.core
         x = np.clip(x, *core.contact_x)
@@ -50,7 +50,7 @@ class Core:
 
 @functools.cache
 def _spline(sensor: str):  # noqa: ANN202 (scipy is imported only where it is needed)
-    """Radius m over x m and theta rad: a bicubic spline through the table, smoothed by its roughness."""
+    """Return the radius, m, over x, m, and theta, rad: a bicubic spline that smooths the table's roughness away."""
     import scipy.interpolate
 
     table, core = skin_of(sensor).table, skin_of(sensor).descriptor.core
@@ -64,9 +64,9 @@ def _spline(sensor: str):  # noqa: ANN202 (scipy is imported only where it is ne
 
 
 def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
-    """Mark the resting inner-skin nodes (n, 3) m that may come to touch the core: (n,) bool.
+    """Mark (n,) bool the resting inner-skin nodes (n, 3) m that may come to touch the core.
 
-    Under the pad, within the table, and clear of the core by 0.1 mm: nearer ones lie beside it and hardly move.
+    They lie under the pad, within the table, and over 0.1 mm off the core: nearer ones are beside it and hardly move.
     """
     x, y, z = nodes.T
     skin = skin_of(sensor)
@@ -77,9 +77,8 @@ def facing_core(sensor: str, nodes: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def above_core(sensor: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin, distances (n,)
-    m.
-    On the sides too, where ``Core`` has no table."""
+    """Return unit vectors (n, 3) from the core's nearest point to each node of the resting inner skin, and distances
+    (n,) m; on the sides too, where ``Core`` has no table."""
     import scipy.spatial
 
     skin = skin_of(sensor)

@@ -13,7 +13,7 @@ class BlockPattern:
     rows, columns : (n_blocks,), the two nodes of each block; diagonal : (n_nodes,), each node's block with itself"""
 
     def __init__(self, cells: np.ndarray, clamped: np.ndarray) -> None:
-        """Take cells : (n_cells, k) nodes, every node belongs to one; clamped : (n,) bool, nodes that never move."""
+        """Take the nodes of cells (n_cells, k), all nodes among them; clamped : (n,) bool, nodes that never move"""
         self.n_nodes = n_nodes = len(clamped)
         self.free = np.flatnonzero(np.repeat(~clamped, 3))  # degrees of freedom that ``upper`` has rows for
         pairs = cells[:, :, None].astype(np.int64) * n_nodes + cells[:, None, :]
@@ -25,7 +25,7 @@ class BlockPattern:
         self.starts = np.searchsorted(self.rows, np.arange(n_nodes + 1)).astype(np.int32)
 
     def gather(self, stiffness: np.ndarray) -> np.ndarray:
-        """Sum cells' stiffness (n_cells, k, 3, 3, k), (node, axis, axis, node), to blocks (n_blocks, 3, 3)."""
+        """Add up cells' stiffness (n_cells, k, 3, 3, k), (node, axis, axis, node), in blocks (n_blocks, 3, 3)."""
         blocks = np.empty((len(self.rows), 3, 3))
         for i in range(3):
             for j in range(3):
@@ -38,8 +38,8 @@ class BlockPattern:
         return np.searchsorted(self._places, rows.astype(np.int64) * self.n_nodes + columns)
 
     def turn(self, blocks: np.ndarray, nodes: np.ndarray, frames: np.ndarray) -> None:
-        """Express the rows and columns of ``nodes`` (k,) in blocks (n_blocks, 3, 3) along the axes of these nodes' own
-        frames (k, 3, 3), the columns; in place."""
+        """Turn the rows and columns of ``nodes`` (k,) in blocks (n_blocks, 3, 3), in place, to these nodes' own axes:
+        the columns of frames (k, 3, 3)."""
         index = np.full(self.n_nodes, -1)
         index[nodes] = np.arange(len(nodes))
         for side, of in ((0, self.rows), (1, self.columns)):
@@ -68,7 +68,7 @@ class BlockPattern:
         return rows[keep], columns[keep], keep, starts
 
     def upper(self, blocks: np.ndarray, held: np.ndarray):  # noqa: ANN201
-        """Assemble the matrix's upper triangle among unclamped degrees of freedom, scipy CSR, identity rows for held
+        """Return the matrix's upper triangle among unclamped degrees of freedom, scipy CSR, with identity rows for held
         ones.
         blocks : (n_blocks, 3, 3); held : (n_free,) bool. The pattern is the same every time: a solver may keep its
             analysis."""

@@ -35,7 +35,7 @@ def reference_gradients() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def cell_stiffness(corners: np.ndarray, material: Material) -> np.ndarray:
     """Return the stiffness (n_cells, 81, 81), N/m, of cells with nodes at ``corners`` (n_cells, 27, 3) m.
 
-    2 mu dev(strain) : dev(strain) plus kappa times the volume change projected on linear functions of the cell.
+    It is 2 mu dev(strain) : dev(strain) plus kappa times the volume change projected on linear functions of the cell.
     Raises ValueError for a cell that is turned inside out at a Gauss point."""
     shear = material.youngs / (2 * (1 + material.poisson))
     bulk = material.youngs / (3 * (1 - 2 * material.poisson))

@@ -26,8 +26,8 @@ SHARE = 4.0
 class NeoHookean:
     """Nearly incompressible neo-Hookean law.
 
-    shear : mu, Pa; bulk : kappa, Pa, that the cells' pressures carry. Simo, Taylor, Pister, Comput. Methods Appl. Mech.
-        Eng. 51, 1985
+    shear : mu, Pa; bulk : kappa, Pa, the part that the cells' pressures carry. Simo, Taylor, Pister, Comput. Methods
+        Appl. Mech. Eng. 51, 1985
     at_points : Pa, a part of the bulk modulus that acts at each Gauss point, so that coarse cells do not buckle. If the
         cell's pressure alone held the volume, a Gauss point could lose half of its volume to the next one: under a
         sharp edge, or deep under a small ball, coarse cells then buckle. Fine meshes have the same limit
@@ -39,22 +39,22 @@ class NeoHookean:
 
     @classmethod
     def from_material(cls, material: Material, *, split: bool = False) -> NeoHookean:
-        """Return mu = E / (2 (1 + nu)) and kappa = E / (3 (1 - 2 nu)), linear elasticity at small strain.
+        """Make the law that at small strain is linear: mu = E / (2 (1 + nu)), kappa = E / (3 (1 - 2 nu)).
 
-        split : true to let a part of kappa, 4 mu (``SHARE``), act at the Gauss points, see ``at_points``"""
+        split : true to let 4 mu (``SHARE``) of kappa act at the Gauss points (``at_points``)"""
         shear = material.youngs / (2 * (1 + material.poisson))
         at_points = SHARE * shear if split else 0.0
         return cls(shear, material.youngs / (3 * (1 - 2 * material.poisson)) - at_points, at_points)
 
     def energy(self, f: np.ndarray, j: np.ndarray) -> np.ndarray:
-        """Return the energy density (...,) J/m3, without the cells' pressures' part, of deformation gradients f (...,
+        """Return the energy density (...,) J/m3, the cells' pressures' part left out, of deformation gradients f (...,
         3, 3) with determinants j (...,)."""
         isochoric = self.shear / 2 * (j ** (-2 / 3) * np.einsum("...ij,...ij->...", f, f) - 3)
         return isochoric + self.at_points / 2 * (j - 1) ** 2
 
     def stress_tangent(self, f: np.ndarray, j: np.ndarray, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, with p J F^-T, and its derivative (..., 3, 3, 3, 3)
-        by F.
+        """Return the first Piola-Kirchhoff stress (..., 3, 3) Pa, p J F^-T included, and its derivative (..., 3, 3, 3,
+        3) Pa with respect to F.
         f, j : F (..., 3, 3) and its determinant J (...); p : (...) Pa, pressure of the cells, tension positive"""
         cofactor = cofactors(f)
         g = cofactor / j[..., None, None]  # F^-T
@@ -116,7 +116,7 @@ class State:
 
 
 class FiniteStrainSolid:
-    """Residual and tangent of a mesh of one material; see the module for the energy.
+    """Residual and tangent stiffness of a mesh of one material; the module states the energy.
 
     material : the law, or linear constants to make it of (``NeoHookean.from_material``, not split)
     pattern : of the mesh's cells; None: made at first use. Raises ValueError for cells that are turned inside out"""
@@ -164,7 +164,7 @@ class FiniteStrainSolid:
         return float((density * self.weight).sum())
 
     def linearise(self, state: State) -> Linearised:
-        """Compute residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        """Compute residual and tangent at a state. Raises FloatingPointError if a cell is turned inside out."""
         f, j = self.deformation(state.displacement)
         if not (j > 0).all():  # NaN, too
             raise FloatingPointError("a cell is turned inside out")
@@ -186,8 +186,8 @@ class FiniteStrainSolid:
         return Linearised(self, by_cell, condensed, stiffness, to_pressure.reshape(n, 4, 81), pressure_gap)
 
     def _cells(self, part, f, j, p, residual, couple, stiffness) -> None:  # noqa: ANN001
-        """Fill in internal forces, residual[part] (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of some
-        cells, a slice ``part``, at gradients f, determinants j and pressures p at their Gauss points."""
+        """Fill in internal forces, residual[part] (e, 27, 3), pressure coupling (e, 27, 4, 3) and stiffness of the
+        cells in the slice ``part``, from gradients f, determinants j and pressures p at their Gauss points."""
         stress, tangent = self.law.stress_tangent(f, j, p)
         by_node, n = self._by_node[part], len(j)
         weight = self.weight[part]
@@ -203,11 +203,11 @@ class FiniteStrainSolid:
 
 @dataclasses.dataclass
 class Linearised:
-    """A solid's equations at one state, cell by cell, pressure eliminated.
-    residual : (n_cells, 81) N, internal forces; condensed : those plus what the pressures' own residual adds as they
-        are eliminated
+    """A solid's linearised equations at one state, cell by cell, pressure eliminated.
+    residual : (n_cells, 81) N, internal forces; condensed : the same plus what eliminating the pressures adds
     stiffness : (n_cells, 27, 3, 3, 27) N/m, (node, axis, axis, node)
-    to_pressure : (n_cells, 4, 81) Pa/m, change of pressure per step; pressure_gap : (n_cells, 4) Pa, without one"""
+    to_pressure : (n_cells, 4, 81) Pa/m, change of pressures per step of displacement; pressure_gap : (n_cells, 4) Pa,
+        their change without a step"""
 
     solid: FiniteStrainSolid
     residual: np.ndarray
@@ -217,14 +217,14 @@ class Linearised:
     pressure_gap: np.ndarray
 
     def internal_force(self, *, condensed: bool = True) -> np.ndarray:
-        """Sum cells to the internal force (3 n,) N on nodes, xyz each: of ``condensed``, which the Newton step needs,
-        or (false) of ``residual``."""
+        """Return the internal force (3 n,) N on nodes, xyz each, summed over cells: of ``condensed``, which the Newton
+        step needs, or (false) of ``residual``."""
         values = self.condensed if condensed else self.residual
         size = 3 * len(self.solid.mesh.nodes)
         return np.bincount(self.solid.dofs.ravel(), values.ravel(), minlength=size)
 
     def blocks(self) -> np.ndarray:
-        """Return the tangent stiffness (n_blocks, 3, 3) N/m on the solid's pattern."""
+        """Return the tangent stiffness (n_blocks, 3, 3) N/m in the order of the solid's pattern."""
         return self.solid.pattern.gather(self.stiffness)
 
     def matrix(self):  # noqa: ANN201 (scipy is imported only where it is needed)

@@ -1,4 +1,4 @@
-"""The BioTac's fluid in finite strain: incompressible, one pressure in the whole cavity."""
+"""The volume of the BioTac's fluid, which is incompressible and has one pressure, in finite strain."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class FluidCavity:
     """
 
     def __init__(self, faces: np.ndarray, n_nodes: int) -> None:
-        """Take faces : (n, 9) mesh nodes, node 3 a + b at (xi, eta) = (a, b) - 1, xi, eta and outward right-handed; and
+        """Take faces (n, 9), mesh nodes: node 3 a + b at (xi, eta) = (a, b) - 1, with xi, eta and outward right-handed.
         n_nodes : number of all the mesh's nodes"""
         self.faces, self.n_nodes = faces, n_nodes
 
@@ -34,7 +34,8 @@ class FluidCavity:
         return gradient.ravel()
 
     def hessian(self, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return d2V / d(node)2: pairs of nodes (k,), (k,) and blocks (k, 3, 3) m; repeated pairs add up."""
+        """Return d2V / d(node)2, at nodes (n_nodes, 3) m: pairs (k,), (k,), blocks (k, 3, 3) m, to be summed by
+        pair."""
         arms = self._arms(nodes[self.faces])
         rows, columns = np.repeat(self.faces, 9, axis=1).ravel(), np.tile(self.faces, (1, 9)).ravel()
         return rows, columns, -6 * _cross_matrix(arms.reshape(-1, 3))
@@ -45,7 +46,7 @@ class FluidCavity:
 
 @functools.cache
 def _coefficients() -> np.ndarray:
-    """Antisymmetric (9, 9, 9): a third of the integral of N_a dN_b/dxi dN_c/deta, exact by three Gauss points."""
+    """Return (9, 9, 9), antisymmetric: 1/3 of the integral of N_a dN_b/dxi dN_c/deta, exact by three Gauss points."""
     value, slope = quadratic(_POINTS)
     weights = np.einsum("p,q->pq", _POINT_WEIGHTS, _POINT_WEIGHTS)
     shape, along, across = (
@@ -59,7 +60,7 @@ def _coefficients() -> np.ndarray:
 
 
 def _cross_matrix(v: np.ndarray) -> np.ndarray:
-    """Matrices (n, 3, 3) with M w = v x w."""
+    """Return the matrices M (n, 3, 3) with M w = v x w for any vector w. v : (n, 3)"""
     zero = np.zeros(len(v))
     x, y, z = v.T
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(-1, 3, 3)

@@ -24,11 +24,11 @@ _KEPT = 6  # patterns kept, each with the analysis and the last factor of its ma
 
 @dataclasses.dataclass(frozen=True)
 class Footprint:
-    """Area where a lattice is refined, in real-valued rows and columns of the lattice.
+    """Part of a lattice that a mesh refines, in real-valued rows and columns of the lattice.
 
-    low, high : (row, column) of the fine part's corners
-    spacing : of the nodes there, in lattice lines
-    refine : divides every cell, for a mesh that many times as fine
+    low, high : (row, column) of the part's corners
+    spacing : of the nodes there, in lattice spacings
+    refine : number of parts that every cell is divided into along each axis
     """
 
     low: tuple[float, float]
@@ -41,8 +41,8 @@ class Footprint:
 class GradedMesh:
     """A graded solid, its matrix's sparsity pattern and solver, and its lines.
     rows (i,), columns (j,) : places of the mesh's lines of nodes, in real-valued rows and columns of the lattice
-    to_rows (rows, i), to_columns (columns, j) : matrices from values on the mesh's lines to values on the lattice's,
-        without a skin's last line, which is its first"""
+    to_rows (rows, i), to_columns (columns, j) : matrices that interpolate values from the mesh's lines to the
+    lattice's; a skin's last line is its first and left out"""
 
     mesh: HexMesh
     pattern: BlockPattern
@@ -62,7 +62,7 @@ class GradedMesh:
         return self._carry(values, self.to_rows, self.to_columns)
 
     def nearest_on_lattice(self, flags: np.ndarray) -> np.ndarray:
-        """Interpolate flags (n_surface,) of the mesh's surface nodes to the lattice's (n,) bool, true above 1/2."""
+        """Mark (n,) bool the lattice's nodes where flags (n_surface,) of the mesh's, interpolated, are above 1/2."""
         shares = self._carry(flags[:, None].astype(float), *self._linear())
         return shares[:, 0] > 0.5
 
@@ -77,7 +77,7 @@ class GradedMesh:
         return rows, columns
 
     def _carry(self, values: np.ndarray, to_rows: np.ndarray, to_columns: np.ndarray) -> np.ndarray:
-        """Interpolate values (n_surface, k) by to_rows, to_columns as the class has; poles count as whole rows."""
+        """Interpolate values (n_surface, k) by matrices to_rows, to_columns of the class; poles count as whole rows."""
         i, j = to_rows.shape[1], to_columns.shape[1]
         k = values.shape[1]
         if len(values) == i * j:
@@ -91,7 +91,7 @@ class GradedMesh:
 
 
 def graded(sensor: str, footprint: Footprint) -> GradedMesh:
-    """Make a sensor's solid, fine in ``footprint`` and ever coarser away from it."""
+    """Make a sensor's solid, fine in ``footprint`` and coarser with the distance from it."""
     return _graded_gel(sensor, footprint) if sensors.is_gel(sensor) else _graded_skin(sensor, footprint)
 
 
@@ -130,7 +130,7 @@ _SKIN_COLUMN_MARKS = (9, 12, 52, 55)
 
 
 def _gel_layers(shape: GelShape, spacing: float) -> np.ndarray:
-    """Places, 0 = back, 1 = surface, of the cells through the gel: the top one twice the spacing, growing downward."""
+    """Return cell boundaries through the gel, 0 = back, 1 = surface: the top cell twice ``spacing``, others larger."""
     top = min(2 * spacing * shape.spacing / shape.thickness, 0.2)
     growth = (0.5 / top) ** 0.5 if top > _THIN_TOP else (0.5 / top) ** (1 / 3)
     cells = np.array([0.5, *top * growth ** np.arange(1 if top > _THIN_TOP else 2, -1, -1)])
@@ -141,8 +141,8 @@ _THIN_TOP = 0.12  # of the thickness: below a top cell of this size a fourth cel
 
 
 def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: float) -> np.ndarray:
-    """Return places of node lines along an axis, 0 rows or 1 columns, an odd number, through all marks: evenly spaced
-    in the footprint, growing beyond. widest : the largest cell, in lattice lines"""
+    """Return places of node lines along an axis, 0 rows or 1 columns, an odd number: through all marks, evenly spaced
+    in the footprint, ever wider beyond. widest : the largest cell, in lattice spacings"""
     low, high = footprint.low[axis], footprint.high[axis]
     at = np.linspace(marks[0], marks[-1], 20 * (marks[-1] - marks[0]) + 1)
     beyond = np.maximum(np.maximum(low - at, at - high), 0)
@@ -161,12 +161,12 @@ def _lines(marks: tuple[int, ...], footprint: Footprint, axis: int, widest: floa
 
 
 def _divided(values: np.ndarray, parts: int) -> np.ndarray:
-    """Subdivide each interval of sorted values into ``parts`` even ones."""
+    """Return sorted values with each interval divided into ``parts`` even ones."""
     return np.interp(np.arange(parts * (len(values) - 1) + 1) / parts, np.arange(len(values)), values)
 
 
 def _bilinear(grid: np.ndarray, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Values of a grid (r, c, k) at real-valued rows and columns."""
+    """Return the values of a grid (r, c, k) at real-valued rows and columns, by bilinear interpolation."""
     for axis, places in ((0, rows), (1, columns)):
         cell = np.minimum(places.astype(int), grid.shape[axis] - 2)
         shape = [1] * grid.ndim
@@ -191,8 +191,8 @@ def _skin_points(sensor: str, layer: str, rows: np.ndarray, columns: np.ndarray)
 
 
 def _spline(lines: np.ndarray, count: int, *, periodic: bool = False) -> np.ndarray:
-    """Matrix (count, lines) from values on lines to values at 0 .. count - 1, by a cubic spline. lines : (lines,)
-    places; periodic : the last line is the first, and has no column"""
+    """Return the matrix (count, lines) of the cubic spline from values on lines to values at 0 .. count - 1.
+    lines : (lines,) places; periodic : true if the last line is the first, and has no column"""
     import scipy.interpolate
 
     values = np.eye(len(lines))
@@ -207,7 +207,7 @@ _PATTERNS: dict[tuple, tuple[BlockPattern, PatternFactor]] = {}  # the latest us
 
 
 def _pattern(mesh: HexMesh, *kind: str | int) -> tuple[BlockPattern, PatternFactor]:
-    """Return pattern and solver of meshes of one ``kind`` (sensor, rows, columns) and clamped nodes: equal cells."""
+    """Return the pattern and solver shared by all meshes of one ``kind`` (sensor, rows, columns) and clamped nodes."""
     key = (*kind, len(mesh.nodes), mesh.clamped.tobytes())
     found = _PATTERNS.pop(key, None) or (BlockPattern(mesh.cells, mesh.clamped), PatternFactor())
     _PATTERNS[key] = found

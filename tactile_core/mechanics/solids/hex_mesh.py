@@ -21,8 +21,8 @@ class HexMesh:
     cells : (n_cells, 27) int, node a + 3 b + 9 c of a cell at (xi, eta, zeta) = (a, b, c) - 1
     clamped : (n,) bool, nodes that do not move
     surface : (n_surface,) int, nodes of the side that is touched, row by row (a ``skin_solid``'s poles last); in a mesh
-        that is nowhere refined they are the nodes of the sensor's surface lattice
-    inner : (n_inner,) int, likewise for the inner skin (empty for the gel)"""
+        that is refined nowhere they are the nodes of the sensor's surface lattice
+    inner : (n_inner,) int, likewise of the inner skin (empty for a gel)"""
 
     nodes: np.ndarray
     cells: np.ndarray
@@ -82,8 +82,8 @@ def skin_solid(outer: np.ndarray, inner: np.ndarray, glued: np.ndarray, layers: 
 
 
 def inner_faces(mesh: HexMesh) -> np.ndarray:
-    """Return the quadratic faces (n, 9) of the inner skin, the undersides of its cells, node 3 a + b at
-    (xi, eta) = (a, b) - 1, as ``FluidCavity`` takes them: outward from the fluid."""
+    """Return the quadratic faces (n, 9) of the inner skin, outward from the fluid, node 3 a + b at (xi, eta) = (a, b) -
+    1, as ``FluidCavity`` takes them."""
     faces = mesh.cells[:, :9]
     faces = faces[np.isin(faces, mesh.inner).all(axis=1)]
     return faces.reshape(-1, 3, 3).swapaxes(1, 2).reshape(-1, 9)

@@ -1,7 +1,7 @@
 """Sparse Cholesky factors of stiffness matrices, by the fastest library that is installed.
 
 For many right-hand sides of one matrix: cholespy, else SciPy's SuperLU. For many matrices of one pattern: MKL's PARDISO
-(pypardiso), which keeps the symbolic analysis, else those. A factorisation was measured to be ten times faster with it.
+(pypardiso), which keeps the symbolic analysis, else the two above. With it a factorisation was ten times faster.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from .finite_strain import FiniteStrainSolid
 
 
 class NotPositiveDefiniteError(ValueError):
-    """The matrix has no Cholesky factor: the solid is unstable at this state, or the step was too large."""
+    """Error for a matrix without Cholesky factor: the solid is unstable at this state, or the step was too large."""
 
 
 _BATCH = 128  # right-hand sides cholespy takes at once
@@ -27,7 +27,7 @@ _BATCH = 128  # right-hand sides cholespy takes at once
 def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy sparse, imported lazily)
     """Return a function that solves ``matrix @ x = b``, b (n, k) float64, for a symmetric positive definite CSC matrix.
 
-    Raises NotPositiveDefiniteError where cholespy finds that it is not; SuperLU does not look.
+    Raises NotPositiveDefiniteError if cholespy finds that it is not; SuperLU does not check.
     """
     try:
         import cholespy
@@ -40,7 +40,7 @@ def factor(matrix) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy
         raise NotPositiveDefiniteError(str(error)) from error
 
     def solve(b: np.ndarray) -> np.ndarray:
-        """Solve b (n, k) in parts that cholespy takes, each copied, since it wants its rows contiguous."""
+        """Return the solution for b (n, k), in parts that cholespy takes, copied since it wants contiguous rows."""
         x = np.empty_like(b)
         for start in range(0, b.shape[1], _BATCH):
             part = np.ascontiguousarray(b[:, start : start + _BATCH])
@@ -70,8 +70,7 @@ class PatternFactor:
     def __call__(self, upper) -> Callable[[np.ndarray], np.ndarray]:  # noqa: ANN001 (scipy CSR)
         """Return a function that solves ``matrix @ x = b`` for b (n, k); valid until the next call.
 
-        upper : the matrix's upper triangle, sorted, all of the diagonal in it. Raises NotPositiveDefiniteError as
-        ``factor`` does."""
+        upper : the matrix's upper triangle, sorted, with the whole diagonal. Raises NotPositiveDefiniteError."""
         if self._pardiso is None:
             import scipy.sparse
 
@@ -111,7 +110,7 @@ _SYMMETRIC_POSITIVE_DEFINITE = 2
 
 
 def _pardiso():  # noqa: ANN202
-    """A PARDISO solver, or None where pypardiso is missing or finds no MKL."""
+    """Return a PARDISO solver, or None if pypardiso is missing or finds no MKL."""
     try:
         import pypardiso
 
@@ -131,12 +130,12 @@ _MOST_BENDING = 0.3  # of a node's own stiffness (assumed)
 
 
 class DampedFactor:
-    """The solver of one solid's tangents, with as much damping as they need to be positive definite.
-    Where the solid is unstable (a node about to slide off a ridge) Newton's iteration then follows it to the next
+    """Solver for one solid's tangents, which adds as much damping as makes them positive definite.
+    Through an unstable state (a node about to slide off a ridge) Newton's iteration then goes on to the next
     equilibrium, which does not depend on the damping.
 
     factor : solver for the solid's sparsity pattern
-    damping : added to each node's own stiffness, over ``stiffness``, N/m, that of a typical node"""
+    damping : added to each node's own stiffness, as a multiple of ``stiffness``, N/m, that of a typical node"""
 
     def __init__(self, solid: FiniteStrainSolid, factor: PatternFactor) -> None:
         self._pattern, self._factor, self.damping = solid.pattern, factor, 0.0
@@ -150,8 +149,8 @@ class DampedFactor:
     def solver(self, blocks: np.ndarray, held: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
         """Return a function from forces (n, 3) N to displacements (n, 3) m, which are zero where held (n, 3) bool.
 
-        blocks : (n_blocks, 3, 3) N/m, of the tangent on the solid's pattern; the damping is added to them in place.
-        Raises NotPositiveDefiniteError where even much damping is too little."""
+        blocks : (n_blocks, 3, 3) N/m, of the tangent in the pattern's order; damping is added to them in place.
+        Raises NotPositiveDefiniteError if even much damping is too little."""
         free, pattern = self._pattern.free, self._pattern
         for _ in range(_TRIES):
             blocks[pattern.diagonal] += self.damping * self.stiffness * np.eye(3)
@@ -174,7 +173,7 @@ class DampedFactor:
 
 
 def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Return the curvature terms ``bending`` (k, 3, 3) N/m, at most 0.3 of their nodes' stiffness (k, 3, 3) N/m.
+    """Return the curvature terms ``bending`` (k, 3, 3) N/m, cut to 0.3 of their nodes' stiffness (k, 3, 3) N/m.
 
     At a ridge sharper than the mesh the whole term would make the matrix indefinite; less of it only costs steps."""
     size = np.abs(bending).max(axis=(1, 2))
@@ -184,10 +183,10 @@ def held_back(bending: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
 
 class LinearSystem(NamedTuple):
     """Linear system of a Newton step, in the frames of the nodes that touch.
-    solve : from forces (n, 3) N to the steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
+    solve : function from forces (n, 3) N to steps (n, 3) m of what is not held; matrix : sparse (3 n, 3 n) N/m
     residual : (n, 3) N, internal minus outer forces; prescribed : (n, 3) m, steps of what is held, 0 elsewhere
     loose_swell : (n, 3) m2, gradient of the fluid's volume, 0 at what is held
-    excess : m3, of the fluid's volume over that which it must have"""
+    excess : m3, by which the fluid's volume exceeds its true one"""
 
     solve: Callable[[np.ndarray], np.ndarray]
     matrix: Any

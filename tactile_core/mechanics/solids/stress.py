@@ -44,7 +44,7 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
 
 
 def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
-    """Return the values (n, ...) at the nodes of a field (n_cells, 27, ...) known at the Gauss points.
+    """Return a field's values (n, ...) at the nodes, from its values (n_cells, 27, ...) at the Gauss points.
 
     In each cell a trilinear function is fitted (local L2 projection); a node has the mean over its cells, by volume. A
     field that is linear in a cell's own coordinates is reproduced. For a smooth von Mises stress, smooth the tensor
@@ -64,12 +64,12 @@ def at_nodes(solid: FiniteStrainSolid, values: np.ndarray) -> np.ndarray:
 
 
 def _trilinear(points: np.ndarray) -> np.ndarray:
-    """1, x, y, z, xy, xz, yz, xyz (n, 8) at points (n, 3)."""
+    """Return the functions 1, x, y, z, xy, xz, yz, xyz (n, 8) at points (n, 3)."""
     x, y, z = points.T
     return np.column_stack([np.ones(len(points)), x, y, z, x * y, x * z, y * z, x * y * z])
 
 
 def _node_places() -> np.ndarray:
-    """Coordinates (27, 3) of a cell's nodes in its own frame, ``HexMesh``'s order."""
+    """Return the coordinates (27, 3) of a cell's nodes in its own frame, in ``HexMesh``'s order."""
     c, b, a = np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij")
     return np.stack([a, b, c], -1).reshape(-1, 3)
