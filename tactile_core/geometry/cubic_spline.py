@@ -10,9 +10,9 @@ from ..files.compiled import Loop
 class EvenSpline:
     """The cubic spline with not-a-knot ends (de Boor, A Practical Guide to Splines, chapter IV) on an even grid.
 
-    start, step : position of the first node and distance between nodes, any unit; count : nodes, 5 or more.
-    Values at nodes v (count, ...) have B-spline coefficients ``to_coefficients @ v`` (count + 2, ...).
-    Beyond the ends a position counts as the end: the first and last values are held.
+    start, step : position of the first node and distance between nodes, any unit; count : number of nodes, 5 or more
+    Values at nodes v (count, ...) have B-spline coefficients ``to_coefficients @ v`` (count + 2, ...). Positions beyond
+    an end count as the end: the spline is constant there.
     """
 
     def __init__(self, start: float, step: float, count: int) -> None:
@@ -23,7 +23,7 @@ class EvenSpline:
 
     @classmethod
     def through(cls, nodes: np.ndarray) -> EvenSpline:
-        """Make the spline through evenly spaced positions ``nodes`` (count,)."""
+        """Make the spline whose nodes lie at the evenly spaced positions ``nodes`` (count,)."""
         return cls(nodes[0], (nodes[-1] - nodes[0]) / (len(nodes) - 1), len(nodes))
 
     @property
@@ -36,15 +36,15 @@ class EvenSpline:
         return EvenSpline(self.start, self.step / factor, (self.count - 1) * factor + 1)
 
     def cells(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return, for each position (n,), the index (n,) of its first of four coefficients, and its place (n,), 0 to 1,
-        in the interval between two nodes."""
+        """Return, for each position (n,), the index (n,) of its first of four coefficients, which is that of the node
+        before it; and its place (n,), 0 to 1, between that node and the next."""
         place = np.clip((position - self.start) / self.step, 0, self.count - 1)
         cell = np.minimum(place.astype(np.intp), self.count - 2)
         return cell, place - cell
 
     def matrix(self, position: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Return the matrix (n, count) from values at nodes to the spline's values at position (n,), or, with
-        derivative 1, to its slopes there."""
+        """Return the matrix (n, count) from values at nodes to the spline's values at position (n,) or, if
+        ``derivative`` is 1, to its slopes there."""
         cell, place = self.cells(position)
         basis = np.zeros((len(cell), self.count + 2))
         weights = bspline_slopes(place) / self.step if derivative else bspline_weights(place)
@@ -57,7 +57,7 @@ class EvenSpline:
 
 
 def bspline_weights(t: np.ndarray) -> np.ndarray:
-    """Return the four uniform cubic B-splines at places t (n,) of their interval, 0..1; (4, n), they sum to 1."""
+    """Return the four uniform cubic B-splines (4, n) at places t (n,), 0 to 1, in their interval; they sum to 1."""
     s = 1 - t
     weights = np.empty((4, len(t)), t.dtype)
     weights[0] = s * s * s / 6
@@ -68,7 +68,7 @@ def bspline_weights(t: np.ndarray) -> np.ndarray:
 
 
 def bspline_slopes(t: np.ndarray) -> np.ndarray:
-    """Return the derivatives of ``bspline_weights`` by t; (4, n)."""
+    """Return the derivatives (4, n) of ``bspline_weights`` with respect to t (n,)."""
     s = 1 - t
     return np.stack([-s * s, 3 * t * t - 4 * t, 4 * s - 3 * s * s, t * t]) / 2
 
@@ -94,9 +94,9 @@ def on_grid(axes: np.ndarray, places: np.ndarray, *, closed: bool) -> np.ndarray
 
 
 def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Return, for places (2, n) as (row, column) of a grid of ``shape`` (rows, columns), the 4 x 4 nodes (4, 4, n)
-    around each, as row * columns + column, and their Catmull-Rom weights (4, 4, n). closed : true if
-    the columns go round, the first after the last; at other edges places are held within the grid"""
+    """Return, for (row, column) places (2, n) on a grid of ``shape`` (rows, columns), the 4 x 4 nodes (4, 4, n) around
+    each, as row * columns + column, and their Catmull-Rom weights (4, 4, n).
+    closed : true if the last column joins the first; places beyond an edge that is not joined count as the edge"""
     rows, columns = shape
     ends = np.array([[rows - 1], [columns - 1]])
     held = np.minimum(np.maximum(places, 0), ends)
@@ -114,7 +114,7 @@ def stencil(shape: tuple[int, int], places: np.ndarray, *, closed: bool) -> tupl
 
 
 def catmull_rom(t: np.ndarray | float) -> np.ndarray:
-    """Return the weights (4, ...) of nodes -1, 0, 1, 2 at places t (...), 0 to 1: cubic, once differentiable."""
+    """Return the Catmull-Rom weights (4, ...), cubic, of nodes -1, 0, 1, 2 at places t (...), 0 to 1."""
     square = t * t
     cube = square * t  # numpy's general power takes ten times as long
     return np.array([

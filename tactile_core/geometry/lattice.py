@@ -18,10 +18,10 @@ class Lattice:
 
     rest : (n_nodes, 3) float64, m, the undeformed surface in the shared frame of ``sensors``
     faces : (n_faces, 3) int32, triangles, normals outward
-    shape : (rows, columns), node index = row * columns + column; a surface that closes at poles
-        carries them after the grid (tip pole first, base pole last)
-    window : the (rows, columns) slices inside which the grid is exactly separable
-        (x depends on the row alone and z on the column alone, both evenly spaced); None where there is none
+    shape : (rows, columns), node index = row * columns + column; the poles of a surface that closes at its ends come
+        after the grid (tip pole first, base pole last)
+    window : slices of rows and columns in which x depends on the row alone and z on the column alone, both evenly
+        spaced; None without such a part
     """
 
     rest: np.ndarray
@@ -51,17 +51,17 @@ class Lattice:
 
     @functools.cached_property
     def axes(self) -> np.ndarray:
-        """Resting nodes of the grid, poles left out, axis by axis, (3, rows, columns) m."""
+        """Coordinates x, y, z (3, rows, columns) m of the grid's resting nodes, poles left out."""
         return np.ascontiguousarray(np.moveaxis(self.grid(self.rest), 2, 0))
 
     @functools.cached_property
     def window_rest(self) -> np.ndarray:
-        """Resting nodes (rows, columns, 3) m of the window, which the surface must have."""
+        """Resting nodes (rows, columns, 3) m of the window; for surfaces that have one."""
         return self.grid(self.rest)[self.window]
 
     @functools.cached_property
     def window_axes(self) -> tuple[EvenSpline, EvenSpline]:
-        """Splines through the window's nodes: through their x, m, by row, and through their z, m, by column."""
+        """Splines through the window's nodes: of x, m, over the row, and of z, m, over the column."""
         return EvenSpline.through(self.window_rest[:, 0, 0]), EvenSpline.through(self.window_rest[0, :, 2])
 
     def grid(self, values: np.ndarray) -> np.ndarray:
@@ -72,8 +72,8 @@ class Lattice:
 
 
 def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
-    """Return the triangles (n, 3) int32 of a grid, two per cell, nodes counted row by row; outward if the cross product
-    of the steps to the next row and to the next column is. closed : true if the last column joins the first"""
+    """Return the triangles (n, 3) int32 of a grid, two per cell, nodes counted row by row. They point along the cross
+    product of a step to the next row with one to the next column. closed : true if the last column joins the first"""
     row = np.arange(rows - 1)[:, None]
     column = np.arange(columns if closed else columns - 1)[None, :]
     right = (column + 1) % columns
@@ -84,7 +84,7 @@ def grid_faces(rows: int, columns: int, *, closed: bool) -> np.ndarray:
 
 
 def cap_faces(pole: int, ring: np.ndarray) -> np.ndarray:
-    """Return a fan of triangles (n, 3) int32 that closes a ring (n,) of nodes at the node ``pole``; nodes by number."""
+    """Return a fan of triangles (n, 3) int32 between a node, ``pole``, and a closed ring (n,) of nodes, by number."""
     return np.stack([np.full(len(ring), pole), ring, np.roll(ring, -1)], -1).astype(np.int32)
 
 
@@ -96,8 +96,8 @@ _STEEPEST = 1.1  # largest slope of a distance: 1, and a little more for a mesh'
 
 
 class LatticeBlocks:
-    """Search index: blocks of 6 x 6 nodes, of ``rest`` (n, 3) m on a grid of ``shape`` (rows, columns), looked at only
-    where near; each node after the grid, a pole, is a block."""
+    """Search index of nodes ``rest`` (n, 3) m: blocks of 6 x 6 of a grid of ``shape`` (rows, columns), of which only
+    near ones are searched; each node after the grid, a pole, is a block."""
 
     def __init__(self, rest: np.ndarray, shape: tuple[int, int]) -> None:
         row, column = np.divmod(np.arange(shape[0] * shape[1]), shape[1])
@@ -112,7 +112,7 @@ class LatticeBlocks:
         ])  # fmt: skip
 
     def near(self, indenter: Indenter, pose: Pose, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Find the nodes (k,), sorted, inside an indenter or nearer than ``reach`` m, and their distances (k,) m."""
+        """Find the nodes (k,), sorted, inside an indenter or within ``reach`` m of it, and their distances (k,) m."""
         close = pose.distance(indenter, self._centre)[0] < reach + _STEEPEST * self._radius
         nodes = np.flatnonzero(close.take(self._label))
         gap = pose.distance(indenter, self._rest.take(nodes, axis=0))[0]

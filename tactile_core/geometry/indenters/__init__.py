@@ -1,4 +1,4 @@
-"""Rigid indenters by signed distance. A new one is one file here and one test row.
+"""Rigid indenters by signed distance. To add one takes one file here and one row in a test.
 
 In its own frame an indenter touches the plane z = 0 at the origin from above: its body lies at z >= 0.
 """

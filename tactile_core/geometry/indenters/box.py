@@ -14,7 +14,7 @@ from .indenter import NEAREST, Indenter, SceneForm, Size, check_length, contiguo
 
 @dataclasses.dataclass(frozen=True)
 class Box(Indenter):
-    """A box along the own axes that touches with its flat lower face.
+    """A box with edges along its own axes that touches with its flat lower face.
 
     sizes : full lengths along x, y, z, m; edge : m, radius of its edges and corners, less than half the smallest size
     """
@@ -62,8 +62,8 @@ class Box(Indenter):
 
 @Loop
 def _from_box(points, middle, inner, edge):  # noqa: ANN001, ANN202
-    """Distance (n,) m and its gradient (n, 3) of points (n, 3) m from a box; middle, inner : (3,) m, its centre and
-    half sides before it is inflated by ``edge`` m"""
+    """Return the distance (n,) m of points (n, 3) m from a box, and its gradient (n, 3). middle : (3,) m, the centre
+    inner : (3,) m, half sides before the box is inflated by ``edge`` m"""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         square, face, deepest = 0.0, 0, -np.inf

@@ -23,7 +23,7 @@ class BumpyCube(Indenter):
 
     size : m, of the cube; edge : m, radius of its edges
     bump_radius : m, of the balls that the bumps are part of; bump_height : m, by which they stand out of the face
-    spacing : m, of the four outer bumps from the middle one, along x and along y
+    spacing : m, distance of the four outer bumps from the middle one, along x and along y
     """
 
     size: float
@@ -97,7 +97,8 @@ class BumpyCube(Indenter):
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Find the nearest part (n,), distance (n,) m and gradient (n, 3), and points (n, 3) in its bump's frame."""
+        """Return, of points (n, 3), the nearest part (n,), its distance (n,) m, gradient (n, 3), points from their
+        bump."""
         outer = np.copysign(self.spacing, points[:, :2])
         outer[np.abs(points[:, 0]) + np.abs(points[:, 1]) <= self.spacing] = 0.0
         at_bump = points.copy()
@@ -115,8 +116,9 @@ class BumpyCube(Indenter):
         return branch, distance, gradient, at_bump
 
     def _above(self, points, at_bump, of_ball, from_ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # noqa: ANN001
-        """Find the part nearest to points (n, 3) m in the cube above a bump, its distance and gradient.
-        at_bump : points in the bump's ball's frame; of_ball, from_ball : their distance and gradient there"""
+        """Return the part nearest to points (n, 3) m that lie in the cube above a bump, its distance and gradient.
+        at_bump : points in the frame of their bump's ball; of_ball, from_ball : its distance and gradient there
+        """
         reach, toward = circle_distance(at_bump - [0.0, 0.0, self.bump_height], self._foot)
         shaft, pose = self._shaft
         of_shaft, from_shaft = shaft.distance(points - pose.apex)

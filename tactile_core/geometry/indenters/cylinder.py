@@ -19,7 +19,7 @@ _ORDER = {0: ([1, 2], [2, 0, 1]), 2: ([0, 1], [0, 1, 2])}  # axis -> axes across
 @dataclasses.dataclass(frozen=True)
 class Cylinder(Indenter):
     """An upright cylinder that touches with its flat end. radius, length : m; edge : m, radius of its rounded rims
-    axis : index of the own axis that the shape is round about, set by the class"""
+    axis : index of its own axis of symmetry, set by the class"""
 
     radius: float
     edge: float
@@ -59,8 +59,8 @@ class Cylinder(Indenter):
 
 @Loop
 def _from_cylinder(points, axis, middle, radius, half_span, edge, nearest):  # noqa: ANN001, ANN202
-    """Distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along axis 0, 1 or 2 about a middle (3,)
-    m.
+    """Return the distance (n,) m and gradient (n, 3) of points (n, 3) m from a cylinder along axis 0, 1 or 2, centre at
+    middle (3,) m.
     radius, half_span : m, before it is inflated by ``edge`` m; nearest : m, least distance from the axis"""
     distance, gradient = np.empty(len(points)), np.empty((len(points), 3))
     first, second = (axis + 1) % 3, (axis + 2) % 3

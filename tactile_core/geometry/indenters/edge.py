@@ -52,7 +52,7 @@ class Edge(Indenter):
         return np.array([x, y, z]) + self.radius * direction
 
     def _corners(self) -> np.ndarray:
-        """Corners (3, 2) m of the smaller wedge across its ridge, counterclockwise in (y, z)."""
+        """Return the corners (3, 2) m of the smaller wedge's cross section, counterclockwise in (y, z)."""
         rise = self.height - 2 * self.radius
         half_width = rise * np.tan(self.angle / 2)
         corners = np.array([[0, 0], [half_width, rise], [-half_width, rise]])

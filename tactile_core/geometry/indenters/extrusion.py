@@ -14,9 +14,9 @@ from .indenter import NEAREST
 
 
 class Outline(NamedTuple):
-    """A two-dimensional signed distance at n places: ``value`` (n,) m, positive outside, and ``slope`` (n, 2), its
-    gradient.
-    radius : (n,) m, of curvature of the line of equal distance through each place; infinite where it is straight"""
+    """Signed distance of a plane figure at n places: ``value`` (n,) m, positive outside, and its gradient ``slope`` (n,
+    2).
+    radius : (n,) m, of curvature of the line of equal distance through each place; infinite if that is straight"""
 
     value: np.ndarray
     slope: np.ndarray
@@ -24,7 +24,7 @@ class Outline(NamedTuple):
 
 
 def disc(across: np.ndarray, radius: float) -> Outline:
-    """Return the outline of a disc of radius m about the origin, at places ``across`` (n, 2) m; radius 0 is a point."""
+    """Return the outline of a disc about the origin, radius m (0: a point), at places ``across`` (n, 2) m."""
     length = np.sqrt(np.einsum("ni,ni->n", across, across))
     centre = length < NEAREST
     length = np.maximum(length, NEAREST)
@@ -34,8 +34,7 @@ def disc(across: np.ndarray, radius: float) -> Outline:
 
 
 def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the signed distance (n,) m from a rounded prism, and its gradient (n, 3): two components across, one
-    along.
+    """Return the signed distance (n,) m from a rounded prism and its gradient (n, 3), two components across, one along.
     outline : of the prism, at the places across; along : (n,) m, the places along its axis, from its middle
     half_span : m, half the prism's length before it is inflated by ``edge`` m"""
     side, end = outline.value, np.abs(along) - half_span
@@ -55,7 +54,7 @@ def distance(outline: Outline, along: np.ndarray, half_span: float, edge: float)
 
 
 def curvature(outline: Outline, along: np.ndarray, half_span: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``distance``, for the same outline, along and half_span."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``distance``; outline, along (n,) m, half_span m as there"""
     side, end = outline.value, np.abs(along) - half_span
     across, beyond, corner = _corner(side, end)
     # On a round corner the normal turns in the plane of the outline's normal and the axis.

@@ -1,5 +1,6 @@
-"""Base class of indenters, the checks that all of them share, and how a shape's own file describes it to scenes and
-menus: its kind, its sizes in millimetres, its menu entry."""
+"""Base class of indenters, checks that all share, and the form in which a shape's file describes it to scenes and
+menus.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ Hull = Callable[[Callable[[np.ndarray], np.ndarray]], Surface]  # surface of a c
 
 
 class Indenter(Protocol):
-    """A rigid body given by its signed distance. Shapes inherit from it."""
+    """A rigid body given by its signed distance, in its own frame. Shapes inherit from it."""
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the signed distance (n,) m, positive outside, and its gradient (n, 3), at points (n, 3) m."""
@@ -32,12 +33,12 @@ class Indenter(Protocol):
     def curvature(self, points: np.ndarray) -> np.ndarray:
         """Return the symmetric second derivatives (n, 3, 3) 1/m of the distance at points (n, 3) m in the own frame.
 
-        They belong to the same branch as ``distance``'s gradient; on creases, a thin set, one side's are given.
+        They belong to the same branch as ``distance``'s gradient; on creases they are those of one of the sides.
         """
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """Return the point (3,) m of the body's convex hull farthest along a unit vector ``direction`` (3,), own frame.
-        Where a whole flat, circle or line lies farthest, its middle."""
+        """Return the point (3,) m of the body's convex hull farthest along a unit vector ``direction`` (3,), own frame;
+        if a whole flat, circle or line lies farthest, its middle."""
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the lower and upper corner (3,) m of the smallest box along the own axes that holds the body."""
@@ -47,7 +48,7 @@ class Indenter(Protocol):
 
     def preview(self, hull: Hull) -> Surface:
         """Return nodes (n, 3) m, own frame, and triangles (m, 3) that show the body.
-        hull : function that makes them of a convex body's ``support``"""
+        hull : function that makes these for a convex body, given its ``support``"""
         return hull(self.support)
 
     @functools.cached_property
@@ -63,19 +64,19 @@ def contiguous(points: np.ndarray) -> np.ndarray:
 
 
 def lengths(vectors: np.ndarray) -> np.ndarray:
-    """Return the lengths (n,) of vectors (n, 3), in half of ``np.linalg.norm``'s time where they are few."""
+    """Return the lengths (n,) of vectors (n, 3), for few of them in half the time of ``np.linalg.norm``."""
     return np.sqrt(np.einsum("ai,ai->a", vectors, vectors))
 
 
 def check_length(kind: str, name: str, value: float) -> None:
-    """Raise TactileError for a length ``value``, m, that is no number between 0.001 mm and 1 m.
-    kind, name : of the shape and of its length, for the message"""
+    """Raise TactileError unless a length ``value``, m, is a number between 0.001 mm and 1 m.
+    kind, name : words for the shape and for the length, for the message"""
     expected, advice = "a length in m, between 0.001 mm and 1 m", "Check the unit: scenes give millimetres"
     finite_number(value, f"{kind}, {name}", expected, 1e-6, 1.0, advice)
 
 
 def sign_of(component: np.ndarray | float) -> np.ndarray:
-    """Return the signs -1, 0, 1 (...) of a direction's component (...), 0 for those that are zero up to rounding."""
+    """Return the sign -1, 0 or 1 (...) of a direction's component (...), 0 if that is zero up to rounding."""
     return np.where(np.abs(component) > SQUARE, np.sign(component), 0.0)
 
 
@@ -85,8 +86,8 @@ _OWN_DOWN = np.array([0.0, 0.0, -1.0])
 @dataclasses.dataclass(frozen=True)
 class Pose:
     """Position and orientation of an indenter: own origin at ``apex`` (3,) m, own axes as columns of ``axes`` (3, 3).
-    push : unit vector (3,) of the sensor's frame along which the indenter moves; None for its own -z
-    Raises TactileError for a number that is nan or infinite.
+    push : unit vector (3,), in the sensor's frame, along which the indenter moves; None for its own -z
+    Raises TactileError for other shapes, and for a number that is nan or infinite.
     """
 
     apex: np.ndarray
@@ -140,22 +141,23 @@ class Pose:
         return points @ self.axes.T + self.apex
 
     def distance(self, indenter: Indenter, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the signed distance (n,) m and gradient (n, 3) of the placed indenter at sensor points (n, 3) m."""
+        """Return the placed indenter's signed distance (n,) m and gradient (n, 3) at points (n, 3) m of the sensor."""
         distance, gradient = indenter.distance(self.to_own(points))
         return distance, gradient @ self.axes.T
 
     def curvature(self, indenter: Indenter, points: np.ndarray) -> np.ndarray:
-        """Return the second derivatives (n, 3, 3) 1/m of the placed indenter's distance at sensor points (n, 3) m."""
+        """Return the second derivatives (n, 3, 3) 1/m of the placed indenter's distance at points (n, 3) m of the
+        sensor."""
         return self.axes @ indenter.curvature(self.to_own(points)) @ self.axes.T
 
     def support(self, indenter: Indenter, direction: np.ndarray) -> np.ndarray:
-        """Return the placed indenter's farthest point (3,) m along a unit vector ``direction`` (3,) of the sensor."""
+        """Return the placed indenter's farthest point (3,) m along a unit vector ``direction`` (3,), sensor frame."""
         return self.apex + self.axes @ indenter.support(direction @ self.axes)
 
 
 def tangents(outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two unit tangents (..., 3) of a surface with unit normals ``outward`` (..., 3): ``along``, the tangent
-    nearest to +x, and the cross product along x outward (on the pad toward -z)."""
+    nearest to +x, and the cross product of along and outward (on the pad toward -z)."""
     along = np.array([1.0, 0.0, 0.0]) - outward[..., :1] * outward
     along /= np.linalg.norm(along, axis=-1, keepdims=True)
     return along, np.cross(along, outward)
@@ -167,7 +169,8 @@ def pose_on(
     """Return the pose in which the indenter just touches ``point`` (3,) m of a surface, unit normal ``outward`` (3,).
 
     tilt : rad, between the indenter's axis, along which it moves, and that normal
-    tilt_heading : rad, the way its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z"""
+    tilt_heading : rad, where its upper end leans: 0 toward +x of the finger, pi / 2 (on the pad) toward -z
+    """
     along, side = tangents(outward)
     axis = np.cos(tilt) * outward + np.sin(tilt) * (np.cos(tilt_heading) * along + np.sin(tilt_heading) * side)
     first = along - axis * (along @ axis)
@@ -178,10 +181,10 @@ def pose_on(
 
 @dataclasses.dataclass(frozen=True)
 class Size:
-    """A size of a shape as scene files give it.
+    """A size of a shape, as scene files give it.
 
     field : its name in scenes, which ends in its unit, ``_mm`` or ``_deg``; count : how many numbers it takes
-    default : its value, in that unit, where a scene leaves it out; None: it must be given
+    default : its value, in that unit, if a scene leaves it out; None: it must be given
     slider : name of the size in Blender's Add menu that sets it; empty: a new object has the default"""
 
     field: str
@@ -199,9 +202,9 @@ class Size:
 @dataclasses.dataclass(frozen=True)
 class SceneForm:
     """Entry of a shape in scenes and in Blender's Add menu; every module here with a ``SCENE`` of this type has one.
-
-    kind : its name in scenes; shape : class or function that makes it; says : what it is, in a line
-    sizes : argument of ``shape`` -> its ``Size``, those without a default first; label, icon : of the menu, "" for none
+    kind : its name in scenes; shape : class or function that makes it; says : what it is, in one line
+    sizes : the ``Size`` of each argument of ``shape``, those without a default first
+    label, icon : in the menu, "" for none
     """
 
     kind: str
@@ -212,7 +215,8 @@ class SceneForm:
     icon: str = ""
 
     def build(self, values: Mapping[str, Any]) -> Indenter:
-        """Build the shape from values, mm or degrees, by ``Size.field``. Raises TactileError for an impossible body."""
+        """Build the shape from values in mm or degrees, by ``Size.field``. Raises TactileError for an impossible
+        body."""
         return self.shape(**{argument: size.in_si(values[size.field]) for argument, size in self.sizes.items()})
 
 

@@ -12,7 +12,7 @@ from .indenter import SceneForm, Size, check_length
 
 @dataclasses.dataclass(frozen=True)
 class LyingCylinder(Cylinder):
-    """A cylinder along the own x that touches with its side. Lengths in m; ``edge`` is the radius of its rounded rims.
+    """A cylinder along its own x that touches with its side. Lengths in m; ``edge`` is the radius of its rounded rims.
 
     An edge as large as the cylinder's radius makes the ends half balls."""
 

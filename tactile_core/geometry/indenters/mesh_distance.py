@@ -1,4 +1,4 @@
-"""Exact distance to the triangles of a mesh, looked up in cells near a point."""
+"""Exact distance to the triangles of a mesh, by search among those in cells near a point."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _TOGETHER = 20_000  # points looked up at a time without numba
 
 
 class NearTriangles:
-    """Search index of triangles (m, 3, 3), any unit: cut into pieces no longer than ``cell``, sorted into cubes of that
-    side; it is raised for many long triangles. middles : (k, 3), of the pieces"""
+    """Search index of triangles (m, 3, 3), any unit: they are cut into pieces no longer than ``cell``, which are sorted
+    into cubes of that side; many long triangles get a larger cell. middles : (k, 3), of the pieces"""
 
     def __init__(self, triangles: np.ndarray, cell: float) -> None:
         cell = max(cell, float(_sides(triangles).max(axis=1).sum()) / _LONGEST)
@@ -40,7 +40,7 @@ class NearTriangles:
         self._boxes[flat[first], 1] = np.maximum.reduceat(corners.max(axis=1), first)
 
     def distance(self, points: np.ndarray, bound: float) -> np.ndarray:
-        """Return the distance (n,) from points (n, 3) to the nearest triangle, inf where it is ``bound`` or more."""
+        """Return the distance (n,) from points (n, 3) to the nearest triangle; inf if it is ``bound`` or more."""
         if not available():
             return self._by_tree(points, bound)
         farthest = int(np.ceil(bound / self._cell)) + 1  # a piece reaches into the next cell
@@ -55,7 +55,8 @@ class NearTriangles:
         return self._cell * np.sqrt(squares)
 
     def _by_tree(self, points: np.ndarray, bound: float) -> np.ndarray:
-        """See ``distance``; without numba: looks at ever more of the nearest pieces until no other can be nearer."""
+        """Return ``distance`` of points, bound without numba: search ever more of the nearest pieces, to the
+        nearest."""
         import scipy.spatial
         import trimesh
 
@@ -80,11 +81,11 @@ def _sides(corners: np.ndarray) -> np.ndarray:
 
 
 def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Cut triangles (m, 3, 3) until no edge is above ``longest``; returns four-sided pieces (k, 4, 3), their triangles
-    (k,).
+    """Cut triangles (m, 3, 3) until no edge is longer than ``longest``. Return four-sided pieces (k, 4, 3) and the
+    index of each one's triangle (k,).
 
     Two opposite edges are halved at a time, first the two beside a triangle's shortest: the number of pieces of a
-    slender one then grows as its length, not its square."""
+    slender triangle then grows with its length, not the square of it."""
     order = (_sides(triangles).argmin(axis=1)[:, None] + [0, 1, 2, 2]) % 3  # the last edge but one has no length
     whole, owner, pieces, owners = np.take_along_axis(triangles, order[:, :, None], 1), np.arange(len(order)), [], []
     while len(whole):
@@ -103,12 +104,12 @@ def _pieces(triangles: np.ndarray, longest: float) -> tuple[np.ndarray, np.ndarr
 
 @functools.partial(Loop, waits=False)  # many cells and triangles for each of few points
 def _least_squares(places, cells, triangles, starts, members, discs, boxes, shape, farthest, bound):  # noqa: ANN001, ANN202
-    """Squared distance (n,) from places (n, 3) to the nearest triangle, inf from ``bound`` on, squared too; unit:
-    cells.
+    """Return the squared distance (n,), in cells, from places (n, 3) to the nearest triangle; inf from ``bound``,
+    squared too, on.
 
-    The piece nearest to the place before comes first, then those, in cells at most ``farthest`` from a place's own,
-    whose cell's box (2, 3) and whose disc (middle, radius, normal) are nearer than what was found. Boxes are first
-    measured from the first place of a cell: others are nearer by no more than they are from that place. A foot inside
+    The piece nearest to the place before comes first. Then come those, in cells at most ``farthest`` from a place's
+    own, whose cell's box (2, 3) and whose disc (middle, radius, normal) are nearer than what was found. Boxes are first
+    measured from the first place of a cell: from the others they are nearer by at most the way between. A foot inside
     the triangle gives the distance to its plane, any other the distance to its nearest edge."""
     squares, normal, arm, edge = np.empty(len(places)), np.empty(3), np.empty(3), np.empty(3)
     most = (2 * farthest + 1) * (2 * farthest + 1) * (2 * farthest + 1)

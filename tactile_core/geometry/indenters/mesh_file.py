@@ -1,6 +1,6 @@
 """Read triangle meshes as indenters without running or fetching anything; refuse those that bound no solid.
 
-Meshes are in mm here and wherever trimesh works on them: its tolerances are absolute, made for numbers of that size.
+Meshes are in mm here and wherever trimesh works on them: its tolerances are absolute, for numbers of that size.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
     content : of the file; where : the file, for its suffix and for messages; scale : m per unit of the file
     up : the file's axis, x, y, z, -x, -y or -z, that points out of the sensor
     Raises TactileError unless it is closed, wound outward, and has the size of an indenter. Whether it crosses itself
-    shows when its grid is built."""
+    is checked only when its grid is built."""
     vertices, faces = _parsed(content, pathlib.Path(where))
     mesh = closed_mesh(vertices @ _turn(up).T, faces, where, scale)
     low = mesh.vertices[mesh.vertices[:, 2] < mesh.vertices[:, 2].min() + _LOWEST_MM]
@@ -60,8 +60,8 @@ def solid(content: bytes, where: str | os.PathLike, scale: float, up: str) -> An
 
 
 def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLike, scale: float) -> Any:
-    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), where it stands; vertices that coincide
-    become one. where : names the mesh in messages; scale : m per unit of the vertices
+    """Return the solid (a trimesh, mm) of vertices (n, 3) and faces (m, 3), not moved; vertices that coincide become
+    one. where : names the mesh in messages; scale : m per unit of the vertices
     Raises TactileError for a mesh that is too large, too small, or not closed."""
     import trimesh
 
@@ -78,7 +78,7 @@ def closed_mesh(vertices: np.ndarray, faces: np.ndarray, where: str | os.PathLik
 
 
 def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unite vertices (n, 3) that differ by rounding alone; returns those that are left, and faces (m, 3) of them."""
+    """Unite vertices (n, 3) that differ by rounding alone; return those that are left, and the faces (m, 3) by them."""
     import scipy.sparse
     import scipy.spatial
 
@@ -92,7 +92,7 @@ def _welded(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]:
-    """Parse vertices (n, 3) in the file's unit and faces (m, 3)."""
+    """Return vertices (n, 3), in the file's unit, and faces (m, 3). Raises TactileError for a damaged file."""
     import trimesh
 
     _check_length(content, path)
@@ -109,7 +109,7 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
 
 
 def _check_whole(content: bytes, path: pathlib.Path) -> None:
-    """Raise TactileError for a binary STL that is shorter than it declares: it would be taken for text."""
+    """Raise TactileError for a binary STL shorter than it declares, which trimesh would take for text."""
     if path.suffix.lower() != ".stl" or b"\0" not in content[:84]:  # text has no zero byte
         return
     count = int.from_bytes(content[80:84], "little")
@@ -119,7 +119,7 @@ def _check_whole(content: bytes, path: pathlib.Path) -> None:
 
 
 def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Raise TactileError unless vertices (n, 3) and faces (m, 3) are 1 to MAX_FACES triangles of finite coordinates.
+    """Raise TactileError unless vertices (n, 3) and faces (m, 3) are 1 to MAX_FACES triangles, all coordinates finite.
     where : names the mesh in messages"""
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
         found = f"vertices {vertices.shape}, faces {faces.shape}"
@@ -135,7 +135,7 @@ def check_triangles(where: str | os.PathLike, vertices: np.ndarray, faces: np.nd
 
 
 def _check_length(content: bytes, path: pathlib.Path) -> None:
-    """Refuse a file of far more than MAX_FACES triangles before it is parsed."""
+    """Raise TactileError, before parsing, for a file of far more than MAX_FACES triangles."""
     words = sum(content.count(mark) for mark in b" \t\r\n")
     if words > MAX_WORDS or (b"\0" in content and len(content) > MAX_BINARY):
         raise TactileError(path, f"{len(content) / 1e6:.0f} MB", f"at most {MAX_FACES} triangles", "Simplify it")
@@ -154,7 +154,7 @@ def check_size(where: str | os.PathLike, extent: float, scale: float) -> None:
 
 
 def _turn(up: str) -> np.ndarray:
-    """Rotation (3, 3) that takes the file's axis ``up`` to z."""
+    """Return the rotation (3, 3) that takes the file's axis ``up`` to z."""
     turn = np.roll(np.eye(3), 2 - "xyz".index(up[-1]), axis=0)
     return turn * [[-1], [1], [-1]] if up[0] == "-" else turn
 

@@ -44,18 +44,18 @@ def finest(extent: np.ndarray, spacing: float = _FINEST) -> float:
 
 
 def _shape(extent: np.ndarray, spacing: float) -> tuple[int, ...]:
-    """Return the number of nodes along x, y, z, spacing m apart, of a body of extent (3,) m while its spline is
-    fitted."""
+    """Return how many nodes, spacing m apart, lie along x, y, z of a body of extent (3,) m, with those for the spline's
+    fit."""
     return tuple(int(n) + 3 + 2 * _SPARE for n in np.ceil((extent + 2 * MARGIN) / spacing))
 
 
 def build(mesh: Any, where: str | os.PathLike, spacing: float) -> tuple[SplineGrid | TipGrid, NearTriangles]:
-    """Build the grid, in m, of the signed distance of a solid ``mesh`` (a trimesh, mm); returns it, and the search
-    index that it was built by.
+    """Build the grid, in m, of the signed distance of a solid ``mesh`` (a trimesh, mm); return it and the search index
+    used.
 
-    where : names the mesh in messages; spacing : m, between nodes; a grid of more than MAX_NODES nodes has it in the
-        body's lowest 5 mm (``REACH``), which may touch, and is coarser above
-    Raises TactileError where the lowest part alone has too many, and for a mesh that overlaps itself."""
+    where : names the mesh in messages; spacing : m, between nodes; if they would be more than MAX_NODES, this is the
+        spacing in the body's lowest 5 mm (``REACH``), which may touch, and above it is coarser
+    Raises TactileError if the lowest part alone has too many nodes, and for a mesh that overlaps itself."""
     extent, near = np.ptp(mesh.bounds, axis=0) * 1e-3, NearTriangles(mesh.triangles, _CELL * spacing * 1e3)
     if np.prod(_shape(extent, spacing)) <= MAX_NODES:
         return _grid(mesh, near, where, spacing, extent), near
@@ -67,8 +67,8 @@ def build(mesh: Any, where: str | os.PathLike, spacing: float) -> tuple[SplineGr
 
 
 def _grid(mesh: Any, near: NearTriangles, where: str | os.PathLike, spacing: float, extent: np.ndarray) -> SplineGrid:
-    """Build the grid, spacing m, of what lies in the extent (3,) m above the mesh's lower bounds. near : of its
-    triangles; where : its file"""
+    """Build the grid, spacing m, of the part of a mesh within extent (3,) m from its lower bounds.
+    near : search index of its triangles; where : its file"""
     import scipy.ndimage
 
     shape = _shape(extent, spacing)
@@ -92,7 +92,7 @@ def _check_memory(where: str | os.PathLike, shape: tuple[int, ...], spacing: flo
 def _signed(
     mesh: Any, near: NearTriangles, where: str | os.PathLike, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
 ) -> np.ndarray:
-    """Return the signed distance (shape) mm at nodes ``origin`` + spacing * (i, j, k), mm. See ``_grid``"""
+    """Return the signed distance (shape) mm at nodes ``origin`` + spacing * (i, j, k), mm; others as in ``_grid``"""
     try:
         within = inside(mesh.triangles, origin, spacing, shape)
     except OverlapError as overlap:
@@ -111,8 +111,8 @@ def error_of(
 ) -> np.ndarray:
     """Return the RMS and largest error (2,) m of an indenter's ``distance`` against its mesh (a trimesh, mm).
 
-    near : of its triangles. Measured at 500 random places within 0.3 mm of the surface, at triangles that reach below
-    the height ``top``, m."""
+    near : search index of its triangles; top : m, height below which triangles count, at least in part
+    The error is measured at 500 random places within 0.3 mm of the surface."""
     random = np.random.default_rng(0)
     area = np.where(mesh.triangles[:, :, 2].min(axis=1) < top * 1e3, mesh.area_faces, 0)
     face = random.choice(len(mesh.faces), _CHECKED, p=area / area.sum())
@@ -132,10 +132,10 @@ def error_of(
 
 
 def signed(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
-    """Return the distance (shape) mm, negative inside, of nodes at ``origin`` + spacing * (i, j, k), mm, to triangles.
+    """Return the distance (shape) mm, negative inside, from nodes ``origin`` + spacing * (i, j, k), mm, to triangles.
     within : bool (shape), true for nodes inside
-    It is exact up to _NEAR spacings from the surface; farther off a grid four times coarser is interpolated by a cubic
-    spline. What this costs in accuracy is measured when an indenter is made (``error_of``)."""
+    It is exact up to _NEAR spacings from the surface; farther off it is interpolated from a grid four times coarser by
+    a cubic spline. What this costs in accuracy is measured when an indenter is made (``error_of``)."""
     bound = _NEAR * spacing
     coarse = _coarse(near, origin, spacing, within)
     along = (EvenSpline(0, _COARSER, n).matrix(np.arange(m)) for n, m in zip(coarse.shape, within.shape, strict=True))
@@ -151,11 +151,11 @@ def signed(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.n
 
 
 def _coarse(near: NearTriangles, origin: np.ndarray, spacing: float, within: np.ndarray) -> np.ndarray:
-    """Return the signed distance, mm, at every fourth node of a grid from ``origin`` (3,), ``spacing`` mm, and beyond
-    its end.
+    """Return the signed distance, mm, at every fourth node of a grid from ``origin`` (3,), ``spacing`` mm, and one
+    beyond its end.
     within : bool (shape of the grid), true for nodes inside
-    Near the surface it is exact; up to ``_FAR`` spacings that to the middle of the nearest piece; farther off that to
-    the piece of the nearest such node, as a search is slow where many pieces are equally near (a ball's middle)."""
+    Near the surface it is exact. Up to ``_FAR`` spacings it is the distance to the middle of the nearest piece; farther
+    off, to the piece of the nearest such node: a search is slow if many pieces are equally near (a ball's middle)."""
     import scipy.ndimage
     import scipy.spatial
 
@@ -186,10 +186,10 @@ class OverlapError(Exception):
 
 
 def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]) -> np.ndarray:
-    """Mark (shape) bool the nodes at ``origin`` + spacing * (i, j, k) inside the mesh of triangles (m, 3, 3), all in
-    one unit of length. shape : numbers of nodes along x, y, z
-    Along each column the crossings must alternate between entering and leaving. Raises OverlapError where they do not;
-    where a column grazes an edge, others beside it are tried first."""
+    """Mark (shape) bool which nodes at ``origin`` + spacing * (i, j, k) lie inside the mesh of triangles (m, 3, 3), all
+    in one unit of length. shape : numbers of nodes along x, y, z
+    Along each column the crossings must alternate between entering and leaving. If they do not, as where a column
+    grazes an edge, columns beside it are tried; then raises OverlapError."""
     for beside in _BESIDE:
         column, height, entering = _crossings(triangles, origin + spacing * np.array([*beside, 0]), spacing, shape)
         order = np.lexsort((height, column))
@@ -210,8 +210,8 @@ def inside(triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tup
 def _crossings(
     triangles: np.ndarray, origin: np.ndarray, spacing: float, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return where columns of nodes, at ``origin`` + spacing * (i, j), cross triangles (m, 3, 3): column (k,) int, i *
-    shape[1] + j; height (k,); true (k,) where going up enters the body."""
+    """Return where columns of nodes, at ``origin`` + spacing * (i, j), cross triangles (m, 3, 3): the column's number
+    (k,) int, i * shape[1] + j; the height (k,); true (k,) if going up enters the body there."""
     flat = (triangles[:, :, :2] - origin[:2]) / spacing
     low = np.clip(np.ceil(flat[:, :, 0].min(axis=1)), 0, None).astype(int)
     rows = np.maximum(np.minimum(np.floor(flat[:, :, 0].max(axis=1)).astype(int), shape[0] - 1) - low + 1, 0)
@@ -239,8 +239,8 @@ def _crossings(
 
 
 def _counted(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Repeat each index of counts (k,) as often as its count; returns indices (n,) and each repetition's number
-    (n,)."""
+    """Repeat each index of counts (k,) as often as its count; return the indices (n,), and the number (n,) of each
+    repetition."""
     index = np.repeat(np.arange(len(counts)), counts)
     return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
 

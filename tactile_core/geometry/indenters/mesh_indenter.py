@@ -35,7 +35,7 @@ _LEVEL = 1e-7  # m, hull vertices this near to the farthest one lie equally far
 def as_indenter(body: Any) -> Indenter:
     """Return ``body`` if it is an indenter, or make one of it if it is a ``trimesh.Trimesh`` in metres.
 
-    Raises what ``MeshIndenter.from_trimesh`` does, for anything else too."""
+    Raises what ``MeshIndenter.from_trimesh`` does; TactileError for any other object."""
     presses = hasattr(body, "curvature") and not isinstance(body, type)
     return body if presses else MeshIndenter.from_trimesh(body)
 
@@ -48,7 +48,7 @@ class MeshIndenter(Summary, Indenter):
     about one grid spacing. Normals and curvatures are exactly those of the spline's level surfaces.
 
     grid : the spline, m, fine where the body may touch; hull : (k, 3) m, vertices of the mesh's convex hull
-    error : rms and largest difference, m, of ``distance`` from the mesh's, at 500 random places within 0.3 mm of it
+    error : rms and largest difference, m, between ``distance`` and the mesh's, at 500 random places within 0.3 mm of it
     """
 
     grid: SplineGrid | TipGrid
@@ -62,13 +62,13 @@ class MeshIndenter(Summary, Indenter):
     ) -> MeshIndenter:
         """Load the body in an STL, PLY, OBJ or OFF file; its grid is built once and cached on disk.
 
-        Building takes .3 to 5 s of CPU time, minutes for 100,000 slender triangles or where numba is missing.
+        Building takes .3 to 5 s of CPU time, minutes for 100,000 slender triangles or without numba.
 
         scale : m per unit of the file; up : the file's axis ("x" ... "-z") that points out of the sensor
-        spacing : m, 1e-5 to 1e-3, of the grid; of one of over 8 million nodes that of its lowest 5 mm, coarser above
+        spacing : m, 1e-5 to 1e-3, of the grid; if that has over 8 million nodes, of its lowest 5 mm, and coarser above
         The body's lowest point, or the middle of its lowest flat, becomes the own origin.
-        Raises TactileError for anything that is no closed, outward surface of an indenter's size, and for one that
-        crosses itself by more than the grid's spacing (less is not seen), for arguments out of range, files that cannot
+        Raises TactileError for anything that is no closed, outward surface of an indenter's size, for one that crosses
+        itself by more than the grid's spacing (less is not seen), for arguments out of range, and for files that cannot
         be read or are too large; ModuleNotFoundError without extra [fem].
         """
         _check(path, scale, up, spacing)
@@ -82,7 +82,7 @@ class MeshIndenter(Summary, Indenter):
     def from_trimesh(cls, mesh: Any, spacing: float | None = None) -> MeshIndenter:
         """Take a ``trimesh.Trimesh``, metres, in its own frame; its grid is built once and cached on disk by its hash.
 
-        spacing : m, of the grid, over which sharp edges are rounded; None for 0.1 mm, or more where the body is large
+        spacing : m, of the grid, over which sharp edges are rounded; None for 0.1 mm, or more if the body is large
         Raises TactileError as ``from_file`` does, and for more than 200,000 triangles.
         """
         try:
@@ -103,7 +103,7 @@ class MeshIndenter(Summary, Indenter):
 
     @classmethod
     def _cached(cls, digest: str, make: Callable[[], Any], where: str | os.PathLike, spacing: float) -> MeshIndenter:
-        """Return the indenter of a mesh (mm) that ``make`` builds, from the cache where its grid is there already.
+        """Return the indenter of a mesh: its grid from the cache, or built of the mesh (mm) that ``make`` returns.
         digest : of the mesh, names the cache's folder; where : the mesh's file, for errors; spacing : m, of the grid"""
         folder = cache_folder() / f"indenter-{digest[:16]}"
         try:
@@ -136,7 +136,7 @@ class MeshIndenter(Summary, Indenter):
         return value, _unit(slope)[1]
 
     def curvature(self, points: np.ndarray) -> np.ndarray:
-        """Return (n, 3, 3) 1/m, the unit normal's derivative along the level surface; see ``Indenter.curvature``."""
+        """Return the unit normal's derivative (n, 3, 3) 1/m along the level surface; see ``Indenter.curvature``."""
         slope, bend = self.grid.gradient_and_hessian(points)
         steepness, normal = _unit(slope)
         along = np.eye(3) - normal[:, :, None] * normal[:, None, :]
@@ -149,8 +149,8 @@ class MeshIndenter(Summary, Indenter):
 
 
 def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
-    """Return what the cache keeps, by its names. error : rms and largest, m; stem_place : coarse grid's origin,
-    spacing, top"""
+    """Return the arrays that the cache keeps, by name. error : rms and largest, m. ``stem`` is the coarse grid, empty
+    for none, ``stem_place`` its origin, spacing and top."""
     grid, stem, place = built.grid, np.zeros((0, 0, 0), np.float32), np.zeros(0)
     fine = grid.fine if isinstance(grid, TipGrid) else grid
     if isinstance(grid, TipGrid):
@@ -160,7 +160,7 @@ def _arrays_of(built: MeshIndenter, error: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _unit(slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the length (n,) of each slope (n, 3), and unit normals (n, 3) along them; (0, 0, -1) where it is zero."""
+    """Return the length (n,) of each slope (n, 3), and unit normals (n, 3) along them; (0, 0, -1) for a zero slope."""
     length = lengths(slope)
     if length.min(initial=1) < 1e-6:
         flat = length < 1e-6
@@ -179,7 +179,7 @@ def _check(path: str | os.PathLike, scale: float, up: str, spacing: float) -> No
 
 
 def _hull(mesh: Any) -> np.ndarray:
-    """Vertices (k, 3) m of the convex hull of a mesh in mm."""
+    """Return the vertices (k, 3) m of the convex hull of a mesh in mm."""
     import scipy.spatial
 
     return mesh.vertices[scipy.spatial.ConvexHull(mesh.vertices).vertices] * 1e-3

@@ -66,8 +66,8 @@ def circle_distance(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.n
 
 
 def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
-    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance`` d at points (n, 3) m. With r from the axis
-    their eigenvalues are 1 / d (round the wire), (r - radius) / (d r) (along it) and 0 (outward)."""
+    """Return the second derivatives (n, 3, 3) 1/m of ``circle_distance``, d, at points (n, 3) m. With r the distance
+    from the axis, the eigenvalues are 1 / d (round the wire), (r - radius) / (d r) (along it) and 0 (outward)."""
     around, radial, arm, length = _arms(points, radius)
     turn = np.column_stack([-arm[:, 1:] * radial, arm[:, 0]])
     along = np.column_stack([-radial[:, 1], radial[:, 0], np.zeros(len(points))])
@@ -76,8 +76,8 @@ def circle_curvature(points: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _arms(points: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return, of points (n, 3) m and a circle of radius m round z: distance (n,) m from the axis, direction from it (n,
-    2), arm from the circle (n, 2) m as (outward, z), its length (n,) m."""
+    """Return, for points (n, 3) m and a circle of radius m about z: the distance (n,) m from the axis, the direction
+    (n, 2) from it, and the arm from the circle, (outward, z) (n, 2) m, and its length (n,) m."""
     across = points[:, :2]
     around = np.sqrt(np.einsum("ni,ni->n", across, across))
     radial = across / np.maximum(around, NEAREST)[:, None]

@@ -15,9 +15,9 @@ _TOUCH = 1e-9  # m, how well the lowest part must touch the plane z = 0
 
 @dataclasses.dataclass(frozen=True)
 class Several(Indenter):
-    """A rigid group of indenters, for several contacts at once: the nearest part counts.
+    """A rigid group of indenters, for several contacts at once; the nearest part decides.
 
-    Its distance is exact outside. Inside, where parts overlap, the true depth is at least the one returned.
+    Its distance is exact outside. Inside, in overlaps of parts, the true depth is at least the one returned.
 
     parts : pairs of an indenter and its ``Pose`` in the group's frame; the lowest of them touches z = 0"""
 
@@ -51,8 +51,8 @@ class Several(Indenter):
         return curvature
 
     def support(self, direction: np.ndarray) -> np.ndarray:
-        """Return the farthest of the parts' support points along a direction (3,), (3,) m, the mean of equally far
-        ones; see ``Indenter.support``."""
+        """Return the farthest (3,) m of the parts' support points along a direction (3,), the mean of equally far ones;
+        see ``Indenter.support``."""
         places = np.array([pose.support(indenter, direction) for indenter, pose in self.parts])
         reach = places @ direction
         return places[reach > reach.max() - SQUARE].mean(axis=0)
@@ -62,7 +62,7 @@ class Several(Indenter):
         return joined(self.parts, hull)
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the distance (n,) m of points (n, 3) m to the nearest part, its gradient (n, 3), the part's index
+        """Return the distance (n,) m of points (n, 3) m to the nearest part, its gradient (n, 3), and the part's index
         (n,)."""
         answers = [pose.distance(indenter, points) for indenter, pose in self.parts]
         nearest = np.argmin([distance for distance, _ in answers], axis=0)
@@ -72,7 +72,7 @@ class Several(Indenter):
 
 
 def joined(parts: Iterable[tuple[Indenter, Pose]], hull: Hull) -> Surface:
-    """Join the surfaces that show ``parts``, pairs of a body and its pose, into one; hull : see ``Indenter.preview``"""
+    """Return one surface that shows all ``parts``, pairs of a body and its pose; hull : as in ``Indenter.preview``"""
     nodes, faces, count = [], [], 0
     for body, pose in parts:
         own, triangles = body.preview(hull)

@@ -36,7 +36,7 @@ class Sphere(Indenter):
 
 @Loop
 def _polar(points, height, nearest):  # noqa: ANN001, ANN202
-    """Distance (n,) m, at least nearest, of points (n, 3) m from a centre height m up the own z; directions (n, 3)."""
+    """Return the distance (n,) m, at least nearest, and direction (n, 3) of points (n, 3) m from (0, 0, height m)."""
     distance, direction = np.empty(len(points)), np.empty((len(points), 3))
     for p in range(len(points)):
         x, y, z = points[p, 0], points[p, 1], points[p, 2] - height

@@ -1,6 +1,6 @@
 """Smooth functions on regular grids: a tricubic B-spline, twice continuously differentiable.
 
-One grid holds a body, or a fine one the part of it that may touch and a coarse one all of it.
+A body has one grid, or a fine one for the part of it that may touch and a coarse one for all of it.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class SplineGrid(Summary):
 
 @Loop
 def _spline(points, origin, spacing, coefficients, bends):  # noqa: ANN001, ANN202
-    """Value (n,), gradient (n, 3), with ``bends`` second derivatives (n, 3, 3), at points (n, 3) m; see
-    ``SplineGrid``."""
+    """Return, for points (n, 3) m, a ``SplineGrid``'s value (n,), gradient (n, 3) and, if ``bends``, second derivatives
+    (n, 3, 3), else (0, 3, 3)."""
     value, gradient = np.empty(len(points)), np.empty((len(points), 3))
     hessian = np.zeros((len(points) if bends else 0, 3, 3))
     cell, beyond, weights, sums = np.zeros(3, np.int64), np.zeros(3), np.zeros((3, 3, 4)), np.zeros(10)
@@ -108,8 +108,8 @@ BAND = 1e-3  # m, over which the fine grid's values pass into the coarse one's, 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class TipGrid(Summary):
-    """The spline ``fine`` up to the height z = ``top``, m, and ``coarse`` from 1 mm (``BAND``) above that; in between
-    one passes into the other. See SplineGrid."""
+    """Two ``SplineGrid``: ``fine`` up to the height z = ``top``, m, ``coarse`` from 1 mm (``BAND``) above that, and in
+    between a smooth passage from one to the other."""
 
     fine: SplineGrid
     coarse: SplineGrid
@@ -138,7 +138,7 @@ class TipGrid(Summary):
         return _mixed_gradient(along, beyond, share, slope * apart), hessian
 
     def _share(self, height: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the coarse grid's share (n,) at height z (n,) m, and two derivatives: a polynomial of degree five."""
+        """Return the coarse grid's share (n,) at height z (n,) m, a polynomial of degree 5, and two derivatives."""
         t = np.clip((height - self.top) / BAND, 0, 1)
         slope, bend = 30 * t**2 * (1 - t) ** 2, 60 * t * (1 - t) * (1 - 2 * t)
         return t**3 * (10 - 15 * t + 6 * t**2), slope / BAND, bend / BAND**2
