@@ -186,8 +186,8 @@ def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
 
 
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    """Return the shape and type that an array's header declares. Raises ValueError for a header over `MAX_HEADER`
-    bytes, which numpy would load unchecked."""
+    """Return the shape and type in an array's header; ValueError for one over `MAX_HEADER` bytes, which numpy would
+    load."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
     if not start.startswith(NPY) or length > MAX_HEADER:

@@ -150,8 +150,7 @@ def assemble(
 
 
 def _refuse_mirrored(path: str, levels: np.ndarray, sensor: str) -> None:
-    """Raise TactileError if levels (e,) counts at rest, NaN if not judged, are low where a typical unit's are high: the
-    file then holds the top of the range minus readings."""
+    """Raise TactileError if levels (e,) counts at rest (NaN: not judged) are low where a typical unit's are high."""
     typical, known = typical_rest(sensor), np.isfinite(levels)
     if typical is None:
         return

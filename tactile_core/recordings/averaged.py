@@ -50,8 +50,8 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
 
 
 def _turns(readings: np.ndarray, rate: float) -> float:
-    """Return the share of samples at which readings turn from rising to falling or back; 1 if too few rows show it.
-    readings : (T, e) counts; rate : Hz"""
+    """Return the share of samples at which readings (T, e) counts, at rate Hz, turn to fall or rise; 1 if too few show
+    it."""
     step = max(1, round(rate / AT))
     whole = np.rint(readings[: BLOCK * step : step])
     whole = whole[~repeats(whole)[0]]

@@ -83,8 +83,7 @@ def silent(electrodes: np.ndarray) -> np.ndarray:
 
 
 def alike(electrodes: np.ndarray) -> np.ndarray:
-    """Return (T,) bool, true where most electrodes (T, e), in any unit of measurement, read the same end of the
-    range."""
+    """Return (T,) bool, true where most electrodes (T, e), in any unit, read the same end of the range."""
     found = (electrodes[:, 1:] == electrodes[:, :-1]).any(axis=1)  # where most are the same, two neighbours are
     middle = np.median(electrodes[found], axis=1)
     same = (electrodes[found] == middle[:, None]).mean(axis=1) >= ALIKE
@@ -159,8 +158,8 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Return (T,) bool, true for rows of electrodes (T, e) equal to the row before; and whether these are faults: they
-    are few, and the other rows noisy."""
+    """Return (T,) bool, true for rows of electrodes (T, e) equal to the row before; and true if these are faults:
+    few."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 

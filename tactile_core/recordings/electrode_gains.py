@@ -121,8 +121,8 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
 
 
 def read(path: str | os.PathLike) -> SensorFile:
-    """Return the content of a sensor file. Raises TactileError, which names file and field, if it cannot be read, has
-    an unknown field, or a value out of range."""
+    """Return the content of a sensor file. Raises TactileError, with file and field, for what is unreadable or out of
+    range."""
     file = Path(path)
     try:
         text = read_toml_text(file)

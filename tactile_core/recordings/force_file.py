@@ -50,8 +50,8 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
 
 
 def read_columns(path: str, names: list[str]) -> np.ndarray:
-    """Return the columns (n, c) of those names, in any case, from a recording's file, as they are there. Raises
-    TactileError for a missing column."""
+    """Return the columns (n, c) called `names`, in any case, as a recording's file has them. Raises TactileError for
+    none."""
     table = _table(path, [name.lower() for name in names])
     missing = [name for name in names if name.lower() not in table.header]
     if missing:

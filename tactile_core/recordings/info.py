@@ -202,8 +202,8 @@ def _time_of_sp(recording: Recording) -> str:
 
 
 def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
-    """Return pairs (label, (e,) counts): each electrode's rest and its least and largest change; without a unit, its
-    median, least and largest count."""
+    """Return pairs (label, (e,) counts): rest, least and largest change; without a unit median, least and largest
+    count."""
     if unit is None:
         counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
     else:

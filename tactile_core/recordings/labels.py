@@ -13,8 +13,8 @@ MOST_WORDS = 20  # of a label that a summary counts one by one
 
 
 def labels_of(columns: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Return columns of texts as labels, name -> (T,) object array of str, cut to `LONGEST` characters and fit for
-    HDF5. Columns of empty texts are dropped."""
+    """Return columns of texts as labels, name -> (T,) object array of str, shortened, fit for HDF5; empty ones are
+    dropped."""
     found = {}
     for name, column in columns.items():
         found[_plain(name).replace("/", "_").strip(". ")] = [_plain(text) for text in column]

@@ -43,7 +43,7 @@ class Opened(NamedTuple):
 
 @contextmanager
 def _reading(path: str) -> Iterator[None]:
-    """Raise an OSError or MemoryError of the block as TactileError, which names the path."""
+    """Raise an OSError or MemoryError of the block as TactileError."""
     try:
         yield
     except OSError as error:
@@ -129,8 +129,8 @@ GZIP, STEP = b"\x1f\x8b", 2**20
 
 @contextmanager
 def unpacked(path: str, file: BinaryIO) -> Iterator[BinaryIO]:
-    """Yield the file from its start, unpacked if it is gzipped. Raises TactileError for damage, and for more than
-    `MAX_BYTES` unpacked."""
+    """Yield the file from its start, unpacked if gzipped. Raises TactileError for damage, and over `MAX_BYTES`
+    unpacked."""
     packed = file.read(len(GZIP)) == GZIP
     file.seek(0)
     if not packed:

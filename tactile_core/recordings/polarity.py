@@ -40,7 +40,7 @@ SCALE = 15.0  # counts; networks see arcsinh(change / SCALE)
 
 
 class Basis(enum.Enum):
-    """Basis of a polarity: shown by the recording or known, assumed, or stated against what the recording shows."""
+    """Basis of a polarity: SURE (shown by the recording, or known), ASSUMED, or CONTRADICTED by the recording."""
 
     SURE = enum.auto()
     ASSUMED = enum.auto()
@@ -49,7 +49,7 @@ class Basis(enum.Enum):
 
 @dataclass(frozen=True)
 class Polarity:
-    """Polarity of a recording: name "falls" or "rises"; found : evidence in words; basis : its kind."""
+    """Whether counts fall or rise where the film thins. name : "falls" or "rises"; found : what shows it, in words"""
 
     name: str
     found: str
@@ -57,17 +57,17 @@ class Polarity:
 
     @property
     def sure(self) -> bool:
-        """Return true if the recording shows the polarity or it is known, false if it is assumed or contradicted."""
+        """Return true if the recording shows the polarity, or it is known; false if it is assumed or contradicted."""
         return self.basis is Basis.SURE
 
     @property
     def evidence(self) -> str:
-        """Return the evidence in words, marked where it is an assumption, for reports."""
+        """Return in words, for reports, what shows the polarity, and whether it is assumed."""
         return f"assumed: {self.found}" if self.basis is Basis.ASSUMED else self.found
 
     @property
     def sign(self) -> float:
-        """Return the factor that turns the recording's changes into those of raw readings."""
+        """Return the factor, 1 or -1, that turns the recording's changes into those of raw readings."""
         return 1.0 if self.name == FALLS else -1.0
 
     @property
@@ -78,15 +78,15 @@ class Polarity:
 
     @property
     def warnings(self) -> list[Doubt]:
-        """Return the doubt for the user, one or none, in a list."""
+        """Return a list of the warning that the polarity is in doubt; an empty one if it is not."""
         if self.basis is Basis.CONTRADICTED:
             return [Doubt(Reason.POLARITY_CONTRADICTED, name=self.name, found=self.found)]
         return [] if self.sure else [Doubt(Reason.POLARITY_ASSUMED, found=self.found)]
 
 
 def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
-    """Choose the user's polarity (given), else the file's, else the shown one; not sure if the recording denies it.
-    given, of_file : "falls" or "rises"; any other text is none"""
+    """Return the polarity that the user gave, else the file's, else the one that the recording shows. One that the
+    recording contradicts is not sure. given, of_file : "falls" or "rises"; any other text counts as none"""
     for stated, who in ((given, "as given"), (of_file, "as the file says")):
         if stated in POLARITIES:
             against = shown.sure and shown.name != stated
@@ -96,7 +96,8 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
 
 
 def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """Return the polarity of a sensor's raw readings, by its descriptor; for a kind other than "raw" it is assumed."""
+    """Return the polarity of a sensor's raw readings, by its descriptor; assumed for readings of another kind than
+    "raw"."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
     return Polarity(reading, raw) if kind == "raw" else Polarity(reading, f"as {raw}", Basis.ASSUMED)
@@ -106,12 +107,11 @@ def polarity_of(
     change: Framewise, quiet: np.ndarray, electrodes: np.ndarray, pdc: np.ndarray | None, *,
     rest_known: bool = False, sensor: str = SOURCE,
 ) -> Polarity:  # fmt: skip
-    """Detect the polarity of a signed recording; "falls" and not sure where it shows nothing.
+    """Return the polarity that a recording of signed changes shows; "falls", assumed, if it shows none.
 
-    change : (T, 19) counts against rest; quiet : (T,) bool, frames that rest was taken from, none where it is a guess
+    change : (T, 19) counts against rest; quiet : (T,) bool, frames that rest was taken from, none if it is a guess
     electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rest_known : true if rest is the unit's own
-    sensor : whose, one with simulated contacts in its descriptor
-    """
+    sensor : name of the recorded sensor, whose descriptor must have simulated contacts"""
     frames = np.flatnonzero(touching(change) & ~quiet)
     frames = frames[spread_out(len(frames), MOST)]
     contacts = by_contacts(change[frames], sensor)
@@ -134,14 +134,16 @@ def polarity_of(
 
 
 def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float, sensor: str) -> Polarity:
-    """Decide by the change (19,) counts of electrodes (T, 19) that goes with a swing, counts, of pdc (T,) counts."""
+    """Return the polarity by which the electrodes' change with the fluid's pressure is more like simulated contacts.
+    electrodes : (T, 19) counts; pdc : (T,) counts; swing : counts of PDC over which the change is taken"""
     centred = pdc - pdc.mean()
     slope = np.array([(column - column.mean(dtype=float)) @ centred for column in electrodes.T]) / (centred @ centred)
     return _decided(slope[None] * swing, "the change that goes with the fluid's pressure", sensor)
 
 
 def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
-    """Decide by touches (n, 19) counts, changes in contact against a known rest; None if there are too few."""
+    """Return the polarity by which touches (n, 19) counts, changes in contact against a known rest, are more like
+    simulated contacts; None for fewer than `FEWEST` touches."""
     if len(touches) < FEWEST:
         return None
     return _decided(touches[spread_out(len(touches), MOST)], "the change in contact", sensor)
@@ -158,7 +160,7 @@ def _as_drift(change: np.ndarray, electrodes: np.ndarray) -> bool:
 
 
 def touching(change: Framewise) -> np.ndarray:
-    """Mark (T,) bool the changes (T, 19) counts that are contacts: the root of the sum of squares reaches TOUCHING."""
+    """Return (T,) bool, true for frames in contact: the norm of their change (T, 19) counts is `TOUCHING` or more."""
     found = np.empty(len(change), bool)
     for start in range(0, len(change), BLOCK):  # their squares would take as much memory as a long recording
         rows = slice(start, start + BLOCK)
@@ -167,7 +169,7 @@ def touching(change: Framewise) -> np.ndarray:
 
 
 def spread_out(count: int, most: int) -> np.ndarray:
-    """Return indices (n,) of at most ``most`` out of ``count`` things, evenly spread."""
+    """Return the indices (n,) of at most ``most`` out of ``count`` elements, evenly spread."""
     return np.linspace(0, count - 1, min(count, most)).astype(int)
 
 
@@ -185,12 +187,13 @@ def _apart(less: float, more: float) -> bool:
 
 
 def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
-    """Return the mean cosine of changes (n, 19) counts to their nearest simulated contacts, by arcsinh(counts / 15)."""
+    """Return the mean cosine of changes (n, 19) counts and the nearest simulated contacts, in arcsinh(counts / 15)."""
     return float((unit(changes) @ patterns(sensor).T).max(axis=1).mean())
 
 
 def contact_signals(sensor: str = SOURCE) -> np.ndarray:
-    """Return changes (P, e) float64 counts of simulated contacts, signed as raw. Raises TactileError where none are."""
+    """Return changes (P, e) float64 counts of a sensor's simulated contacts, signed as raw ones; TactileError for
+    none."""
     found = contacts_of(sensor)
     if found is None:
         raise TactileError(f"sensor {sensor!r}", "no simulated contacts", "a table that [electrodes] contacts names")

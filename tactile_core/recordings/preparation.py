@@ -1,4 +1,4 @@
-"""Prepare a Recording's signals for the networks: repaired, tared, drift removed, everything reported."""
+"""Prepare a Recording's signals for the networks: repair them, subtract rest and drift, and report all of it."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ SCALED_PEAK = 150.0
 
 
 def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Turn a recording into signals: counts repaired, their rest found and taken off, flags set, as options say. Each
-    frame must hold readings: the caller has removed those of a finger that was not connected.
-    frames : those whose signals are returned; rest and flags are found from all"""
+    """Return a recording's signals: counts repaired, rest and drift subtracted, frames flagged, as the options say.
+    Each frame must hold a response of the finger: the caller has removed others.
+    frames : (n,) or slice, frames whose signals are returned; rest and flags are found from all"""
     flags, warnings = recording.flags.copy(), list(recording.warnings)
     readings = fill(recording.electrodes, ~np.isfinite(recording.electrodes))
     kind, evidence = _kind(recording, readings, options)
@@ -102,8 +102,10 @@ def _film(
     recording: Recording, change: Changes, rest: Baseline, pressure: np.ndarray, options: PrepareOptions, *,
     own_rest: bool,
 ) -> film.Film | None:  # fmt: skip
-    """Estimate the film of a raw recording whose rest is known; without simulated contacts, the given one or None.
-    change, rest : (T, e) counts; pressure : (T,) Pa over rest, NaN for none; own_rest : rest is of this recording"""
+    """Return the fluid film of a raw recording whose rest is known, by its contacts; for a sensor without simulated
+    contacts the film in the options, or None.
+    change, rest : (T, e) counts; pressure : (T,) Pa over rest, NaN if unknown
+    own_rest : true if rest was found in this recording"""
     if contacts_of(recording.sensor) is None:
         return None if options.film is None else film.Film.given(options.film)
     return film.find(
@@ -114,8 +116,8 @@ def _film(
 
 
 def doubt_law(signals: Signals) -> Signals:
-    """Return signals that are flagged ``LAW_DOUBTED`` in all frames in contact, and carry a warning, if these frames,
-    taken as one set, resemble no simulated contacts of the sensor; else the signals as they are."""
+    """Return the signals after checking anew whether their contacts, taken together, resemble simulated contacts of the
+    sensor: if not, all frames in contact are flagged ``LAW_DOUBTED``, and a warning is added."""
     changes = Changes(len(signals.change), signals.typical_of)
     flags, doubt = contact_law.flagged(changes, signals.kind, signals.quiet, signals.flags, signals.pdc, signals.sensor)
     return replace(signals, flags=flags, warnings=(*without(signals.warnings, LAW), *filter(None, [doubt])))
@@ -137,8 +139,9 @@ def _kind(recording: Recording, readings: np.ndarray, options: PrepareOptions) -
 def _unit_rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Rest | None:
-    """Return the unit's known rest, since a calm level may be a steady grip; None if a calm level lies near it, and
-    where none is known or wanted. readings : (T, e) counts; kind, quiet : as found of the recording"""
+    """Return the unit's own rest if no quiet part lies near it, since a calm level may be a steady grip; else None,
+    also if no rest is given, if a tare is, and for another kind than "raw".
+    readings : (T, e) counts; quiet : the recording's quiet parts; warnings : list, extended if the rest is returned"""
     if options.rest is None or kind != "raw" or options.tare is not None:
         return None
     reason = "no quiet part"
@@ -154,7 +157,7 @@ def _unit_rest(
 
 
 def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: Rest | None) -> np.ndarray:
-    """Return PDC (T,) counts over its level at rest; NaN where there is none."""
+    """Return PDC's change (T,) counts over its level at rest; NaN if the recording has no PDC."""
     if recording.pdc is None:
         return np.full(len(recording), np.nan)
     if unit_rest is not None and unit_rest.pdc is not None and not _is_tared(recording.pdc, unit_rest.pdc):
@@ -163,7 +166,7 @@ def _pressure_change(recording: Recording, kind: str, quiet: Quiet, unit_rest: R
 
 
 def _is_tared(pdc: np.ndarray, rest: float) -> bool:
-    """Return true if pdc (T,) counts was tared: it lies further below the unit's rest, counts, than any pressure."""
+    """Return true if pdc (T,) counts was tared: its median lies over `TARED_PDC` below the unit's rest, counts."""
     finite = pdc[np.isfinite(pdc)]
     return bool(len(finite)) and rest - float(np.median(finite)) > TARED_PDC
 
@@ -183,7 +186,8 @@ def _polarity(
 def _counts_per_unit(
     recording: Recording, readings: np.ndarray, kind: str, options: PrepareOptions, warnings: list[str]
 ) -> float:
-    """Return the factor to counts: 1, the user's, or for scaled readings (T, e) one of a usual press (assumed)."""
+    """Return the factor from readings (T, e) to counts: the user's; for raw ones in volts or shares that of the range;
+    for scaled ones that by which a press has its usual size (assumed); else 1. Extends the warnings."""
     if options.counts_per_unit is not None:
         return float(options.counts_per_unit)
     if kind == "raw" and (found := full_scale(readings)):
@@ -228,7 +232,8 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Baseline:
-    """Return the rest to subtract from readings (T, e) counts: of quiet parts, else zero or a guess, with a warning."""
+    """Return the rest of readings (T, e) counts: of quiet parts; without any, a guess if raw, else 0, with a
+    warning."""
     if quiet.parts:
         # drift of a rectified signal has no sign
         return baseline(readings, quiet, options.drift and kind != "rectified")
@@ -247,7 +252,8 @@ def _rest(
 def _is_loaded(
     recording: Recording, rest: Baseline, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> bool:
-    """Return true, and add a warning, if the calm level of a raw recording looks like that of a grip."""
+    """Return true, and add a warning, if a raw recording's rest looks like a contact, and the user gave no rest or
+    tare."""
     if kind != "raw" or options.tare is not None or options.rest is not None:
         return False
     level_there = rest.at(np.array([quiet.parts[-1][0]]))[0]

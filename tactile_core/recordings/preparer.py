@@ -1,5 +1,5 @@
-"""Prepare a recording's signals, whole, or part after part with its unit's rest and gains. Frames in which the finger
-does not respond get no change and a flag."""
+"""Prepare a recording's signals, whole or part after part, with its unit's rest and gains. Frames in which the finger
+does not respond get a change of 0 and a flag."""
 
 from __future__ import annotations
 
@@ -31,8 +31,9 @@ DOUBTS = np.uint16(Flag.POLARITY_ASSUMED | Flag.POLARITY_DOUBTED)
 
 
 def prepare(recording: Recording, options: PrepareOptions | None = None, frames: slice | np.ndarray = EVERY) -> Signals:
-    """Repair, detect the kind, tare, remove drift. Raises TactileError for options this recording cannot meet.
-    frames : (n,) or slice, whose signals are returned; all frames of the recording decide the result"""
+    """Return a recording's signals: glitches repaired, the kind of readings detected, rest and drift subtracted.
+    frames : (n,) or slice, frames whose signals are returned; all frames of the recording decide the result
+    Raises TactileError for options that this recording cannot meet."""
     options = options or PrepareOptions()
     options.check()
     recording.check()
@@ -48,7 +49,8 @@ def prepare(recording: Recording, options: PrepareOptions | None = None, frames:
 
 
 def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> Signals:
-    """Prepare frames with a response; those marked silent (T,) bool get no change and a flag. No tare may lie there."""
+    """Return the signals of a recording in which the finger does not respond in some frames, silent (T,) bool: these
+    get a change of 0 and a flag. Raises TactileError for a tare among them alone."""
     heard = np.flatnonzero(~silent)
     first = np.flatnonzero(silent)[0]
     where = f"{recording.row_word} {recording.rows[first]}"
@@ -78,12 +80,13 @@ def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.n
 
 
 def unanswered(signals: Signals) -> np.ndarray:
-    """Mark (T,) bool the frames of prepared signals in which the finger did not respond."""
+    """Return (T,) bool, true for frames of prepared signals in which the finger did not respond."""
     return (signals.flags & Flag.DEAD_CHANNEL > 0) & ~signals.change.any(axis=1)
 
 
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:
-    """Return the options with the tare's frames renumbered among those with a response, not silent (T,) bool."""
+    """Return the options, the tare counted in frames not silent (T,) bool. Raises TactileError if none of it is
+    left."""
     if options.tare in (None, "none"):
         return options
     frames = tare_frames(options.tare, len(silent))
@@ -95,7 +98,7 @@ def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarra
 
 
 class Preparer:
-    """Function that prepares a recording's parts in order, with what earlier ones showed; one alone as `prepare`."""
+    """Prepare a recording's parts in order, each with what the earlier ones showed; a single part as `prepare` does."""
 
     def __init__(
         self,
@@ -103,7 +106,8 @@ class Preparer:
         unit: ElectrodeGains | None = None,
         parts: Callable[[], Iterable[Recording]] = tuple,
     ) -> None:
-        """Store options and unit (None: a typical one); parts : returns all parts, searched for the polarity."""
+        """Store the options and the unit's gains (None: a typical unit). parts : function that returns all parts, which
+        are searched for the polarity if the first one does not show it"""
         options = options or PrepareOptions()
         self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest(), film=unit.film)
         self._unit, self._parts = unit, parts
@@ -113,8 +117,9 @@ class Preparer:
         self._doubts = np.uint16(0)  # of the first part's polarity, which hold for all
 
     def __call__(self, part: Recording, frames: slice | np.ndarray = EVERY) -> Signals:
-        """Prepare the next part; frames : those whose signals are returned. The first part decides kind, scale,
-        polarity and film for all; a later one without a rest takes that of the part before. Raises as `prepare`."""
+        """Return the signals of the next part; frames : (n,) or slice, frames whose signals are returned.
+        The first part decides kind, scale, polarity and film for all; a later part without quiet frames takes the rest
+        of the part before. Raises TactileError for options that the part cannot meet."""
         options, rest = self._options, self._rest
         first = rest is None
         if not first and options.tare not in (None, "none"):  # frames that the user named lie in the first part
@@ -141,7 +146,7 @@ class Preparer:
         return electrode_gains.apply(signals, self._unit).at(frames)
 
     def _look_for_polarity(self) -> bool:
-        """Take the polarity of the first part that shows one; returns false if none does."""
+        """Store the polarity of the first part that shows one; return false if none does."""
         for part in self._parts():
             signals = prepare(part, self._options)
             if not signals.flags[0] & DOUBTS:
@@ -151,7 +156,7 @@ class Preparer:
         return False
 
     def _decided_once(self, signals: Signals, *, first: bool) -> Signals:
-        """Return a part's signals under the polarity of the whole recording, which the first part reports."""
+        """Return a part's signals under the whole recording's polarity, of which only the first part warns."""
         report, warnings = signals.report, signals.warnings
         if self._polarity_found:
             report = report | {"polarity_evidence": self._polarity_found}
@@ -166,8 +171,8 @@ class Preparer:
     def _carried(
         self, part: Recording, signals: Signals, rest: np.ndarray, rows: slice | np.ndarray, *, given: bool
     ) -> Signals:
-        """Return the signals of a part without a rest of its own, from the rest (19,) and PDC of the part before.
-        rows : frames of the part whose signals these are; given : the user chose the tare"""
+        """Return a part's signals against the rest (19,) counts and PDC of the part before.
+        rows : (n,) or slice, frames of the part whose signals these are; given : true if the user chose the tare"""
         warnings = without(signals.warnings, REST)
         if not given:
             warnings += (Doubt(Reason.REST_CARRIED),)
@@ -186,7 +191,7 @@ class Preparer:
     def _of_typical_film(
         self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str
     ) -> tuple[film.Film, np.ndarray]:
-        """Return the film, and change (T, 19) counts from rest (19,) at time (T,) s converted to a typical film."""
+        """Return the film, and change (T, 19) counts from rest (19,) at time (T,) s, converted to a typical film."""
         level, options = Baseline.constant(rest), self._options
         whole = Changes(len(change), change.__getitem__)
         found = film.find(
@@ -196,8 +201,8 @@ class Preparer:
         return found, found.changes(whole, level)[EVERY]
 
     def _keep_rest(self, part: Recording, signals: Signals, rows: slice | np.ndarray) -> None:
-        """Keep the rest at the part's end: a calm level of the next part is rest only near it; a grip is calm, too.
-        rows : frames of the part whose signals these are"""
+        """Store rest and PDC at the part's end for the next part: a calm level there is rest only if it is near this
+        one, as a grip is calm, too. rows : (n,) or slice, frames of the part whose signals these are"""
         rest = self._rest = signals.rest + signals.drift * part.duration
         self._rest_pdc = _rest_pdc(part, signals, rows)
         pdc = self._rest_pdc if np.isfinite(self._rest_pdc) else None
@@ -205,5 +210,5 @@ class Preparer:
 
 
 def _rest_pdc(part: Recording, signals: Signals, rows: slice | np.ndarray) -> float:
-    """Return the PDC, counts, of zero pressure in a part; NaN where there is none. rows : frames of these signals"""
+    """Return a part's PDC at rest, counts; NaN without PDC. rows : (n,) or slice, frames of the part in `signals`"""
     return np.nan if part.pdc is None else float(part.pdc[rows][0] - signals.pdc[0])

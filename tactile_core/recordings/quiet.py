@@ -38,7 +38,8 @@ NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is
 
 @dataclass(frozen=True, eq=False)
 class Quiet:
-    """Quiet parts; mask : (T,) bool; parts : first and one-past-last frame of each quiet part; evidence in words."""
+    """Quiet parts of a recording, without contact. mask : (T,) bool, true in them; parts : first frame, and one past
+    the last, of each; evidence : how they were found, in words"""
 
     mask: np.ndarray
     parts: tuple[tuple[int, int], ...]
@@ -47,9 +48,9 @@ class Quiet:
 
 @dataclass(frozen=True, eq=False)
 class _Windows:
-    """Statistics of all W windows of n frames, by first frame: sums (19, W) of counts, calm (W,) bool, pdc (W,) mean or
-    None, middle (W,) s. Sums are in single precision where that is exact, as for counts: in double they take twice the
-    recording."""
+    """Statistics of all W windows of n consecutive frames of a recording, by first frame.
+    sums : (19, W) of counts, in single precision if that is exact, which halves the memory; calm : (W,) bool
+    pdc : (W,) mean counts, or None; middle : (W,) s, time of the window's middle"""
 
     n: int
     sums: np.ndarray
@@ -58,7 +59,7 @@ class _Windows:
     middle: np.ndarray
 
     def largest(self, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return the largest (W,) over electrodes of change, a function of each one's window means (W,) counts."""
+        """Return the largest value (W,) over the electrodes of change(means), means (W,) counts in each window."""
         found = change(self.sums[0].astype(float) / self.n)
         for sums in self.sums[1:]:
             np.maximum(found, change(sums.astype(float) / self.n), out=found)
@@ -66,14 +67,15 @@ class _Windows:
 
 
 def window_frames(rate: float) -> int:
-    """Return the number of frames of the tare window at this rate (Hz)."""
+    """Return the number of frames in the shortest part that is called quiet, at this rate (Hz)."""
     return max(FEWEST, round(WINDOW * rate))
 
 
 def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind: str) -> Quiet:
-    """Find quiet parts: calm in every electrode, at the rest level, and with the fluid pressure (PDC) of rest.
+    """Return the parts that are calm in every electrode, at the level of rest, and at the fluid pressure (PDC) of rest.
 
-    electrodes : (T, 19), repaired, pdc : (T,) or None, counts; rate : Hz; kind : raw, tared, scaled or rectified
+    electrodes : (T, 19) counts, repaired; pdc : (T,) counts, or None; rate : Hz
+    kind : "raw", "tared", "scaled" or "rectified"
     A held press is calm too, but its PDC is higher than without contact. Without PDC, calm parts near the start or end
     are taken for rest, and others must agree with them. In tared recordings rest is near zero.
     Known limit: a raw recording of one steady contact from its first frame to its last looks like rest."""
@@ -95,8 +97,8 @@ def find_quiet(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float, kind
 
 
 def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slice:
-    """Return the window for rest where nothing is quiet: that of lowest PDC or, without PDC, of least movement.
-    electrodes : (T, 19), pdc : (T,) counts; rate : Hz"""
+    """Return the frames to take rest from if nothing is quiet: the window of lowest PDC or, without PDC, of least
+    movement. electrodes : (T, 19) counts; pdc : (T,) counts, or None; rate : Hz"""
     n = min(window_frames(rate), len(electrodes))
     if pdc is not None and np.isfinite(pdc).all():
         start = int(np.argmin(_sums(pdc, n)))
@@ -106,20 +108,22 @@ def calmest(electrodes: np.ndarray, pdc: np.ndarray | None, rate: float) -> slic
 
 
 def _sums(values: np.ndarray, n: int) -> np.ndarray:
-    """Sums (..., W) of each window of n values (..., T)."""
+    """Return the sums (..., W) over all windows of n of values (..., T)."""
     total = np.zeros((*values.shape[:-1], values.shape[-1] + 1))
     np.cumsum(values, axis=-1, out=total[..., 1:])
     return total[..., n:] - total[..., :-n]
 
 
 def _spread(centred: np.ndarray, n: int) -> np.ndarray:
-    """Return the standard deviation (..., W) in each window of n values; centred : (..., T), about 0: small squares"""
+    """Return the standard deviation (..., W) in each window of n values; centred : (..., T), values near 0, for
+    precision"""
     mean = _sums(centred, n) / n
     return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
 
 
 def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
-    """Estimate the noise (19,) of electrodes (T, 19) counts by steps over APART frames, in calmer windows of n."""
+    """Return the noise (19,) counts, standard deviation, of electrodes (T, 19) counts, from differences over `APART`
+    frames in the calmer ones of some windows of n frames."""
     starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
     windows = (electrodes[start : start + n].astype(float) for start in starts)
     steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])
@@ -127,9 +131,9 @@ def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
 
 
 def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float) -> _Windows:
-    """Return the statistics of all windows of n frames. A window is calm if in every electrode the standard deviation
-    and the difference between the means of its halves are below CALM_STD and CALM_TREND times the noise.
-    electrodes : (T, 19), pdc : (T,) counts, or None; rate : Hz"""
+    """Return the statistics of all windows of n frames. A window is calm if for every electrode its standard deviation
+    is at most `CALM_STD`, and the difference of its halves' means at most `CALM_TREND`, times the noise.
+    electrodes : (T, 19) counts; pdc : (T,) counts, or None; rate : Hz"""
     half = max(1, n // 2)
     count = len(electrodes) - n + 1
     medians = np.array([[median(column)] for column in electrodes.T])
@@ -152,7 +156,7 @@ def _running(electrodes: np.ndarray, pdc: np.ndarray | None, n: int, rate: float
 
 
 def _rest_rectified(windows: _Windows) -> np.ndarray:
-    """Mark windows (W,) bool at rest in rectified readings: small and calm, as the tare is zero."""
+    """Return (W,) bool, true for windows at rest in rectified readings: they are calm, and near zero, which is rest."""
     largest = windows.largest(lambda mean: mean)
     if windows.pdc is None:
         return windows.calm & (largest <= RECTIFIED_LEVEL)
@@ -160,7 +164,8 @@ def _rest_rectified(windows: _Windows) -> np.ndarray:
 
 
 def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
-    """Mark windows (W,) bool at rest: one calm window, and all calm ones that agree with it. duration : s, in all"""
+    """Return (W,) bool, true for windows at rest: one calm window, and all calm windows that agree with its levels.
+    kind : "raw", "tared" or "scaled"; duration : s, of the recording"""
     possible = windows.calm
     if kind != "raw":
         possible = possible & (windows.largest(np.abs) <= TARED_LEVEL)
@@ -184,9 +189,10 @@ def _rest_signed(windows: _Windows, kind: str, duration: float) -> np.ndarray:
 def _tracked(
     sums: np.ndarray, n: int, middle: np.ndarray, possible: np.ndarray, anchor: int, level: float, rate: float
 ) -> np.ndarray:
-    """Mark windows (W,) bool with means, sums (C, W) over n, within ``level`` of a level that follows them.
-    It starts at the window ``anchor`` and moves by at most ``rate`` per second: drift over an hour can exceed a press.
-    middle : (W,) s, of the windows; possible : (W,) bool, those that the level may follow"""
+    """Return (W,) bool, true for windows whose means stay near a tracked level, since drift over an hour can exceed a
+    press. The tracked level starts at the window ``anchor`` and follows the possible windows.
+    sums : (C, W) of n values of each channel; middle : (W,) s, time of the windows; possible : (W,) bool
+    level : counts by which means may be off; rate : counts/s, by which the tracked level may move"""
     accepted = np.ones(len(middle), bool)
     candidates = np.flatnonzero(possible)
     near = level + rate * TRACKED
@@ -208,8 +214,8 @@ def _tracked(
 
 
 def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> int:
-    """Choose the calm window (its index) that is taken for rest: among those of lowest PDC, the first near the
-    recording's start or the last near its end; of a recording that is not raw, the one nearest to zero.
+    """Return the index of the calm window that is taken for rest, among those of lowest PDC: the first near the
+    recording's start, or the last near its end; for another kind than "raw" the window nearest to zero.
     calm : (n,) int, indices of the windows to choose from; duration : s, of the recording"""
     if windows.pdc is not None:
         low = windows.pdc[calm]
@@ -224,7 +230,8 @@ def _anchor(windows: _Windows, calm: np.ndarray, kind: str, duration: float) -> 
 
 
 def tare_frames(asked: slice | str, count: int) -> slice:
-    """Convert asked tare frames, a slice or "A:B", to a slice without step; TactileError unless within `count`."""
+    """Return the frames to take rest from, a slice without a step. asked : slice or "A:B"; count : number of frames
+    Raises TactileError for frames that are not a range within these."""
     if isinstance(asked, slice):
         tare = asked
     else:

@@ -1,4 +1,5 @@
-"""Registry of file layouts, and the function that reads all: ``read(path)``. `columns` is a `ColumnMap` or None."""
+"""Registry of file layouts, and the function that reads all of them: ``read(path)``. Everywhere `columns` is a map of
+columns, for files of no known layout, or None."""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ PAC = re.compile(r"pac\d+")
 
 @cache
 def layouts() -> tuple[ModuleType, ...]:
-    """Import all modules of ``formats/``, in the order of their names."""
+    """Return the modules of ``formats/``, in the order of their names."""
     return tuple(modules_of(formats.__name__).values())
 
 
@@ -51,13 +52,13 @@ def read(
 
     path : the file; ``hand.mat#1`` reads finger 1 of a file of several fingers, ``hands.bag#left/biotac/finger1`` that
         of one topic of a bag
-    columns : which column or array of the file is what, where no known layout has its names; a map's file,
-        or one of ``column_map.read``
-    sensor : ``"biotac"``, or another with a descriptor, as ``"biotac_sp"`` of 24 electrodes
-    lean : a long CSV file leaves out what no translation needs, PAC and columns outside the map, and has its electrodes
-        in single precision where that is exact, as it is of counts: a third of the memory
-    Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac``,
-    ``tdc`` where the file has them, ``warnings`` for what is odd in it, ``not_taken`` for what else the file holds.
+    columns : map that says which column or array is what, for files of no known layout: its file, or what
+        ``column_map.read`` returns
+    sensor : name of the expected sensor, ``"biotac"``, or another with a descriptor, as ``"biotac_sp"``
+    lean : true reads a long CSV file in a third of the memory: without PAC and columns outside the map, which no
+        translation needs, and with electrodes in single precision if that is exact, as it is for counts
+    Returns a :class:`Recording`: ``time`` (T,) s, ``electrodes`` (T, 19 or 24) counts, ``pdc``, ``pac``, ``tac`` and
+    ``tdc`` if the file has them, ``warnings`` of what is odd in it, ``not_taken``: what else the file holds.
     Nothing is resampled, repaired or dropped.
     Raises TactileError for a file that is missing, not a recording, of another sensor, or mostly unreadable.
 
@@ -75,8 +76,8 @@ def read(
 
 
 def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Recording:
-    """Read a recording of whichever sensor a file that is no CSV holds; a CSV of another is refused at its header.
-    lean : leave out of a long CSV file what no translation needs"""
+    """Return a file's recording, of any sensor; but a CSV file of another sensor than the expected one is refused by
+    its header. lean : true leaves out of a long CSV file what no translation needs"""
     with opened(path) as (container, where, finger, file):
         if columns is not None:
             refuse_bag(path, container)
@@ -101,8 +102,8 @@ def _read(path: str, columns: ColumnMap | None, sensor: str, lean: bool) -> Reco
 
 
 def _noted(recording: Recording, store: Store) -> Recording:
-    """Add names of arrays that the recording leaves out, a warning of one that may be its time, and, unless it is
-    simulated, the file's labels."""
+    """Return the recording with the names of the arrays that were not read and, unless it is simulated, the file's
+    labels, and a warning of an unread array that may be the time."""
     labels = {} if recording.simulated else labels_in(store, len(recording))
     left, warnings = tuple(name for name in store.shapes if name not in store.taken), recording.warnings
     clock = next((name for name in left if is_time(name) and store.shapes[name][0][:1] == (len(recording),)), None)
@@ -112,14 +113,15 @@ def _noted(recording: Recording, store: Store) -> Recording:
 
 
 def _unneeded(columns: ColumnMap | None, name: str) -> bool:
-    """Return true for a column that no translation needs."""
+    """Return true if no translation needs the column called `name`: PAC, or, with a map, all columns outside it."""
     if columns is None:
         return PAC.fullmatch(name) is not None
     return name not in columns.names() and not columns.is_nanoseconds(name)
 
 
 def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> int:
-    """Count the PAC columns of a CSV file, which lean reading leaves out; 0 for other files and with a map."""
+    """Return the number of a CSV file's PAC columns, which lean reading leaves out; 0 for other files, and with a
+    map."""
     with opened(os.fspath(path)) as (container, where, _, file):
         if columns is not None or container != "csv":
             return 0
@@ -127,8 +129,8 @@ def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> str:
-    """Return a recording's sensor, by a CSV file's columns or a bag's messages; of other files, and with a map, the
-    BioTac. Raises TactileError for a file that is no recording."""
+    """Return the name of a recording's sensor, by a CSV file's columns or a bag's messages; "biotac" for other files
+    and with a map. Raises TactileError for a file that is no recording."""
     path = os.fspath(path)
     with opened(path) as (container, where, _, file):
         if container == "bag":
@@ -140,7 +142,7 @@ def sensor_of(path: str | os.PathLike[str], columns: ColumnMap | None = None) ->
 
 
 def sensor_of_first(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> str:
-    """Return the sensor of the first readable one of paths; the BioTac where none is, as `read` then refuses them."""
+    """Return the name of the sensor of the first readable file; "biotac" if no file is, which `read` then refuses."""
     for path in paths:
         with suppress(TactileError):
             return sensor_of(path, columns)
@@ -152,7 +154,8 @@ def _sensor(layout: ModuleType) -> str:
 
 
 def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -> Recording:
-    """Read the requested finger of a hand, or the first with a warning that names the others."""
+    """Return the recording of the requested finger, or of a file's first with a warning that names the others. Raises
+    TactileError for a finger that the file lacks."""
     known = layout.fingers(store.header if isinstance(store, Table) else store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
@@ -167,9 +170,9 @@ def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -
 
 
 def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> list[str]:
-    """List the recordings that a file holds: ``path#0``, ``path#1`` for a hand, the path itself for a file of one. Of a
-    bag of several topics, ``path#topic/finger0`` and so on. A map picks one finger itself. Raises TactileError like
-    `read` for a file that is no recording."""
+    """Return a path for each recording that a file holds: the path itself for one, ``path#0``, ``path#1`` for fingers
+    of a hand, ``path#topic/finger0`` for a bag of several topics. A map picks one finger. Raises TactileError for other
+    files."""
     path = os.fspath(path)
     with opened(path) as (container, where, finger, file):
         if container == "bag":
@@ -188,7 +191,7 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> list[str]:
-    """List the recordings of each of paths as `each_finger` does; unreadable files, too, for `read` to refuse."""
+    """Return a path for each recording in the files, by `each_finger`; that of an unreadable file stays as it is."""
     found = []
     for path in paths:
         try:
@@ -199,7 +202,7 @@ def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | N
 
 
 def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the fingers of a file whose layout holds hands; () for any other layout and for mapped columns."""
+    """Return the numbers of the fingers in a CSV file, by its header; () if its layout holds no hands."""
     known = [layout for layout in layouts() if _holds_hands(layout) and layout.score(header) >= RECOGNISED]
     return known[0].fingers(header) if known else ()
 
@@ -210,15 +213,15 @@ def _holds_hands(layout: ModuleType) -> bool:
 
 
 def names(store: Store) -> set[str]:
-    """Return the names from which an HDF5 file's layout is detected: of its arrays, and ``format=...``."""
+    """Return the names by which an HDF5 file's layout is detected: its arrays' names, and ``format=...``."""
     return {*store.shapes, f"format={store.attributes.get('format', '')}"}
 
 
 def table_reader(
     path: str, header: Collection[str], columns: ColumnMap | None, sensor: str = SOURCE, finger: int | None = None
 ) -> Callable[[Table], Recording]:
-    """Return the reader of a CSV file's table, by map or header; finger : its number in a hand's table, None for the
-    first. Raises TactileError for another sensor's file."""
+    """Return the function that makes the recording of a CSV file's table, by the map or by the header's layout.
+    finger : number of the finger to read, None for the first. Raises TactileError for another sensor's file."""
     if columns is not None:
         reader = partial(read_mapped, columns=columns)
     else:
@@ -232,8 +235,9 @@ def table_reader(
 
 
 def layout_of(path: str, container: str, keys: Collection[str]) -> ModuleType:
-    """Return the layout of whose own names keys, the file's columns or arrays, hold the largest share. Raises
-    TactileError where that is below RECOGNISED. container : kind of file: csv, json, hdf5, npz or mat"""
+    """Return the module of the layout that fits a file best, by the share of the layout's own names among the file's.
+    Raises TactileError if that share is below `RECOGNISED`.
+    container : "csv", "json", "hdf5", "npz" or "mat"; keys : names of the file's columns or arrays"""
     scored = [(layout.score(keys), layout) for layout in layouts() if container == layout.CONTAINER]
     best, layout = max(scored, key=lambda pair: pair[0], default=(0.0, formats))
     if best < RECOGNISED:

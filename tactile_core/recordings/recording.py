@@ -1,4 +1,4 @@
-"""The one type every reader returns, and the name of one in a file of several: ``path#topic/finger``."""
+"""The type that every reader returns, and paths of single recordings in a file of several: ``path#topic/finger``."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ LEAST_STEP = 1e-6  # s between stamps; less is no time (assumed), and its invers
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Truth(Summary):
-    """True values of a simulated recording; real ones have none. None marks arrays that its file leaves out.
+    """True values of a simulated recording; real ones have none. None stands for arrays that its file leaves out.
 
-    displacement_biotac : (T, N, 3) float32, m, of the outer skin's nodes
-    displacement_digit : (T, M, 3) float32, m, of the gel surface's nodes
-    force : (T, 3) float, N, of the object on the BioTac or, where that was not solved, on the first sensor
-    contact_center : (T, 2) float, m, (x, z) of pressure on the first gel at rest; NaN without contact
-    traction_biotac : (T, N, 3) float32, Pa, of the object on the resting skin's nodes
-    traction_digit : (T, M, 3) float32, Pa, of the object on the resting gel's nodes
-    displacement, traction : the same of further sensors, by their names"""
+    displacement_biotac : (T, N, 3) float32, m, displacement of the N nodes of the outer skin
+    displacement_digit : (T, M, 3) float32, m, displacement of the M nodes of the gel's surface
+    force : (T, 3) float, N, of the object on the BioTac or, if that was not solved, on the first sensor that was
+    contact_center : (T, 2) float, m, (x, z) of the center of pressure on the first gel at rest; NaN without contact
+    traction_biotac : (T, N, 3) float32, Pa, traction of the object at the nodes of the skin at rest
+    traction_digit : (T, M, 3) float32, Pa, traction of the object at the nodes of the gel at rest
+    displacement, traction : arrays as above for further sensors, by the sensor's name"""
 
     displacement_biotac: np.ndarray | None
     displacement_digit: np.ndarray | None
@@ -55,13 +55,13 @@ class Truth(Summary):
 
     @property
     def displacements(self) -> dict[str, np.ndarray]:
-        """Displacements (T, n, 3) m of all sensors whose displacement the file has, by the sensor's name."""
+        """Return the displacements (T, n, 3) m that the file has, by the sensor's name."""
         held = {SOURCE: self.displacement_biotac, TARGET: self.displacement_digit, **self.displacement}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
     @property
     def tractions(self) -> dict[str, np.ndarray]:
-        """Tractions (T, n, 3) Pa of all sensors whose traction the file has, by the sensor's name."""
+        """Return the tractions (T, n, 3) Pa that the file has, by the sensor's name."""
         held = {SOURCE: self.traction_biotac, TARGET: self.traction_digit, **self.traction}
         return {sensor: values for sensor, values in held.items() if values is not None}
 
@@ -70,25 +70,24 @@ class Truth(Summary):
 class Recording(Summary):
     """Content of a recording's file, unchanged: one frame per data row, in file order, nothing resampled or dropped.
 
-    name : file name without its extension
-    sensor : "biotac" or "biotac_sp"
-    section : of a file of `tactile adapt`, which has the recording's unit
-    layout : which layout the file has, in words
-    time : (T,) float, s from the first frame; may go back where the file's stamps do; NaN of snapshots, which do not
+    name : the file's name without extension, with topic and finger if the file holds several
+    sensor : name of the sensor, "biotac" or "biotac_sp"
+    section : name of the section that has the recording's unit in a file of `tactile adapt`
+    layout : the file's layout, in words
+    time : (T,) float, s from the first frame; it goes back where the file's stamps do; NaN for snapshots, which do not
         follow each other
     start_time : unix time of the first frame, s; 0.0 if unknown
-    electrodes : (T, 19) float, counts or as in the file, E1..E19, (T, 24) of a BioTac SP; NaN where the file is
+    electrodes : (T, 19) float, E1 to E19, (T, 24) for a BioTac SP: counts, or as in the file; NaN where it is
         unreadable
-    rows : (T,) int, line of each frame in a text file (the header is line 1); index of the frame in others
+    rows : (T,) int, each frame's line in a text file (the header is line 1), its index in other files
     flags : (T,) uint16, bits of :class:`tactile_core.recordings.flags.Flag`
     pdc, tac, tdc : (T,) float or None, counts
     pac : (T, P) float or None, counts; P = 22 at 2,200 Hz, or what the file holds
     position, force : (T, 3) float or None, in the file's own frame and unit of measurement
-    labels : name -> (T,) object array of str, such as object, material or trial, which no translation reads
-    warnings : sentences for the user; simulated, truth : true, and true values, of a file that says it is simulated
-    not_taken : what the file holds beside it and no recording is made of, in words: topics, arrays, columns, fields
-    about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)
-    """
+    labels : name -> (T,) object array of str, such as object, material or trial, which translation ignores
+    warnings : sentences for the user; simulated : true if the file says that it is; truth : its true values, or None
+    not_taken : topics, arrays, columns and fields of the file that were not read, in words
+    about : other information in the file (simulated: sensor, scene, seed, made_by, note; BioTac SP: finger, labels)"""
 
     name: str
     path: str
@@ -117,7 +116,7 @@ class Recording(Summary):
         return len(self.electrodes)
 
     def at(self, frames: np.ndarray) -> Recording:
-        """Return the frames (n,) alone; what was found in all of them, such as warnings, stays."""
+        """Return the recording with only the frames (n,), given by index; its warnings stay."""
         held: dict[str, Any] = {name: value for name, value in vars(self).items() if isinstance(value, np.ndarray)}
         rows = {name: value[frames] for name, value in held.items()}
         labels = {name: column[frames] for name, column in self.labels.items()}
@@ -139,24 +138,25 @@ class Recording(Summary):
 
     @cached_property
     def rate(self) -> float:
-        """Frames per second: one over the median step between stamps; the nominal 100 Hz for a single frame."""
+        """Return the frames per second: one over the median step of time; the nominal 100 Hz for a single frame."""
         steps = np.diff(self.time)
         steps = steps[steps > 0]
         return 1.0 / max(float(np.median(steps)), LEAST_STEP) if len(steps) else SAMPLE_RATE
 
     @property
     def duration(self) -> float:
-        """Time from the first frame to the last, s; 0 of snapshots, which have none."""
+        """Return the time from the first frame to the last, s; 0 for snapshots, which have none."""
         return float(np.nan_to_num(self.time[-1] - self.time[0]))
 
     @property
     def row_word(self) -> str:
-        """Word for a frame's row in messages: line of a text file, frame of others."""
+        """Return what messages call a frame's row: "line" in a text file, "frame" in others."""
         return "line" if self.layout.startswith("CSV") else "frame"
 
 
 class Chosen(NamedTuple):
-    """One of a file's recordings; file : its path; finger, topic : None and empty where the path names none"""
+    """What a path such as ``hand.bag#left/biotac/finger2`` names. file : path of the file
+    finger : the finger's number, None if none is named; topic : the bag's topic, "" if none is named"""
 
     file: str
     finger: int | None
@@ -164,18 +164,18 @@ class Chosen(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Name of the recording and its results: the file's without extension, with topic and finger."""
+        """Return the name of the recording and its results: the file's without extension, topic and finger."""
         topic = f"_{UNFIT.sub('_', self.topic)}" if self.topic else ""
         return Path(self.file).stem + topic + ("" if self.finger is None else f"_finger{self.finger}")
 
     @property
     def section(self) -> str:
-        """Name of its unit's section in a file of `tactile adapt`: ``unit``, ``finger2``, ``left/biotac/finger2``."""
+        """Return its unit's section in a file of `tactile adapt`: ``unit``, ``finger2``, ``left/biotac/finger2``."""
         return (f"{self.topic}/" if self.topic else "") + ("unit" if self.finger is None else f"finger{self.finger}")
 
 
 def split(path: str) -> Chosen:
-    """Split ``hand.bag#2`` or ``hand.bag#left/biotac/finger2``; a path that exists is taken as it is."""
+    """Split ``hand.bag#2`` or ``hand.bag#left/biotac/finger2`` into its parts; a path that exists is a file's."""
     if os.path.exists(path):
         return Chosen(path, None)
     if found := FINGER.match(path):
@@ -185,7 +185,7 @@ def split(path: str) -> Chosen:
 
 
 def name_of(path: str | os.PathLike) -> str:
-    """Name a recording and its results, as ``hand_left_biotac_finger2`` for ``hand.bag#left/biotac/finger2``."""
+    """Return the name of a recording's results, ``hand_left_biotac_finger2`` of ``hand.bag#left/biotac/finger2``."""
     return split(os.fspath(path)).name
 
 
@@ -196,5 +196,5 @@ def short_of(path: str | os.PathLike) -> str:
 
 
 def named(recording: Recording, chosen: Chosen) -> Recording:
-    """Add the topic and finger to the names of a recording and its unit, as `Chosen` does."""
+    """Return the recording with the name and the unit's section that the chosen topic and finger have."""
     return replace(recording, name=chosen.name, section=chosen.section)

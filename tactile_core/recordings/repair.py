@@ -21,9 +21,8 @@ MAX_SHARE = 0.2  # of the frames; beyond, the rows are no time series and nothin
 
 
 def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
-    """Interpolate linearly over the bad samples of each column; the nearest good one at the ends.
-    values : (T, C) float; bad : (T, C) bool. A column without any good sample becomes 0. Never changes values, and
-    returns them themselves where none is bad."""
+    """Return values (T, C) with the bad samples, bad (T, C) bool, of each column interpolated linearly; at the ends the
+    nearest good sample is taken, and a column without any becomes 0. If none is bad, values itself is returned."""
     if not bad.any():
         return values
     values = values.astype(float)
@@ -35,19 +34,19 @@ def fill(values: np.ndarray, bad: np.ndarray) -> np.ndarray:
 
 
 def find_glitches(values: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool samples that left the signal's level for a moment and came back.
+    """Return (T, C) bool, true for samples that leave the signal's level for a moment: the signal comes back to it.
 
-    values : (T, C) float, counts, finite.
+    values : (T, C) float, counts, finite
     A run of samples is a glitch when all of these hold. It begins with a jump of more than 30 counts in one sample and
     ends with one in the opposite direction. The level after it is the one before it, and its own samples lie on one
     level, both within a third of the jump. The jumps are three times as steep as the calmer of the two steps just
-    outside. It is not itself the return, between two glitches, to the level of the second around it. It lasts at most 5
-    samples, or at most 50 where no more than 3 electrodes step by 10 counts (a bit stuck in one channel; seen in
+    outside. It leaves the median level of the second around it (a gap between two glitches does not). It lasts at most
+    5 samples, or at most 50 where no more than 3 electrodes step by 10 counts (a bit stuck in one channel; seen in
     mat5_50 of the slide set).
     A press, a tap and a rolling contact pass: they rise and fall over several samples, or stay. A round tap of 20-50 ms
     is not flat; a contact within one single sample (10 ms) looks like a glitch. At the start and end of a recording
-    only one jump can be seen; there it must exceed 100 counts, within 3 samples. The search ends where the rows are
-    found to be no time series, see `is_time_series`."""
+    only one jump can be seen; there it must exceed 100 counts, within 3 samples. The search ends early if so many
+    frames hold glitches that the rows can be no time series."""
     found = np.zeros(values.shape, bool)
     for _ in range(ROUNDS):
         if not is_time_series(found):
@@ -69,7 +68,7 @@ def is_time_series(glitches: np.ndarray) -> bool:
 
 
 def _jumping(values: np.ndarray) -> np.ndarray:
-    """Mark the electrodes of values (T, C) that jump anywhere; computed in parts, which bounds the memory."""
+    """Return the indices (k,) int of the columns of values (T, C) counts that anywhere step by more than `LIMIT`."""
     most = np.zeros(values.shape[1])
     for start in range(0, len(values) - 1, BLOCK):
         steps = np.diff(values[start : start + BLOCK + 1].astype(float), axis=0)
@@ -78,8 +77,8 @@ def _jumping(values: np.ndarray) -> np.ndarray:
 
 
 def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool glitches of 1 to 5 samples in values (T, C), a column at a time, which bounds the memory of a
-    long recording. jumping : (k,) int, columns to search"""
+    """Return (T, C) bool, true for glitches of 1 to 5 samples in values (T, C) counts. jumping : (k,) int, columns to
+    search, one at a time, which bounds the memory of a long recording"""
     frames = len(values)
     found = np.zeros(values.shape, bool)
     for length in range(1, min(SHORT, frames - 2) + 1):
@@ -91,7 +90,7 @@ def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 
 def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
-    """Mark in ``found`` (T,) the glitches of `length` samples in a column (T,), beside those already marked."""
+    """Set ``found`` (T,) bool for glitches of `length` samples in a column (T,) counts, beside those already set."""
     steps = np.diff(column)  # steps[i] leads from sample i to i + 1
     large = np.abs(steps) > LIMIT
     calm = np.abs(np.pad(steps, 1, mode="edge"))  # calm[i] = |step| into sample i
@@ -105,9 +104,9 @@ def _mark_short(column: np.ndarray, found: np.ndarray, length: int) -> None:
 
 
 def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np.ndarray:
-    """Mark (N,) runs that jump away, steeper than their neighbourhood, stay on one level and return.
-    samples : (n + 2, N) counts, the level before, the n samples of each run, the level after
-    neighbour_step : (N,) counts, the calmer of the steps just outside"""
+    """Return (N,) bool, true for runs that jump away, steeper than their neighbourhood, stay on one level and return.
+    samples : (n + 2, N) counts, the sample before each run, its n samples, and the sample after it
+    neighbour_step : (N,) counts, the smaller of the steps just before and after these"""
     jump = np.minimum(np.abs(samples[1] - samples[0]), np.abs(samples[-1] - samples[-2]))
     run = samples[1:-1]
     returns = np.abs(samples[-1] - samples[0]) <= np.maximum(LEVEL, FLATNESS * jump)
@@ -118,8 +117,8 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if the run after sample `first` and before `last` of column (T,) leaves the level of the second
-    around it; a gap between two glitches does not."""
+    """Return true if the run between samples `first` and `last` of column (T,) counts leaves the median level of the
+    second around it; a gap between two glitches does not."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])
@@ -127,7 +126,7 @@ def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
 
 
 def _end_runs(values: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool the glitches of 1 to 3 samples at the first and the last sample of values (T, C) counts."""
+    """Return (T, C) bool, true for glitches of 1 to 3 samples at the very start or end of values (T, C) counts."""
     found = np.zeros(values.shape, bool)
     if len(values) < 2 * END + 2:
         return found
@@ -143,7 +142,7 @@ def _end_runs(values: np.ndarray) -> np.ndarray:
 
 
 def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Mark (T, C) bool runs of 6 to 50 samples in which one electrode, or two or three, sit at a wrong level.
+    """Return (T, C) bool, true for runs of up to 50 samples in which one to three electrodes sit at a wrong level.
     values : (T, C) counts; jumping : (k,) int, columns to search"""
     found = np.zeros(values.shape, bool)
     together = np.zeros(len(values) - 1, int)
@@ -161,9 +160,9 @@ def _stuck_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
 
 
 def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, int, float]]:
-    """Return pairs of opposite jumps in column (T,) that may begin and end a stuck run, in order, as
-    (start, end, step): samples before them, and the calmer of the steps just outside.
-    edges : (n,) int, samples before large steps. (A noisy electrode has millions of pairs: all are checked at once.)"""
+    """Return, sorted, (start, end, step) for pairs of opposite jumps that may begin and end a stuck run: the samples
+    before the two jumps, and the smaller of the steps just outside, counts.
+    column : (T,) counts; edges : (n,) int, samples before large steps. (All pairs at once: noise may make millions.)"""
     steps = np.diff(column)
     beside = np.abs(np.concatenate([[np.inf], steps, [np.inf]]))
     pairs: list[tuple[int, int, float]] = []
@@ -182,8 +181,8 @@ def _opposite_jumps(column: np.ndarray, edges: np.ndarray) -> list[tuple[int, in
 
 
 def faded_ends(readings: np.ndarray) -> np.ndarray:
-    """Mark rows (T,) bool at either end of raw readings (T, e) counts that were averaged with zeros from beyond it:
-    from about half of what follows they rise evenly, all electrodes alike (``numpy.convolve(..., "same")``)."""
+    """Return (T,) bool, true for rows at either end of raw readings (T, e) counts that are moving averages with zeros
+    beyond the end, as of ``numpy.convolve(..., "same")``: towards it all electrodes fade evenly, to about half."""
     found = np.zeros(len(readings), bool)
     found[: _faded(readings)] = True
     found[len(readings) - _faded(readings[::-1]) :] = True
@@ -191,7 +190,7 @@ def faded_ends(readings: np.ndarray) -> np.ndarray:
 
 
 def _faded(readings: np.ndarray) -> int:
-    """Return how many first rows of readings (T, e) counts fade."""
+    """Return the number of first rows of readings (T, e) counts that are averages with zeros before them."""
     if len(readings) < 3 or not (readings[1] > readings[0]).all() or not readings[0].all():
         return 0
     rows = round(float(np.median(readings[0] / (readings[1] - readings[0]))))  # that the first average holds
@@ -202,7 +201,7 @@ def _faded(readings: np.ndarray) -> int:
 
 
 def smooth(values: np.ndarray, frames: int) -> np.ndarray:
-    """Average values (T, k) over an odd number of frames round each, fewer at the ends: less noise without delay."""
+    """Return values (T, k) averaged over an odd number of frames around each, fewer at the ends."""
     if frames == 1:
         return values
     total = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(values, axis=0, dtype=np.float64)])

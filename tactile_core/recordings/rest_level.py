@@ -17,19 +17,19 @@ LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Readings without contact: levels (P, 19) counts at frames (P,), linear between them, constant outside."""
+    """Readings without contact: levels (P, 19) counts at frames (P,), linear between these, constant outside."""
 
     frames: np.ndarray
     levels: np.ndarray
 
     @classmethod
     def constant(cls, counts: np.ndarray) -> Baseline:
-        """Make the baseline that is at counts (19,) in every frame."""
+        """Return the baseline that has the level counts (19,) in every frame."""
         return cls(np.zeros(1), np.asarray(counts, float)[None])
 
     @functools.cached_property
     def _slopes(self) -> np.ndarray:
-        """Slope (P, 19), counts per frame, after each of the frames; 0 after the last."""
+        """Return the slope (P, 19), counts per frame, after each of `frames`; 0 after the last."""
         return np.diff(self.levels, axis=0, append=self.levels[-1:]) / np.diff(self.frames, append=np.inf)[:, None]
 
     def at(self, frames: np.ndarray) -> np.ndarray:
@@ -45,8 +45,8 @@ class Baseline:
 
 
 class Changes:
-    """Changes (T, e) counts, indexed like an array; computed on demand, as all would take twice a recording's memory.
-    count : T; of : function from frames (n,) to their changes (n, e)"""
+    """Changes (T, e) counts against rest, indexed like an array and computed when they are read, as all of them would
+    take twice a recording's memory. count : T; of : function from frames (n,) to their changes (n, e)"""
 
     def __init__(self, count: int, of: Callable[[np.ndarray], np.ndarray]) -> None:
         self._count, self._of = count, of
@@ -66,7 +66,7 @@ class Changes:
         return found
 
     def then(self, function: Callable[[np.ndarray], np.ndarray]) -> Changes:
-        """Return changes that apply a function (n, e) -> (n, e), frame by frame, to these when they are read."""
+        """Return these changes with a function (n, e) -> (n, e) applied to them, frame by frame, when they are read."""
         return Changes(self._count, lambda frames: function(self._of(frames)))
 
 
@@ -74,9 +74,9 @@ Framewise = np.ndarray | Changes
 
 
 def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
-    """Estimate what electrodes (T, 19) counts read without contact. Level of each quiet part, linear between their
-    middles, constant before the first and after the last: nothing is known there, and contact is never taken for drift.
-    Without drift: one level over all quiet frames."""
+    """Return what electrodes (T, 19) counts would read without contact, from the quiet parts. drift : true takes each
+    part's level, linear between the parts' middles and constant outside, where nothing is known; false takes one level
+    of all quiet frames"""
     if not drift or len(quiet.parts) < 2:
         return Baseline.constant(level(electrodes[quiet.mask]))
     middles = np.array([0.5 * (a + b - 1) for a, b in quiet.parts])
@@ -84,7 +84,8 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """Return pdc (T,) at rest, counts: 0 if tared, and not of kind "raw"; else that of quiet frames, or the lowest."""
+    """Return the level of pdc (T,) counts at rest: 0 if it was tared (low, and the kind is not "raw"), else that of the
+    quiet frames, without any its lowest percentile."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0
@@ -93,7 +94,7 @@ def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
 
 
 def level(samples: np.ndarray) -> np.ndarray:
-    """Return the mean (19,) of the middle half of (n, 19) samples: robust as the median, but not whole counts."""
+    """Return the mean (19,) of the middle half of samples (n, 19): as robust as the median, but finer than a count."""
     cut = len(samples) // 4
     counts = counted(samples)
     if counts is None:

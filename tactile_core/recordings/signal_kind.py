@@ -25,8 +25,8 @@ MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assu
 
 
 def counted(columns: np.ndarray) -> np.ndarray | None:
-    """Return a histogram (e, 65536) int of columns (T, e) of whole numbers from -32,768 on; None for other numbers and
-    short columns. (Sorting long columns takes twice their memory and most of the time of reading.)"""
+    """Return the histograms (e, 65536) int of columns (T, e) of whole numbers, from -32,768 on; None for other numbers
+    and short columns. (They replace sorting, which takes long and twice the memory.)"""
     if len(columns) < len(WHOLE):
         return None
     counts = np.empty((columns.shape[1], len(WHOLE)), int)
@@ -39,7 +39,7 @@ def counted(columns: np.ndarray) -> np.ndarray | None:
 
 
 def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Return percentiles as numpy's, shares in per cent, of numbers given by their histogram, counts (65536,)."""
+    """Return the percentiles, as numpy's, of whole numbers. counts : (65536,) their histogram; shares : per cent"""
     place = np.array(shares) / 100 * (counts.sum() - 1)
     below = np.floor(place)
     low, high = (WHOLE[np.searchsorted(np.cumsum(counts), rank, "right")] for rank in (below, np.ceil(place)))
@@ -47,15 +47,15 @@ def percentiles(counts: np.ndarray, shares: list[float]) -> np.ndarray:
 
 
 def median(column: np.ndarray) -> float:
-    """Return the median of a column (T,), finite."""
+    """Return the median of a column (T,) of finite numbers."""
     counts = counted(column[:, None])
     return float(np.median(column)) if counts is None else float(percentiles(counts[0], [50])[0])
 
 
 def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
-    """Return counts per unit of measurement, and that unit in words, of raw readings in volts, shares or other bits;
-    None for counts and for what is not raw.
-    electrodes : (T, e) float, finite; readings are raw if most electrodes rest high in the range and stay far from 0"""
+    """Return counts per unit of measurement, and that unit in words, if raw readings are in volts, shares of the range
+    or counts of other bits; None for 12-bit counts and for readings that are not raw.
+    electrodes : (T, e) float, finite; they are raw if most rest high in the range and stay far from 0"""
     past_10_bit, past_12_bit = (
         ((electrodes > BEYOND * full).mean(axis=0) > 0.5).mean() for full in (1023.0, COUNT_MAX)
     )
@@ -70,8 +70,8 @@ def full_scale(electrodes: np.ndarray) -> tuple[float, str] | None:
 
 
 def detect(electrodes: np.ndarray) -> tuple[str, str]:
-    """Return kind ("raw", "tared", "scaled" or "rectified") and the evidence for it in words.
-    electrodes : (T, 19) float, finite, as in the file"""
+    """Return the kind of electrodes (T, 19) float, finite, as in the file: "raw", "tared" (rest subtracted), "scaled"
+    (tared, in another unit) or "rectified" (absolute changes); and what shows it, in words."""
     counts = counted(electrodes)
     if counts is not None:
         levels = np.array([percentiles(each, [50])[0] for each in counts])

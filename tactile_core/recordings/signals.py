@@ -27,16 +27,16 @@ SAME_PRESSURE = 15.0  # counts of PDC, 0.55 kPa: less is no contact (docs/source
 
 @dataclass(frozen=True)
 class Rest:
-    """Rest of a unit, found in other recordings of it. counts : (e,) readings, of E1 on; spread : (e,) counts by which
-    they may be off; pdc : counts, None where unknown"""
+    """A unit's readings without contact, found in other recordings of it. counts : (e,) readings from E1 on
+    spread : (e,) counts by which they may be off; pdc : PDC at rest, counts, None if unknown"""
 
     counts: tuple[float, ...]
     spread: tuple[float, ...]
     pdc: float | None = None
 
     def agrees(self, level: np.ndarray, pdc: float) -> bool:
-        """Return true if a quiet level (19,) counts is this unit at rest, judged by pdc, counts, there. If either has
-        no PDC (NaN), or PDC has another zero, the level must be near the unit's counts at rest."""
+        """Return true if a calm level (19,) counts is this unit at rest: if pdc, counts, is near the unit's at rest; if
+        PDC is unknown (NaN), or has another zero, if the level is near the unit's counts at rest."""
         if self.pdc is not None and abs(pdc - self.pdc) < TARED_PDC:
             return abs(pdc - self.pdc) < SAME_PRESSURE
         return bool((np.abs(level - np.array(self.counts)) <= np.maximum(UNIT_DRIFT, self.spread)).all())
@@ -44,19 +44,18 @@ class Rest:
 
 @dataclass(frozen=True)
 class PrepareOptions:
-    """Options that override the automatic choices; None is automatic.
+    """Options of the preparation of signals; None leaves a choice to the program.
 
     kind : "raw", "tared", "scaled" or "rectified"
     tare : frames to take rest from, a slice or "A:B"; "none" takes the file's own zero; None finds quiet parts
-    drift : remove drift between quiet parts
-    repair : remove glitches (unreadable samples are always interpolated)
-    counts_per_unit : factor from a scaled recording's unit of measurement to counts
-    smooth : frames, odd, centred window over which the changes are averaged; None: 3 of a rectified recording, else 1
-    polarity : "falls" or "rises": direction of counts where a film thins; "auto": as the file states, or as detected
-    rest : the unit's own, for raw recordings that hold no calm part near it
+    drift : true removes drift between quiet parts
+    repair : true interpolates over glitches (unreadable samples are always interpolated)
+    counts_per_unit : factor from a recording's unit of measurement to counts
+    smooth : odd number of frames over which changes are averaged; None: 3 for a rectified recording, else 1
+    polarity : "falls" or "rises", how counts change where the film thins; "auto": as the file states, or as detected
+    rest : the unit's readings without contact, for raw recordings that hold no calm part near it
     film : thickness of a raw recording's fluid film, divided by a typical unit's; None: as rest and contacts show it
-    columns : which column of a CSV file is what, for those who read the recording; None: as its layout says
-    """
+    columns : map of the file's columns, used when the recording is read; None: its layout names them"""
 
     kind: str | None = None
     tare: slice | str | None = None
@@ -101,13 +100,13 @@ class Signals:
     electrodes : (T, 19) float, counts: the readings after repair, before the tare
     kind : "raw", "tared", "scaled" or "rectified"
     quiet : (T,) bool, frames without contact that rest was taken from
-    flags : (T,) uint16, the recording's and those found here
+    flags : (T,) uint16, bits of ``flags.Flag``: the recording's and those found here
     pdc : (T,) float, counts, the fluid's pressure over its level at rest; NaN where the recording has none
-    warnings : the recording's and those found here; doubts among them carry their reason, see `doubt`
+    warnings : sentences, the recording's and those found here; a `Doubt` among them carries its reason
     report : what was found and done, fit for JSON
-    sensor : whose signals; shapes above say 19, as of a BioTac
-    film : thickness of the unit's film, divided by a typical unit's, which the changes were converted from
-    stiffness : of the unit's skin, divided by a typical one's; force and pressure are to be multiplied by it"""
+    sensor : name of the sensor; 19 in the shapes is the BioTac's number of electrodes
+    film : thickness of the unit's film, divided by a typical unit's, from which the changes were converted
+    stiffness : of the unit's skin, divided by a typical one's: force and pressure are to be multiplied by it"""
 
     change: np.ndarray
     rest: np.ndarray
@@ -124,42 +123,42 @@ class Signals:
     stiffness: float = 1.0
 
     def at(self, frames: np.ndarray | slice) -> Signals:
-        """Return the signals of frames (n,) alone; rest and drift stay those of the recording."""
+        """Return the signals of frames (n,) or a slice alone; rest and drift stay those of the recording."""
         return replace(self, **{name: getattr(self, name)[frames] for name in FRAMEWISE})
 
     @property
     def pressure_measured(self) -> np.ndarray:
-        """Rise (T,) Pa of the fluid's pressure over rest, measured by PDC; NaN where it was not recorded."""
+        """Return the rise (T,) Pa of the fluid's pressure over rest, by PDC; NaN if that was not recorded."""
         return of_kind(self.sensor, Fluid).readout.pressure * self.pdc
 
     @property
     def typical(self) -> np.ndarray:
-        """Change (T, 19) counts, converted by ``divider.typical`` to a unit that rests at ``sensors.typical_rest``, the
-        networks' input. Only raw readings are converted, as others do not show their unit's rest, and only of a
-        sensor with a typical rest."""
+        """Return the networks' input: change (T, 19) counts that a unit with a typical rest would show. Only raw
+        readings are converted, as others do not show their unit's rest, and only if the sensor has a typical rest."""
         if self.kind != "raw" or typical_rest(self.sensor) is None:
             return self.change
         return Changes(len(self.change), self.typical_of)[EVERY]
 
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
-        """Return change (T, e) counts, of raw readings converted to a unit that rests at counts rest (e,)."""
+        """Return change (T, e) counts, if readings are raw converted to a unit that rests at rest (e,) counts."""
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
-        """Convert change (T, e) counts of a typical unit, which rests at counts `at` (e,), to the change (T, e) that
-        this unit would show. Its gains and the fluid's drift are not put back. Returned as it is where this recording
-        is not raw, or `at` is None."""
+        """Return the change (T, e) counts that this unit would show where a typical one shows change (T, e) counts; not
+        converted if the recording is not raw, or `at` None. Gains and the fluid's drift are not put back.
+        at : (e,) counts at which the typical unit rests"""
         if self.kind != "raw" or at is None:
             return change
         own = divider.of_unit(change, self.rest, at)
         return own if self.film == 1 else divider.of_typical_film(own, self.rest, 1 / self.film)
 
     def typical_of(self, rows: slice | np.ndarray) -> np.ndarray:
-        """Return change (n, 19) counts of frames rows (n,) or a slice alone, as ``typical`` has them."""
+        """Return the rows (n,), or a slice, of ``typical`` alone: (n, 19) counts."""
         return typical(self.change[rows], self.kind, self.rest, self.sensor)
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Convert change (n, 19) counts of a unit at counts rest (19,) to a sensor's typical unit's, if of kind "raw"."""
+    """Return change (n, 19) counts, if "raw" converted from a unit at rest (19,) counts to the sensor's typical
+    unit."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

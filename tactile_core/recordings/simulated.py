@@ -48,11 +48,11 @@ def write_simulated(
     note: str,
     start_time: float = 0.0,
 ) -> Path:
-    """Write the file whole or not at all, and return its path; None is left out.
-    time : (T,) s; electrodes : (T, 19), pdc, tac, tdc : (T,) counts, raw; start_time : unix s, 0 if unknown
-    truth : true values, arrays of T frames; scene : TOML text; seed : that the scene was simulated with
-    made_by, note : texts, the program and what a reader must know
-    Raises TactileError: shapes that do not belong together, counts outside 12 bits, displacements beyond +-16 mm."""
+    """Write a simulated recording, whole or not at all, and return its path; arrays that are None are left out.
+    time : (T,) s; electrodes : (T, 19) raw counts; pdc, tac, tdc : (T,) raw counts; start_time : unix s, 0 if unknown
+    truth : true values, arrays of T frames; scene : the scene's TOML text; seed : random seed of the simulation
+    made_by : name of the program; note : what a reader must know
+    Raises TactileError for shapes that do not fit, counts outside 12 bits, and displacements beyond +-16 mm."""
     path, frames = Path(path), len(time)
     _check_shape(path, "time", time, (frames,))
     plain: dict[str, np.ndarray] = {"time": np.asarray(time, np.float64)}
@@ -89,8 +89,8 @@ def write_simulated(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Read an opened file; layout : its name in words, kept in the recording. Raises TactileError for misfits, and
-    without electrodes."""
+    """Return the recording in an open file; layout : in words. Raises TactileError without electrodes, and for
+    misfits."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")
@@ -106,7 +106,7 @@ def read_simulated(store: Store, layout: str) -> Recording:
 
 
 def read_truth(path: str | os.PathLike) -> tuple[np.ndarray, Truth]:
-    """Read times (T,) s, after the file's start_time (unix s, 0 if unknown) was added, and true values of a simulated
+    """Return times (T,), unix s, or s from the start if the file states none, and the true values of a simulated
     recording, with electrodes or without. Raises TactileError for another file."""
     with open_hdf5(os.fspath(path)) as store:
         if store.attributes.get("format") != FORMAT:

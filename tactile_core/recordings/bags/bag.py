@@ -55,8 +55,7 @@ class Bag:
 
 
 def is_bag_folder(path: str) -> bool:
-    """Return true if a path is the folder of a ROS 2 bag. Raises TactileError if its files are compressed, or link to
-    others outside the folder."""
+    """Return true for a ROS 2 bag's folder. Raises TactileError for compressed files in it, and for links out of it."""
     if not os.path.isfile(os.path.join(path, MARK)):
         return False
     with outside.open_file(outside.inside(path, MARK), "a bag's metadata") as file:
@@ -71,8 +70,8 @@ def is_bag_folder(path: str) -> bool:
 
 
 def kind_of(start: bytes) -> str | None:
-    """Return the kind of bag that a file with this start is: "ros1", "mcap" or "sqlite"; None if it is no bag.
-    start : the file's first `START_BYTES` bytes"""
+    """Return the kind of bag that begins with these `START_BYTES` bytes: "ros1", "mcap" or "sqlite"; None if it is no
+    bag."""
     return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
 
 
@@ -115,8 +114,7 @@ def refused(path: str) -> Iterator[None]:
 
 
 def _sorted(path: str, reader: Any, ros1: bool) -> Bag:
-    """Return the bag of an open reader, its topics with BioTacs apart from the others. Raises TactileError if no topic
-    has a BioTac and a message."""
+    """Return the bag of an open reader. Raises TactileError if no topic has a BioTac and a message."""
     grouped: dict[tuple[str, str], list[Any]] = {}
     for connection in reader.connections:
         grouped.setdefault((connection.topic, connection.msgtype), []).append(connection)

@@ -99,8 +99,8 @@ def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
 
 
 def _hand(bag: Bag, topic: Topic) -> list[Finger]:
-    """Return all fingers of a topic, after reading `LOOKED_AT` messages from its start and from its middle, more if no
-    finger has signals in these."""
+    """Return all fingers of a topic, by some messages from its start and from its middle; by more if none has
+    signals."""
     hand: list[Finger] = []
     for start in (None, bag.middle):
         for count, (_, sensors) in enumerate(_messages(bag, topic, start), start=1):
@@ -191,8 +191,8 @@ def _messages(
 
 
 def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict[str, Any], list[Any]]:
-    """Return a message, decoded by the first of the `known` pairs (decoder, sensors) that fits, and a list of that
-    pair. Raises TactileError if none fits."""
+    """Return a message decoded by the first `known` pair (decoder, sensors) that fits, and [that pair], or
+    TactileError."""
     for one in known:
         try:
             return one[0](data), [one]

@@ -22,8 +22,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Return the recording of a table, with 22 samples of pac per line. Raises TactileError for a missing column, and
-    for what `assemble` refuses."""
+    """Return a table's recording. Raises TactileError for a missing column, and for what `assemble` refuses."""
     held = sum(name.startswith("ele") and name[3:].isdigit() for name in table.header)
     if held > ELECTRODES:
         check_electrodes(table.path, held, "line 1")

@@ -29,8 +29,7 @@ def fingers(keys: Collection[str]) -> tuple[int, ...]:
 
 
 def read(store: Store, finger: int) -> Recording:
-    """Return the recording of one finger, by its number. Raises TactileError for another sensor's arrays, for fingers
-    of different length, and for too many frames."""
+    """Return a finger's recording. Raises TactileError for another sensor, different lengths, and too many frames."""
     lengths = {number: store.shapes[f"F{number}Electrodes"][0] for number in fingers(store.shapes)}
     name = f"F{finger}Electrodes"
     if len(lengths[finger]) == 2 and lengths[finger][0] != ELECTRODES:
