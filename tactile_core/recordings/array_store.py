@@ -143,8 +143,7 @@ def _plain(value: Any) -> Any:
 
 @contextmanager
 def open_npz(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Open an NPZ file, or an NPY file as the array ``electrodes``; nothing is unpickled.
-    Raises TactileError for damage, for packing other than deflate, and for an array that is there twice."""
+    """Open NPZ, or NPY as array ``electrodes``, never unpickling. Raises TactileError for damage or odd packing."""
     if file.read(len(NPY)) == NPY:
         file.seek(0)
         with damage_reported(path, "NPY"):
@@ -186,8 +185,7 @@ def _check_packing(path: str, member: zipfile.ZipInfo) -> None:
 
 
 def _npy_header(stream: Any) -> tuple[tuple[int, ...], np.dtype]:
-    """Return the shape and type in an array's header; ValueError for one over `MAX_HEADER` bytes, which numpy would
-    load."""
+    """Return the shape and type in an array's header. Raises ValueError for one over `MAX_HEADER` bytes."""
     start = stream.read(_NPY_START)
     length = int.from_bytes(start[8 : 10 if start[6:7] == b"\1" else 12], "little")
     if not start.startswith(NPY) or length > MAX_HEADER:

@@ -203,8 +203,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
-    """Return sentences that name row and field of the first `SHOWN` problems, and the number of the others.
-    row_word : "line" or "frame", what a row is called in them"""
+    """Return sentences on the first `SHOWN` problems, by row_word ("line" or "frame"), and on how many more there are."""
     sentences = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")
@@ -231,9 +230,8 @@ def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
 def _unreadable(
     electrodes: np.ndarray, bad: np.ndarray, names: Sequence[str], rows: np.ndarray, known: Sequence[Problem]
 ) -> list[Problem]:
-    """Return a problem for each impossible reading that is not among the `known` ones, which the reader has reported.
-    electrodes : (T, 19) readings; bad : (T, 19) bool, impossible ones; names : their columns' names
-    rows : (T,) int, row of each frame in the file"""
+    """Return a problem for each impossible reading but `known` ones. electrodes, bad : (T, 19) readings, and bool
+    names : the columns' names; rows : (T,) int, row of each frame in the file"""
     known_places = {(p.frame, "" if p.field == "row" else p.field) for p in known}
     found = []
     for frame, j in np.argwhere(bad)[:MAX_PROBLEMS]:

@@ -50,8 +50,7 @@ def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warn
 
 
 def _turns(readings: np.ndarray, rate: float) -> float:
-    """Return the share of samples at which readings (T, e) counts, at rate Hz, turn to fall or rise; 1 if too few show
-    it."""
+    """Return the share of samples at which readings (T, e) counts turn; 1 if too few tell it. rate : Hz"""
     step = max(1, round(rate / AT))
     whole = np.rint(readings[: BLOCK * step : step])
     whole = whole[~repeats(whole)[0]]

@@ -107,8 +107,7 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return (T,) bool, true for frames in runs of `FROZEN` or more in which no electrode changes; none are if the
-    recording is not noisy elsewhere.
+    """Return (T,) bool, true in runs of `FROZEN` and more frames without a change, if others are noisy.
     electrodes : (T, e) readings; change : (T - 1, e) bool, true if a reading differs from that of the frame before"""
     still = np.r_[False, ~change.any(axis=1)]
     found = np.zeros(len(still), bool)
@@ -158,8 +157,7 @@ def mended(
 
 
 def repeats(electrodes: np.ndarray) -> tuple[np.ndarray, bool]:
-    """Return (T,) bool, true for rows of electrodes (T, e) equal to the row before; and true if these are faults:
-    few."""
+    """Return (T,) bool, true for rows of electrodes (T, e) that repeat the last; and true if these are faults."""
     same = np.r_[False, (electrodes[1:] == electrodes[:-1]).all(axis=1)]
     return same, bool(same.mean() <= MOST_STALE) and noise_turns(electrodes[~same]) >= TURNS
 
@@ -236,8 +234,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) uint16: SATURATED in frames where one of readings (T, 19) counts is at an end of the 12-bit
-    range, 0 in others and for another kind than "raw"; extend the warnings."""
+    """Return flags (T,) uint16: SATURATED where one of raw readings (T, 19) is at a range's end; extend warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)
@@ -251,8 +248,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) uint16: DEAD_CHANNEL in frames where one of readings (T, 19) counts stands still for
-    `DEAD_FRAMES` or longer, 0 in others; extend the warnings."""
+    """Return flags (T,) uint16: DEAD_CHANNEL where one of readings (T, 19) counts stands still; extend warnings."""
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():

@@ -121,8 +121,7 @@ def apply(signals: Signals, sensor: ElectrodeGains) -> Signals:
 
 
 def read(path: str | os.PathLike) -> SensorFile:
-    """Return the content of a sensor file. Raises TactileError, with file and field, for what is unreadable or out of
-    range."""
+    """Return a sensor file's content. Raises TactileError, with file and field, for what is unreadable or unfit."""
     file = Path(path)
     try:
         text = read_toml_text(file)

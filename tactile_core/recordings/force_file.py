@@ -50,8 +50,7 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
 
 
 def read_columns(path: str, names: list[str]) -> np.ndarray:
-    """Return the columns (n, c) called `names`, in any case, as a recording's file has them. Raises TactileError for
-    none."""
+    """Return the columns (n, c) called `names`, in any case, of a recording's file. Raises TactileError for none."""
     table = _table(path, [name.lower() for name in names])
     missing = [name for name in names if name.lower() not in table.header]
     if missing:
@@ -60,8 +59,7 @@ def read_columns(path: str, names: list[str]) -> np.ndarray:
 
 
 def _table(path: str, names: list[str] | None) -> Table:
-    """Return a table of numbers: all of a text file, or the arrays `names` of another. Raises TactileError for a bag,
-    and for another file than a text if `names` is None."""
+    """Return a table of numbers: all of a text file, of another the arrays `names`. Raises TactileError for bags."""
     with opened(path) as (container, where, _, file):
         if container in ("csv", "json"):
             return read_json(where, file) if container == "json" else read_table(where, file)

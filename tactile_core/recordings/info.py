@@ -173,8 +173,7 @@ def _flags(flags: np.ndarray) -> str:
 
 
 def _of_counts(recording: Recording, unit: ElectrodeGains | None, pac: int) -> list[tuple[str, str]]:
-    """Return pairs (label, words) for a recording of a sensor without a typical rest, of which only readings are shown.
-    unit : the unit's rest, or None; pac : number of samples of PAC per frame"""
+    """Return pairs (label, words) on a recording of unknown rest; pac : number of samples of PAC per frame"""
     electrodes = recording.electrodes
     finger = recording.about.get("finger")
     name = f", {HAND[finger]} ({finger})" if finger else ""
@@ -202,8 +201,7 @@ def _time_of_sp(recording: Recording) -> str:
 
 
 def _counts(recording: Recording, unit: ElectrodeGains | None) -> list[tuple[str, np.ndarray]]:
-    """Return pairs (label, (e,) counts): rest, least and largest change; without a unit median, least and largest
-    count."""
+    """Return (label, (e,) counts): rest (without a unit, the median), least and largest count (over rest, if known)."""
     if unit is None:
         counts, middle = recording.electrodes, ("median", np.nanmedian(recording.electrodes, axis=0))
     else:

@@ -13,8 +13,7 @@ MOST_WORDS = 20  # of a label that a summary counts one by one
 
 
 def labels_of(columns: Mapping[str, Iterable[str]]) -> dict[str, np.ndarray]:
-    """Return columns of texts as labels, name -> (T,) object array of str, shortened, fit for HDF5; empty ones are
-    dropped."""
+    """Return columns as labels, name -> (T,) object array of str, shortened, fit for HDF5; empty ones are dropped."""
     found = {}
     for name, column in columns.items():
         found[_plain(name).replace("/", "_").strip(". ")] = [_plain(text) for text in column]
@@ -26,8 +25,7 @@ def _plain(text: str) -> str:
 
 
 def summary(labels: Mapping[str, np.ndarray]) -> dict[str, dict[str, int]]:
-    """Return name -> text -> number of frames with it, for labels, name -> (T,) texts. Beyond the `MOST_WORDS`
-    commonest texts of a label, the others are counted together."""
+    """Return name -> text -> number of frames, of labels name -> (T,) texts; rare texts are counted together."""
     found = {}
     for name, column in labels.items():
         counts = Counter(column.tolist()).most_common()
@@ -41,8 +39,7 @@ Runs = dict[str, list[tuple[str, int]]]  # name -> texts in order, each with the
 
 
 def extend(runs: Runs, labels: Mapping[str, np.ndarray], start: int, stop: int) -> None:
-    """Add the labels (stop - start,) of frames start to stop to ``runs``, which hold those of the frames before start:
-    name -> pairs (text, number of frames in a row with it)."""
+    """Add labels (stop - start,) of frames start to stop to ``runs``: name -> pairs (text, frames in a row)."""
     for name in {**runs, **labels}:
         held = runs.setdefault(name, [("", start)] * bool(start))
         column = labels[name].tolist() if name in labels else [""] * (stop - start)

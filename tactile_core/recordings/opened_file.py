@@ -129,8 +129,7 @@ GZIP, STEP = b"\x1f\x8b", 2**20
 
 @contextmanager
 def unpacked(path: str, file: BinaryIO) -> Iterator[BinaryIO]:
-    """Yield the file from its start, unpacked if gzipped. Raises TactileError for damage, and over `MAX_BYTES`
-    unpacked."""
+    """Yield the file from its start, unpacked if gzipped. Raises TactileError for damage and a too long text."""
     packed = file.read(len(GZIP)) == GZIP
     file.seek(0)
     if not packed:

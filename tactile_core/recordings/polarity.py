@@ -96,8 +96,7 @@ def choose(shown: Polarity, given: str, of_file: str) -> Polarity:
 
 
 def polarity_of_sensor(sensor: str, kind: str) -> Polarity:
-    """Return the polarity of a sensor's raw readings, by its descriptor; assumed for readings of another kind than
-    "raw"."""
+    """Return the polarity of a sensor's raw readings, by its descriptor; assumed for another kind than "raw"."""
     reading = of_kind(sensor, Fluid).readout.polarity
     raw = f"raw counts of a {title(sensor)}"
     return Polarity(reading, raw) if kind == "raw" else Polarity(reading, f"as {raw}", Basis.ASSUMED)
@@ -142,8 +141,7 @@ def _by_pressure(electrodes: np.ndarray, pdc: np.ndarray, swing: float, sensor: 
 
 
 def by_contacts(touches: np.ndarray, sensor: str = SOURCE) -> Polarity | None:
-    """Return the polarity by which touches (n, 19) counts, changes in contact against a known rest, are more like
-    simulated contacts; None for fewer than `FEWEST` touches."""
+    """Return the polarity by which touches (n, 19) counts from rest are like simulated ones; None for too few."""
     if len(touches) < FEWEST:
         return None
     return _decided(touches[spread_out(len(touches), MOST)], "the change in contact", sensor)
@@ -192,8 +190,7 @@ def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:
 
 
 def contact_signals(sensor: str = SOURCE) -> np.ndarray:
-    """Return changes (P, e) float64 counts of a sensor's simulated contacts, signed as raw ones; TactileError for
-    none."""
+    """Return changes (P, e) float64 counts of simulated contacts, signed as raw. Raises TactileError for none."""
     found = contacts_of(sensor)
     if found is None:
         raise TactileError(f"sensor {sensor!r}", "no simulated contacts", "a table that [electrodes] contacts names")

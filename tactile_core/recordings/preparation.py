@@ -232,8 +232,7 @@ def _quiet(recording: Recording, readings: np.ndarray, kind: str, options: Prepa
 def _rest(
     recording: Recording, readings: np.ndarray, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> Baseline:
-    """Return the rest of readings (T, e) counts: of quiet parts; without any, a guess if raw, else 0, with a
-    warning."""
+    """Return the rest of readings (T, e) counts: of quiet parts, else a guess if raw, 0 if not, with a warning."""
     if quiet.parts:
         # drift of a rectified signal has no sign
         return baseline(readings, quiet, options.drift and kind != "rectified")
@@ -252,8 +251,7 @@ def _rest(
 def _is_loaded(
     recording: Recording, rest: Baseline, kind: str, quiet: Quiet, options: PrepareOptions, warnings: list[str]
 ) -> bool:
-    """Return true, and add a warning, if a raw recording's rest looks like a contact, and the user gave no rest or
-    tare."""
+    """Return true, and add a warning, if a raw recording's rest is like a contact, and the user gave none."""
     if kind != "raw" or options.tare is not None or options.rest is not None:
         return False
     level_there = rest.at(np.array([quiet.parts[-1][0]]))[0]

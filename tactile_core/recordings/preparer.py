@@ -85,8 +85,7 @@ def unanswered(signals: Signals) -> np.ndarray:
 
 
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:
-    """Return the options, the tare counted in frames not silent (T,) bool. Raises TactileError if none of it is
-    left."""
+    """Return the options, the tare counted in frames not silent (T,) bool. Raises TactileError if none is left."""
     if options.tare in (None, "none"):
         return options
     frames = tare_frames(options.tare, len(silent))
@@ -106,8 +105,7 @@ class Preparer:
         unit: ElectrodeGains | None = None,
         parts: Callable[[], Iterable[Recording]] = tuple,
     ) -> None:
-        """Store the options and the unit's gains (None: a typical unit). parts : function that returns all parts, which
-        are searched for the polarity if the first one does not show it"""
+        """Store options and unit (None: a typical one); parts : function to all parts, searched for the polarity"""
         options = options or PrepareOptions()
         self._options = options if unit is None else dataclasses.replace(options, rest=unit.rest(), film=unit.film)
         self._unit, self._parts = unit, parts

@@ -38,8 +38,8 @@ NEAR_END = 0.5  # s; a calm part this near to the start or end of a recording is
 
 @dataclass(frozen=True, eq=False)
 class Quiet:
-    """Quiet parts of a recording, without contact. mask : (T,) bool, true in them; parts : first frame, and one past
-    the last, of each; evidence : how they were found, in words"""
+    """Quiet parts of a recording. mask : (T,) bool, true in them; parts : first frame, and one past the last, of each
+    evidence : how they were found, in words"""
 
     mask: np.ndarray
     parts: tuple[tuple[int, int], ...]
@@ -115,15 +115,13 @@ def _sums(values: np.ndarray, n: int) -> np.ndarray:
 
 
 def _spread(centred: np.ndarray, n: int) -> np.ndarray:
-    """Return the standard deviation (..., W) in each window of n values; centred : (..., T), values near 0, for
-    precision"""
+    """Return the standard deviation (..., W) in windows of n values; centred : (..., T), values near 0"""
     mean = _sums(centred, n) / n
     return np.sqrt(np.maximum(_sums(np.square(centred), n) / n - np.square(mean), 0.0))
 
 
 def _noise(electrodes: np.ndarray, n: int) -> np.ndarray:
-    """Return the noise (19,) counts, standard deviation, of electrodes (T, 19) counts, from differences over `APART`
-    frames in the calmer ones of some windows of n frames."""
+    """Return the noise (19,) of electrodes (T, 19) counts, rms, by steps over `APART` frames in calm windows of n."""
     starts = np.linspace(0, len(electrodes) - n, min(LOOKED_AT, len(electrodes) // n)).astype(int)
     windows = (electrodes[start : start + n].astype(float) for start in starts)
     steps = np.array([np.square(each[APART:] - each[:-APART]).mean(axis=0) for each in windows])

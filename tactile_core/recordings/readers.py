@@ -1,5 +1,4 @@
-"""Registry of file layouts, and the function that reads all of them: ``read(path)``. Everywhere `columns` is a map of
-columns, for files of no known layout, or None."""
+"""Registry of file layouts, and ``read(path)``, which reads all. `columns` is a map for unknown layouts, or None."""
 
 from __future__ import annotations
 
@@ -120,8 +119,7 @@ def _unneeded(columns: ColumnMap | None, name: str) -> bool:
 
 
 def pac_columns(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> int:
-    """Return the number of a CSV file's PAC columns, which lean reading leaves out; 0 for other files, and with a
-    map."""
+    """Return the number of PAC columns in a CSV file, which lean reading leaves out; 0 for others, and with a map."""
     with opened(os.fspath(path)) as (container, where, _, file):
         if columns is not None or container != "csv":
             return 0
@@ -154,8 +152,7 @@ def _sensor(layout: ModuleType) -> str:
 
 
 def _read_finger(layout: ModuleType, store: Store | Table, finger: int | None) -> Recording:
-    """Return the recording of the requested finger, or of a file's first with a warning that names the others. Raises
-    TactileError for a finger that the file lacks."""
+    """Return the recording of the requested finger, or of the first, with a warning that names the others."""
     known = layout.fingers(store.header if isinstance(store, Table) else store.shapes)
     chosen = known[0] if finger is None else finger
     if chosen not in known:
@@ -191,7 +188,7 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
 
 
 def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | None = None) -> list[str]:
-    """Return a path for each recording in the files, by `each_finger`; that of an unreadable file stays as it is."""
+    """Return a path for each recording in the files, by `each_finger`; an unreadable file's own path."""
     found = []
     for path in paths:
         try:

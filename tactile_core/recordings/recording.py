@@ -170,12 +170,12 @@ class Chosen(NamedTuple):
 
     @property
     def section(self) -> str:
-        """Return its unit's section in a file of `tactile adapt`: ``unit``, ``finger2``, ``left/biotac/finger2``."""
+        """Return its section in a file of `tactile adapt`: ``unit``, ``finger2``, ``left/biotac/finger2``."""
         return (f"{self.topic}/" if self.topic else "") + ("unit" if self.finger is None else f"finger{self.finger}")
 
 
 def split(path: str) -> Chosen:
-    """Split ``hand.bag#2`` or ``hand.bag#left/biotac/finger2`` into its parts; a path that exists is a file's."""
+    """Split ``hand.bag#2`` or ``hand.bag#left/biotac/finger2``; a path that exists is taken for a file."""
     if os.path.exists(path):
         return Chosen(path, None)
     if found := FINGER.match(path):
@@ -185,7 +185,7 @@ def split(path: str) -> Chosen:
 
 
 def name_of(path: str | os.PathLike) -> str:
-    """Return the name of a recording's results, ``hand_left_biotac_finger2`` of ``hand.bag#left/biotac/finger2``."""
+    """Return the name of a recording's results: ``hand_left_finger2`` for ``hand.bag#left/finger2``."""
     return split(os.fspath(path)).name
 
 

@@ -77,8 +77,7 @@ def _jumping(values: np.ndarray) -> np.ndarray:
 
 
 def _short_runs(values: np.ndarray, jumping: np.ndarray) -> np.ndarray:
-    """Return (T, C) bool, true for glitches of 1 to 5 samples in values (T, C) counts. jumping : (k,) int, columns to
-    search, one at a time, which bounds the memory of a long recording"""
+    """Return (T, C) bool, true for glitches of 1 to 5 samples in values (T, C); jumping : (k,) columns to search"""
     frames = len(values)
     found = np.zeros(values.shape, bool)
     for length in range(1, min(SHORT, frames - 2) + 1):
@@ -117,8 +116,7 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if the run between samples `first` and `last` of column (T,) counts leaves the median level of the
-    second around it; a gap between two glitches does not."""
+    """Return true if the run between samples `first` and `last` of column (T,) leaves the level around; a gap does not."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])

@@ -17,7 +17,7 @@ LOWEST = 1.0  # percentile of PDC that is taken for rest where nothing is quiet:
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Readings without contact: levels (P, 19) counts at frames (P,), linear between these, constant outside."""
+    """Readings without contact: levels (P, 19) counts at frames (P,), linear between them, constant outside."""
 
     frames: np.ndarray
     levels: np.ndarray
@@ -84,8 +84,7 @@ def baseline(electrodes: np.ndarray, quiet: Quiet, drift: bool) -> Baseline:
 
 
 def pressure_rest(pdc: np.ndarray, kind: str, quiet: Quiet) -> float:
-    """Return the level of pdc (T,) counts at rest: 0 if it was tared (low, and the kind is not "raw"), else that of the
-    quiet frames, without any its lowest percentile."""
+    """Return pdc (T,) at rest, counts: 0 if it was tared (low, and not "raw"), else of quiet frames, or its lowest."""
     finite = pdc[np.isfinite(pdc)]
     if not len(finite) or (kind != "raw" and np.median(finite) < TARED_PDC):
         return 0.0

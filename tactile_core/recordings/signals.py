@@ -140,7 +140,7 @@ class Signals:
         return Changes(len(self.change), self.typical_of)[EVERY]
 
     def relative_to(self, rest: np.ndarray) -> np.ndarray:
-        """Return change (T, e) counts, if readings are raw converted to a unit that rests at rest (e,) counts."""
+        """Return change (T, e) counts; if the recording is raw, that of a unit that rests at rest (e,) counts."""
         return divider.typical(self.change, self.rest, rest) if self.kind == "raw" else self.change
 
     def of_typical(self, change: np.ndarray, at: np.ndarray | None) -> np.ndarray:
@@ -158,7 +158,6 @@ class Signals:
 
 
 def typical(change: np.ndarray, kind: str, rest: np.ndarray, sensor: str) -> np.ndarray:
-    """Return change (n, 19) counts, if "raw" converted from a unit at rest (19,) counts to the sensor's typical
-    unit."""
+    """Return change (n, 19) counts, if "raw" converted from a unit at rest (19,) counts to a typical unit."""
     to = typical_rest(sensor)
     return divider.typical(change, rest, to) if kind == "raw" and to is not None else change

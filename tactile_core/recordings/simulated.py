@@ -89,8 +89,7 @@ def write_simulated(
 
 
 def read_simulated(store: Store, layout: str) -> Recording:
-    """Return the recording in an open file; layout : in words. Raises TactileError without electrodes, and for
-    misfits."""
+    """Return the recording in an open file; layout : in words. Raises TactileError for misfits and no electrodes."""
     if "electrodes" not in store.shapes:
         expected = "readings, which a recording has"
         raise TactileError(f"{store.path}, electrodes", "missing", expected, "Simulate it with --keep electrodes")

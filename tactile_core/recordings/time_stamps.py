@@ -1,4 +1,4 @@
-"""Time stamps: their unit, missing, coarse or disordered ones, and the rate that they show."""
+"""Convert a file's time stamps to seconds: find their unit and rate, and missing, coarse or disordered stamps."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
 def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
-    """Return time (T,) s and start, s, as `seconds_of`, frames where stamps (T,) jump, and sentences on them.
-    rows : (T,) int, the frames' rows in the file, called by row_word in the sentences"""
+    """Return time (T,) s from the first frame, its unix time, s (0.0 if unknown), indices (n,) of the frames before
+    which time jumps, and sentences for the user. stamps : (T,) as in the file, s to ns
+    rows : (T,) int, the frames' rows in the file, which the sentences call row_word"""
     seconds, start, notes = seconds_of(stamps)
     jumps, found = time_jumps(seconds, rows, row_word)
     return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
 
 
 def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
-    """Return time (T,) s from the first frame, unix start (s; 0.0: unknown), warnings; stamps (T,) in s to ns."""
+    """Return time (T,) s from the first frame, its unix time, s (0: unknown), warnings; stamps : (T,) s to ns"""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)
     warnings, missing = [], int(np.isnan(stamps).sum())
     if missing == len(stamps):
@@ -48,7 +49,7 @@ def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
 
 
 def unit_of(stamps: np.ndarray) -> Unit:
-    """Return the time unit of stamps (T,), such as "ms": one that gives a likely rate, else one that fits unix time."""
+    """Return the unit of time stamps (T,), such as "ms": one that gives a likely rate, else one that fits unix time."""
     steps = np.diff(stamps)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
     likely = [unit for unit, length in SECONDS.items() if LIKELY[0] <= 1 / max(step * length, 1e-12) <= LIKELY[1]]
@@ -59,7 +60,7 @@ def unit_of(stamps: np.ndarray) -> Unit:
 
 
 def is_likely(values: np.ndarray) -> bool:
-    """Return true if values (T,) of a column never fall, and rise as a sensor's time may, in any unit."""
+    """Return true if a column's values (T,) may be time stamps, in any unit: they never fall, at a sensor's rate."""
     steps = np.diff(values)
     if not len(steps) or not (steps >= 0).all() or not (steps > 0).any():
         return False
@@ -71,7 +72,7 @@ def is_likely(values: np.ndarray) -> bool:
 
 
 def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """Spread frames that share a stamp, seconds (T,), evenly up to the next, the last by the usual step; say so."""
+    """Return seconds (T,), frames that share a stamp spread evenly up to the next one, and sentences on it."""
     steps = np.diff(seconds)
     if len(steps) < FEWEST or not (steps >= 0).all() or (steps == 0).mean() < SHARED:
         return seconds, []
@@ -89,7 +90,7 @@ def _spread(seconds: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def tell_rate(seconds: np.ndarray) -> list[str]:
-    """Return a sentence if frames at seconds (T,) come much faster or slower than the filters were made for."""
+    """Return a list of one sentence if frames at seconds (T,) come at another rate than filters expect, else []."""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     if not len(forward):
@@ -105,7 +106,7 @@ def tell_rate(seconds: np.ndarray) -> list[str]:
 
 
 def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
-    """Interpolate missing stamps (T,), NaN; at the ends, extrapolate by the median step."""
+    """Return stamps (T,) with NaN interpolated; at the ends extrapolated by the median step."""
     good = np.flatnonzero(np.isfinite(stamps))
     if len(good) == len(stamps):
         return stamps
@@ -120,8 +121,8 @@ def _fill_stamps(stamps: np.ndarray) -> np.ndarray:
 
 
 def time_jumps(seconds: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, list[str]]:
-    """Return the frames (n,) before which seconds (T,) go back, stand still or leave a gap, and sentences on them.
-    rows : (T,) int, the frames' rows in the file, called by row_word in the sentences"""
+    """Return the indices (n,) of frames before which seconds (T,) go back, stand still or leave a gap, and sentences on
+    these. rows : (T,) int, the frames' rows in the file, which the sentences call row_word"""
     steps = np.diff(seconds)
     forward = steps[steps > 0]
     usual = float(np.median(forward)) if len(forward) else 1.0 / SAMPLE_RATE

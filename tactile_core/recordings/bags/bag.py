@@ -70,8 +70,7 @@ def is_bag_folder(path: str) -> bool:
 
 
 def kind_of(start: bytes) -> str | None:
-    """Return the kind of bag that begins with these `START_BYTES` bytes: "ros1", "mcap" or "sqlite"; None if it is no
-    bag."""
+    """Return the kind of bag that begins with these bytes: "ros1", "mcap" or "sqlite"; None for any other file."""
     return next((name for mark, name in STARTS.items() if start.startswith(mark)), None)
 
 

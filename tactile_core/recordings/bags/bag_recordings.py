@@ -73,8 +73,7 @@ def streams_of(bag: Bag, chosen: Chosen) -> list[Stream]:
 
 
 def _topics(bag: Bag, chosen: Chosen) -> tuple[list[Topic], int | None]:
-    """Return the chosen topics and the chosen finger's number, or None. Raises TactileError for a topic without
-    BioTacs. A topic may itself be called ``left/finger0``: then that is no finger."""
+    """Return the chosen topics and finger, or None for all fingers; a topic may be called ``left/finger0``."""
     named = {topic.name.strip("/"): topic for topic in bag.topics}
     if chosen.topic in named:
         return [named[chosen.topic]], chosen.finger
@@ -99,8 +98,7 @@ def names_of(bag: Bag, path: str, chosen: Chosen) -> list[str]:
 
 
 def _hand(bag: Bag, topic: Topic) -> list[Finger]:
-    """Return all fingers of a topic, by some messages from its start and from its middle; by more if none has
-    signals."""
+    """Return a topic's fingers, by some messages from its start and middle, by more if none has signals."""
     hand: list[Finger] = []
     for start in (None, bag.middle):
         for count, (_, sensors) in enumerate(_messages(bag, topic, start), start=1):
@@ -154,8 +152,7 @@ def _not_taken(bag: Bag, stream: Stream) -> tuple[str, ...]:
 
 
 def _blocks(bag: Bag, stream: Stream, frames: int) -> Iterator[np.ndarray]:
-    """Yield rows (n, columns) float of up to `frames` messages: stamp (unix s), pdc, tac, tdc, pac, electrodes
-    (counts). Raises TactileError if the number of fingers or of readings changes."""
+    """Yield rows (n, columns) of up to `frames` messages: stamp (unix s), pdc, tac, tdc, pac, electrodes (counts)."""
     topic, wanted = stream.topic, stream.hand[stream.number].electrodes
     if not stream.sensor:
         check_electrodes(bag.path, wanted, f"{topic.name}, finger {stream.number}")
@@ -191,8 +188,7 @@ def _messages(
 
 
 def _decoded(place: str, kind: str, known: list[Any], data: bytes) -> tuple[dict[str, Any], list[Any]]:
-    """Return a message decoded by the first `known` pair (decoder, sensors) that fits, and [that pair], or
-    TactileError."""
+    """Return a message, decoded by the first `known` pair (decoder, sensors) that fits, and that pair in a list."""
     for one in known:
         try:
             return one[0](data), [one]

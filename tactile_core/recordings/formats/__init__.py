@@ -121,8 +121,7 @@ def _of_finger(style: str, finger: int) -> list[str]:
 
 
 def electrodes_of(store: Store, name: str) -> np.ndarray:
-    """Return the electrodes (T, 19) in the array `name`, float32 if they are 16-bit integers. Raises TactileError for
-    another shape, such as that of another sensor."""
+    """Return the electrodes (T, 19) in the array `name`. Raises TactileError for another shape or sensor."""
     shape, kind = store.shapes[name]
     if len(shape) == 2 and shape[0] == ELECTRODES != shape[1]:
         raise TactileError(f"{store.path}, {name}", f"shape {shape}", f"(frames, {ELECTRODES})", TURN_ADVICE)

@@ -43,8 +43,7 @@ def score(keys: Collection[str]) -> float:
 
 
 def read(table: Table) -> Recording:
-    """Return the recording of a table, place and force (T, 3) in the file's own units. Raises TactileError for a
-    missing column, and for what `assemble` refuses."""
+    """Return a table's recording. Raises TactileError for a missing column, and for what `assemble` refuses."""
     names = canonical(table.header)
     known, called = dict(zip(table.header, names, strict=False)), dict(zip(names, table.header, strict=False))
     table.taken.update(called.get(name, name) for name in COLUMNS)

@@ -22,7 +22,7 @@ INDEX = re.compile(r"(.*?)((?:\[\d+\])*)$", re.DOTALL)
 
 
 def names_of(store: Store) -> dict[str, int]:
-    """Return the names of the file's columns, in lower case, each with its number of rows."""
+    """Return the names of a file's columns of numbers, in lower case, each with its number of rows."""
     found: dict[str, int] = {}
     for name, (shape, kind) in store.shapes.items():
         rows, inner = _rows(shape)
@@ -33,7 +33,7 @@ def names_of(store: Store) -> dict[str, int]:
 
 
 def _rows(shape: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
-    """Return an array's number of rows and the shape of a row; (19, T) and (1, T), as of MATLAB, are transposed."""
+    """Return an array's number of rows and a row's shape; (19, T) and (1, T), as of MATLAB, are transposed."""
     if _is_turned(shape):
         shape = shape[::-1]
     if len(shape) == 2 and shape[1] == 1:
@@ -46,9 +46,9 @@ def _is_turned(shape: tuple[int, ...]) -> bool:
 
 
 def table_of(store: Store, wanted: Iterable[str]) -> Table:
-    """Read the wanted columns, and the file's labels, to a table.
-    wanted : names as of `names_of`; an array's name stands for all its columns. Raises TactileError for one that is
-    missing, and for arrays of other lengths than the first."""
+    """Return a table of the wanted columns, with the file's labels.
+    wanted : names of columns, such as ``name[3]``; an array's name stands for all its columns
+    Raises TactileError for a missing array, and for arrays of different lengths."""
     called = {name.lower(): name for name in store.shapes}
     columns: dict[str, np.ndarray] = {}
     held: dict[str, np.ndarray] = {}
@@ -79,7 +79,7 @@ def _columns_of(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _read(store: Store, name: str) -> np.ndarray:
-    """Return an array (T, ...) with its rows first, (T,) if it has one column."""
+    """Return the array `name`, rows first: (T, ...), or (T,) for one column. Raises TactileError if too long."""
     shape = store.shapes[name][0]
     frames = _rows(shape)[0]
     if frames > MAX_FRAMES:
@@ -91,7 +91,7 @@ def _read(store: Store, name: str) -> np.ndarray:
 
 
 def labels_in(store: Store, frames: int) -> dict[str, np.ndarray]:
-    """Return name -> (T,) texts, T `frames`: arrays of texts, and numbers and attributes with labels' names."""
+    """Return labels, name -> (`frames`,) texts: of texts, and of numbers and attributes with a label's name."""
     found = {
         name: np.full(frames, value, dtype=object)
         for name, value in store.attributes.items()

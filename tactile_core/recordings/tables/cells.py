@@ -1,4 +1,4 @@
-"""Cells of a table: numbers, times of day, and texts, which the table stores as their index."""
+"""Cells of a table: numbers, times of day, and texts, for which the table stores an index."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ OUTSIDE = {ord(mark): chr(code) for code, mark in INSIDE.items()}
 
 
 def number(cell: str) -> float | None:
-    """Parse the cell as a finite number; None for text, NaN, infinity and Python's 1_000."""
+    """Return the cell's number; None for text, NaN, infinity and Python's 1_000."""
     if "_" in cell:
         return None
     try:
@@ -39,7 +39,7 @@ def number(cell: str) -> float | None:
 
 
 def seconds(cell: str) -> float:
-    """Parse a time, with a day (2012-11-08, 08.11.2012) or none, to s since 1970 or midnight; else ValueError."""
+    """Return a time, s since 1970 if it has a day (2012-11-08, 08.11.2012), else since midnight; or ValueError."""
     found = CLOCK.fullmatch(cell.strip())
     if found is None:
         raise ValueError(cell)
@@ -51,25 +51,25 @@ def seconds(cell: str) -> float:
 
 
 class Words:
-    """Distinct texts of a column, which the table stores by their index."""
+    """Distinct texts of a column; the table stores their indices in place of them."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, int] = {}
 
     def number(self, cell: str) -> float:
-        """Return the index of a cell's text, a new index for a new text; after `MOST_WORDS` texts, that of `MORE`."""
+        """Return the index of a cell's text; a new text gets a new index, after `MOST_WORDS` texts that of `MORE`."""
         word = cell.strip().translate(OUTSIDE)
         if word not in self._numbers and len(self._numbers) >= MOST_WORDS:
             word = MORE
         return float(self._numbers.setdefault(word, len(self._numbers)))
 
     def texts(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the texts (T,) object of indices ``numbers`` (T,) float; the empty text for NaN, a missing cell."""
+        """Return the texts (T,) object whose indices are ``numbers`` (T,) float; "" for NaN, a missing cell."""
         known = np.array([*self._numbers, ""], dtype=object)
         return known[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
     def values(self, numbers: np.ndarray) -> np.ndarray:
-        """Return the numbers (T,) float that texts of indices ``numbers`` (T,) float spell; NaN for other texts."""
+        """Return the numbers (T,) float that texts of indices ``numbers`` (T,) float spell; NaN for others."""
         known = [value if (value := number(word)) is not None else np.nan for word in (*self._numbers, "")]
         return np.array(known)[np.where(np.isfinite(numbers), numbers, -1).astype(int)]
 
@@ -78,11 +78,11 @@ class Words:
 
 
 class Cells:
-    """Kinds of a table's columns: number, time, text. words : of columns of texts, by name; plain : all numbers"""
+    """Kinds of a table's columns: numbers, times or texts.
+    words : name of a column of texts -> its distinct texts; plain : true if all columns hold numbers"""
 
     def __init__(self, names: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """Decide by the first `LOOKED_AT` rows, lists of cells, what each column holds: numbers, times or words.
-        names : of the columns"""
+        """Decide by the first `LOOKED_AT` rows, lists of cells, what each of the columns `names` holds."""
         self.words: dict[str, Words] = {}
         self._readers: list[Callable[[str], float]] = [_plain_number] * len(names)
         for place, name in enumerate(names):
@@ -96,13 +96,13 @@ class Cells:
         self.plain = all(reader is _plain_number for reader in self._readers)
 
     def values(self, cells: Sequence[str]) -> list[float]:
-        """Read the cells of a row as numbers. Raises ValueError where a number or time cannot be read."""
+        """Return a row's cells as numbers: times in s, texts as indices. Raises ValueError for an unreadable cell."""
         if self.plain:
             return [float(cell) for cell in cells]
         return [reader(cell) for reader, cell in zip(self._readers, cells, strict=True)]
 
     def value(self, place: int, cell: str) -> float | None:
-        """Read a cell of column number `place`; None for one that is not finite, or not of the column's kind."""
+        """Return the number of a cell in column `place`; None if it is not finite, or not of the column's kind."""
         try:
             found = self._readers[place](cell)
         except ValueError:
@@ -125,5 +125,5 @@ def _is_clock(cell: str) -> bool:
 
 
 def unquoted(text: str) -> str:
-    """Return a text without quotes; separators within them are protected until a cell is read."""
+    """Return a text without its quotation marks; separators between them are replaced until a cell is read."""
     return QUOTED.sub(lambda found: found[1].strip().translate(INSIDE), text).replace('"', "") if '"' in text else text

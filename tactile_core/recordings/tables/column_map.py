@@ -1,6 +1,6 @@
-"""Map of a recording's columns whose names no layout knows: a TOML file that says which column is what. A column is one
-of a text table, a field of JSON records, or one of an array's. ``map_guess`` proposes a map, ``mapped`` reads by it;
-``write`` and ``read`` keep it in a file."""
+"""Map of a recording's columns, for files of no known layout: a TOML file that says which column is what. A column is
+that of a text table, a field of JSON records, or a column of an array. ``map_guess`` proposes a map, ``mapped`` reads a
+recording by it; ``write`` and ``read`` are for the map's file."""
 
 from __future__ import annotations
 
@@ -26,13 +26,14 @@ MOST_NAMED = 40  # of the file's columns, in the comment of a new map
 
 @dataclass(frozen=True)
 class ColumnMap:
-    """Names of a file's columns, in any case.
+    """Names of a file's columns, in any case; "" stands for a column that the file lacks.
 
-    electrodes : of E1 to E19, "" for one that the file lacks; or the one name of an array of 19 columns
-    time : "" where there is none, then `rate` in Hz counts; time_unit : of that column, s, ms, us or ns
-    pdc, tac, tdc : "" where there are none
-    channel, value : of a long table, which has a row for each value of a channel: its columns with the channel's name
-        and the value; electrodes, pdc, tac and tdc are then names of channels"""
+    electrodes : names of the columns of E1 to E19, or the name of an array of 19 columns
+    time : name of the column of time; time_unit : its unit, "s", "ms", "us" or "ns"; rate : Hz, used without such a
+    column
+    pdc, tac, tdc : names of these columns
+    channel, value : names of two columns of a long table, which has a row for each value of each channel: that of the
+        channel's name, and that of the value. Then electrodes, pdc, tac and tdc are names of channels"""
 
     electrodes: tuple[str, ...] = ()
     time: str = ""
@@ -45,22 +46,22 @@ class ColumnMap:
     value: str = ""
 
     def channels(self) -> set[str]:
-        """Return the file's own names of the mapped channels, in lower case."""
+        """Return the names, in lower case, of the electrodes, pdc, tac and tdc that the file has."""
         return {name.lower() for name in (*self.electrodes, self.pdc, self.tac, self.tdc) if name}
 
     def names(self) -> list[str]:
-        """Return the names of all mapped columns, in lower case."""
+        """Return the names, in lower case, of all columns that the map uses."""
         values = (self.channel, self.value) if self.channel else (*self.electrodes, self.pdc, self.tac, self.tdc)
         return [name.lower() for name in (*values, self.time) if name]
 
     def is_nanoseconds(self, name: str) -> bool:
-        """Return true for the column beside one of whole seconds, as ROS's ``stamp.nanosec`` beside ``stamp.sec``."""
+        """Return true for the column of nanoseconds beside that of s, as ``stamp.nanosec`` in ROS."""
         stem = re.sub(r"secs?$", "", self.time.lower())
         return stem != self.time.lower() and re.fullmatch(re.escape(stem) + r"n(ano)?secs?", name) is not None
 
 
 def read(path: str | os.PathLike) -> ColumnMap:
-    """Read a map; raises TactileError naming file and field for what is unreadable, unknown or missing."""
+    """Return a file's map. Raises TactileError, with file and field, for what is unreadable, unknown or missing."""
     import msgspec  # not by every reader: Blender without wheels has none
 
     file = Path(path)
@@ -95,7 +96,7 @@ def read(path: str | os.PathLike) -> ColumnMap:
 
 
 def write(path: str | os.PathLike, guessed: list[ColumnMap], held: tuple[str, ...]) -> None:
-    """Write the first guessed map to a new file, the others, of further fingers, as comments.
+    """Write the first of the guessed maps to a file, those of further fingers as comments.
     held : names of all columns of the recording, for a comment"""
     named = ", ".join(held[:MOST_NAMED]) + (f" and {len(held) - MOST_NAMED} more" if len(held) > MOST_NAMED else "")
     quoted = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
@@ -127,6 +128,6 @@ def _channel_lines(columns: ColumnMap) -> list[str]:
 
 
 def refuse_bag(path: str, container: str) -> None:
-    """Raise TactileError where a map is given for a bag, whose messages name their fields."""
+    """Raise TactileError if the container is "bag": a bag's messages name their fields, so it needs no map."""
     if container == "bag":
         raise TactileError("--columns", f"given for {path} (bag)", "a file of columns or arrays", "Leave it out")

@@ -23,13 +23,13 @@ STAMPS = {frozenset(("secs", "nsecs")), frozenset(("sec", "nanosec")), frozenset
 
 
 def is_json(start: bytes) -> bool:
-    """Return true if a file that starts with these bytes holds JSON records."""
+    """Return true if a file that starts with these bytes looks like JSON records."""
     begin = b"".join(start.removeprefix(b"\xef\xbb\xbf").split())[:2]
     return begin in (b'{"', b"[{", b"[[")
 
 
 def read_json(path: str, file: BinaryIO) -> Table:
-    """Read the records of a JSON file. Raises TactileError for damage, no records, too many fields or bytes."""
+    """Return a table of a JSON file's records. Raises TactileError for damage, no records, too many fields or bytes."""
     if os.fstat(file.fileno()).st_size > MAX_JSON:
         raise TactileError(path, f"over {MAX_JSON // 2**20} MB of JSON", "less", "Split it, or write it as CSV or HDF5")
     file.seek(0)
@@ -48,7 +48,7 @@ def read_json(path: str, file: BinaryIO) -> Table:
 
 
 def _records(path: str, text: str) -> Iterator[Any]:
-    """Yield the records of an array, or of records in sequence; a last one that is cut off ends them."""
+    """Yield the records of a JSON array, or in sequence, but a last one that is cut off; TactileError for damage."""
     decode, place, count = json.JSONDecoder().raw_decode, _next(text, 0), 0
     if text[place : place + 1] == "[":
         place = _next(text, place + 1)
@@ -73,7 +73,7 @@ def _next(text: str, place: int) -> int:
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of a record with their names."""
+    """Yield (name, value) of each plain field in a record called `name`; inner fields are called as ``a.b[2]``."""
     if isinstance(value, dict):
         if frozenset(value) in STAMPS:
             seconds, parts = value.values()
@@ -89,7 +89,7 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def _of_object(path: str, whole: dict[str, Any]) -> Table:
-    """Make a table of `whole`, the file's single object: of its list of records, or of its lists of numbers."""
+    """Return a table of a file's single object, `whole`: of its first list of records, or of its lists of numbers."""
     lists = dict(_lists("", whole))
     constants = {name: str(value) for name, value in _flat("", {k: v for k, v in whole.items() if _plain(v)})}
     records = next((each for each in lists.values() if all(isinstance(one, dict) for one in each)), None)
@@ -114,7 +114,7 @@ def _lists(name: str, value: dict[str, Any]) -> Iterator[tuple[str, list[Any]]]:
 
 
 def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dict[str, str] | None = None) -> Table:
-    """Make a table of records; fields missing in a record are NaN."""
+    """Return a table of records, begin then more, NaN for missing fields; constants : name -> text, made labels"""
     begin = [dict(_flat("", record)) for record in begin if isinstance(record, dict | list)]
     for record in more:
         if len(begin) >= LOOKED_AT:

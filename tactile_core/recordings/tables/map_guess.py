@@ -32,9 +32,9 @@ DRIVER = {"17": {"pdc": "1", "tac": "2", "tdc": "3"}}
 
 
 def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]:
-    """Guess a column map for each finger in a file, the one to read first; a map without electrodes if none are found.
-    names : of all columns, in lower case, or name -> length of all arrays (those of another length are ignored)
-    table : some rows, for columns without telling names"""
+    """Return a guessed map for each finger in a file, the best first; one without electrodes if none are found.
+    names : names of all columns in lower case; for arrays name -> length (those of other lengths are ignored)
+    table : some rows of the file, for columns whose names tell nothing, or None"""
     found = []
     for each in _series(names):
         near = _as_long(names, each)
@@ -45,7 +45,7 @@ def guess(names: Collection[str], table: Table | None = None) -> list[ColumnMap]
 
 
 def with_unit(columns: ColumnMap, table: Table) -> ColumnMap:
-    """Return the map with the unit of its time, by the name or by the stamps in a table."""
+    """Return the map with the unit of its time, by the column's name, or by the stamps in a table."""
     unit = UNIT.search(columns.time.rpartition("/")[2].replace("_", " "))
     stamps = table.column(columns.time)
     stamps = stamps[np.isfinite(stamps)]
@@ -54,7 +54,7 @@ def with_unit(columns: ColumnMap, table: Table) -> ColumnMap:
 
 
 def _as_long(names: Collection[str], electrodes: tuple[str, ...]) -> Collection[str]:
-    """Return the names of arrays as long as the electrodes'; all of columns, which are."""
+    """Return the names of arrays as long as the electrodes'; the names themselves if they come without lengths."""
     if not isinstance(names, dict):
         return names
     frames = names[next(filter(None, electrodes))]
@@ -62,8 +62,7 @@ def _as_long(names: Collection[str], electrodes: tuple[str, ...]) -> Collection[
 
 
 def _series(names: Collection[str]) -> list[tuple[str, ...]]:
-    """List runs of 19 names that differ in one number: those called electrodes, some maybe missing, else any; of both
-    those that are not called processed, else any."""
+    """Return runs of 19 names that differ in a number: called electrodes (some may be ""), not processed, if any."""
     series: dict[tuple[str, str], dict[int, str]] = {}
     for name in names:
         for found in NUMBER.finditer(name):
@@ -87,14 +86,14 @@ def _series(names: Collection[str]) -> list[tuple[str, ...]]:
 
 
 def _consecutive(numbers: list[int]) -> list[tuple[int, int]]:
-    """Return the first and last number of each run of consecutive ones."""
+    """Return pairs (first, last) of the runs of consecutive integers among rising `numbers`."""
     breaks = [place for place in range(1, len(numbers)) if numbers[place] != numbers[place - 1] + 1]
     starts, ends = [0, *breaks], [*breaks, len(numbers)]
     return [(numbers[start], numbers[end - 1]) for start, end in zip(starts, ends, strict=True) if end > start]
 
 
 def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
-    """Return the map of electrodes and of the channels whose names begin most like theirs."""
+    """Return the map of the electrodes and of the columns called pdc, tac and tdc whose names are most like theirs."""
     like = next(filter(None, electrodes), "")
     channels: dict[str, Any] = {
         word: _nearest((name for name in names if _is_called(word, name)), like) for word in CHANNELS
@@ -106,24 +105,24 @@ def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
 
 
 def _is_called(word: str, name: str) -> bool:
-    """Return true for the column of a channel, false for one of its array's columns."""
+    """Return true if a column's name holds the channel `word`, such as "pdc", and no index of an array's column."""
     return word in NO_TAC.sub("", name.rpartition("/")[2]) and not INDEXED.search(name)
 
 
 def _nearest(names: Iterable[str], like: str) -> str:
-    """Return the name that begins and ends most like `like`, of such the first of the shortest; "" for none."""
+    """Return the name that begins and ends most like `like`, of several the shortest; "" if there are no names."""
     like = like.partition("[")[0]
     return max(names, key=lambda name: (_alike(name, like) + _alike(name[::-1], like[::-1]), -len(name)), default="")
 
 
 def _alike(name: str, other: str) -> int:
-    """Count the characters with which name and other both begin."""
+    """Return the number of characters that two names have in common at their beginning."""
     pairs = zip(name, other, strict=False)
     return next((place for place, (one, two) in enumerate(pairs) if one != two), min(len(name), len(other)))
 
 
 def is_time(name: str) -> bool:
-    """Return true for a column's name that looks like that of time, such as ``time`` or ``stamp``."""
+    """Return true if a column's name looks like that of time, such as ``time`` or ``stamp``."""
     return bool(TIME.search(name.lower().rpartition("/")[2]))
 
 
@@ -144,7 +143,7 @@ def _rises(table: Table, name: str) -> bool:
 
 
 def _long(table: Table) -> list[ColumnMap]:
-    """Return the maps of a long table: the column that names 19 channels in turn, with each that may hold values."""
+    """Return the maps of a long table, one per column that may hold values; [] if no column names 19 channels."""
     for place, name in enumerate(table.header):
         if name in table.words:
             held = [word.lower() for word in table.words[name]]
@@ -169,8 +168,8 @@ def _is_raw(table: Table, name: str) -> bool:
 
 
 def _by_values(table: Table) -> list[ColumnMap]:
-    """Return the map of columns without names: electrodes are the 19 neighbouring columns with the highest counts;
-    the last 19 where none look like counts, none of a table with names."""
+    """Return the map of columns without names: electrodes are the 19 neighbouring columns with the highest counts, or
+    the last 19 if none look like counts. A table with names gets a map without electrodes."""
     names = table.header
     if not names[0].startswith("column") or len(names) < ELECTRODES:
         return [_beside((), names)]

@@ -1,5 +1,4 @@
-"""Read recordings of any container but bags by a map of their columns, also where each row holds one channel (a long
-table); and guess the map."""
+"""Read recordings by a map of columns, or guess it; in long tables, too, where each row holds one channel."""
 
 from __future__ import annotations
 
@@ -34,13 +33,13 @@ TURNS = 0.6  # stamps per row, below which rows share them; those of two fingers
 
 
 def refuse_several(table: Table, columns: ColumnMap) -> None:
-    """Raise TactileError where rows of several fingers alternate: a column tells rows of one stamp apart."""
+    """Raise TactileError if fingers' rows alternate: a column outside the map tells rows of one stamp apart."""
     if not columns.time or any(name not in table.header for name in columns.names()):
         return
     keys = [table.header.index(name) for each in (columns.time, columns.channel) if (name := each.lower())]
 
     def different(places: list[int]) -> int:
-        """Count the distinct combinations of values in the columns at places in the first rows."""
+        """Return the number of distinct combinations of values in the columns `places`, in the first rows."""
         rows = np.column_stack([table.exact.get(place, table.values[:, place])[:LOOKED_AT] for place in places])
         return len(np.unique(rows, axis=0))
 
@@ -54,11 +53,11 @@ def refuse_several(table: Table, columns: ColumnMap) -> None:
 
 
 def widen(table: Table, columns: ColumnMap) -> Table:
-    """Return a table with one column for each mapped channel, and the time's.
+    """Convert a long table, with a row for each value of a channel, to one with a column for each mapped channel and
+    one for the time.
 
-    Rows of one stamp are a frame, in the order of time, where stamps differ from frame to frame; else a frame ends
-    where the channels begin again, in their order in the file. Missing values are NaN. Raises TactileError for a file
-    without any of the channels."""
+    Rows of one stamp make a frame, in the order of time, if stamps differ from frame to frame; else a frame ends where
+    the channels begin again. Missing values are NaN. Raises TactileError for a file without any of the channels."""
     channels = _texts(table, columns.channel.lower())
     wanted = [name for name in dict.fromkeys(channels.tolist()) if name in columns.channels()]
     if not wanted:
@@ -89,7 +88,7 @@ def widen(table: Table, columns: ColumnMap) -> Table:
 
 
 def _texts(table: Table, name: str) -> np.ndarray:
-    """Return the channels (T,) of the rows as texts, in lower case."""
+    """Return the column `name` as texts (T,) in lower case: the rows' channels."""
     if name in table.words:
         table.taken.add(name)
         texts = table.words[name].texts(table.values[:, table.header.index(name)])
@@ -99,7 +98,8 @@ def _texts(table: Table, name: str) -> np.ndarray:
 
 
 def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Recording:
-    """Make the recording of a table by a map; container : csv, json, hdf5, npz or mat. Raises as ``assemble`` does."""
+    """Return the recording in a table, by a map. container : "csv", "json", "hdf5", "npz" or "mat"
+    Raises TactileError for a missing column, for rows of several fingers in turn, and for what `assemble` refuses."""
     refuse_several(table, columns)
     if columns.channel:
         table = widen(table, columns)
@@ -130,7 +130,7 @@ def read_mapped(table: Table, columns: ColumnMap, container: str = "csv") -> Rec
 
 
 def _tell_millivolts(names: list[str]) -> list[str]:
-    """Return a sentence, or none, on electrodes whose names say mV, which counts cannot be told from."""
+    """Return a list of a sentence if electrodes' names say mV, which their counts do not show; else []."""
     told = next(filter(MILLIVOLTS.search, names), None)
     advice = "1.241 with --counts-per-unit if the range is 3.3 V"
     return (
@@ -139,7 +139,7 @@ def _tell_millivolts(names: list[str]) -> list[str]:
 
 
 def _electrodes(table: Table, names: list[str]) -> list[str]:
-    """Return the names of E1 to E19, or of one array's. Raises TactileError for 19 of a BioTac SP's 24."""
+    """Return the columns of E1 to E19, by name or of an array. Raises TactileError for 19 of a BioTac SP's 24."""
     known = (*table.header, *table.left_out)
     if len(names) == 1:
         inner = [name for name in known if name.startswith(f"{names[0]}[")]
@@ -156,7 +156,7 @@ def _electrodes(table: Table, names: list[str]) -> list[str]:
 
 
 def _readings(table: Table, names: Sequence[str]) -> np.ndarray:
-    """Return the electrodes (T, 19), NaN where there is no column. Raises TactileError for one that is missing."""
+    """Return electrodes (T, 19) of columns `names`, NaN for "". Raises TactileError for a missing column."""
     held = [name for name in names if name]
     counts = table.counts(held) if all(map(table.has, held)) else table.columns(held)
     if len(held) == len(names):
@@ -169,8 +169,8 @@ def _readings(table: Table, names: Sequence[str]) -> np.ndarray:
 def read_by_map(
     path: str, container: str, file: BinaryIO, columns: ColumnMap, left_out: Callable[[str], bool] | None = None
 ) -> Recording:
-    """Read the recording of an open file by a map, columns; container : csv, json, hdf5, npz or mat
-    left_out : true for the name of a column that need not be kept of a long text; None keeps all
+    """Return the recording in an open file, by the map `columns`. container : "csv", "json", "hdf5", "npz" or "mat"
+    left_out : function that is true for a column's name if a long text need not keep it; None keeps all
     Raises TactileError for a missing column or array."""
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else read_table(path, file, left_out)
@@ -185,14 +185,14 @@ def read_by_map(
 
 @contextmanager
 def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
-    """Open the arrays of a file whose container is hdf5, npz or mat."""
+    """Open the arrays of a file. container : "hdf5", "npz" or "mat"""
     opened = {"hdf5": lambda: open_hdf5(path), "npz": lambda: open_npz(path, file)}
     with opened.get(container, lambda: open_matlab(path, file))() as store:
         yield store
 
 
 def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap], tuple[str, ...]]:
-    """Guess the map of each finger of an open file; also return the names of its columns. TactileError for a bag."""
+    """Return a guessed map for each finger in an open file, and the columns' names. Raises TactileError for a bag."""
     refuse_bag(path, container)
     if container in ("csv", "json"):
         table = read_json(path, file) if container == "json" else next(read_tables(path, file, GUESSED_BY, 0))[0]

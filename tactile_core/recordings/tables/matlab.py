@@ -29,7 +29,7 @@ HEADER, PACKED, STEP = 128, 15, 2**20  # bytes; type of a packed element (MAT-fi
 
 @contextmanager
 def open_matlab(path: str, file: BinaryIO) -> Iterator[Store]:
-    """Read an open MATLAB 5 file as named arrays. Raises TactileError for objects, damage, and without scipy."""
+    """Open a MATLAB 5 file's arrays. Raises TactileError for objects and damage, and if scipy is not installed."""
     with damage_reported(path, "MATLAB file"):
         _check_unpacked(path, file)
     try:

@@ -1,5 +1,5 @@
-"""Parse the rows of a text table: clean ones together, others cell by cell, with an error for each bad cell, and doubt
-the last cell of a file that does not end in a newline: it may be cut off."""
+"""Parse the rows of a text table: clean rows all at once, others cell by cell, with a problem noted for each bad cell.
+The last cell of a file without a final newline may be cut off, and is judged."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ MAX_BLANK = 8  # blank lines that a message names
 
 
 def is_row(line: str, header: Header) -> bool:
-    """Return false for a line that is blank, a comment, or the header again, as of a log that was continued."""
+    """Return false for a line that is blank, a comment, or the header again (of a log that was continued)."""
     return line != header.line and bool(line.strip(" \t")) and not line.lstrip().startswith(COMMENTS)
 
 
 def clean(rows: list[str], header: Header) -> np.ndarray | None:
-    """Parse rows to (n, columns of the header), ten times as fast as `row`; None if any cell is no finite number."""
+    """Return the numbers (n, columns) in n rows; None if any cell is no finite number. Ten times as fast as `row`."""
     trimmed = [row.removesuffix(header.separator) for row in rows]  # one at the end of each row, as the slide set has
     if not all(map(str.strip, trimmed)):
         return None
@@ -38,7 +38,7 @@ def clean(rows: list[str], header: Header) -> np.ndarray | None:
 
 
 def row(line: str, header: Header, kinds: Cells, frame: int, line_number: int, problems: list[Problem]) -> list[float]:
-    """Parse a line to the row's values, for frame number `frame`; errors are added to problems, under line_number."""
+    """Return a line's values, NaN for bad cells, which are added to problems, at `frame` and `line_number`."""
     width = len(header.names)
     cells = split(line, header.separator)
     if len(cells) > width and not "".join(cells[width:]).strip():
@@ -78,7 +78,7 @@ def _bad_row(
 
 
 def no_number(cell: str) -> str:
-    """Describe a cell that is no number, a decimal comma or thousands separators by name."""
+    """Describe in words a cell that is no number; a decimal comma and thousands separators are named."""
     comma = cell.count(",") == 1 and number(cell.replace(",", ".")) is not None
     if THOUSANDS.fullmatch(cell):
         return f"{shown(cell)} is a number with thousands separators{' or a decimal comma' * comma}"
@@ -87,8 +87,8 @@ def no_number(cell: str) -> str:
 
 
 def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
-    """Return a sentence, or none, on blank lines between header and last row, where frames may be missing.
-    rows : (T,) line of each frame"""
+    """Return a tuple of one sentence on lines without a frame between header and last row, an empty one if none.
+    header_line : line of the header; rows : (T,) int, line of each frame"""
     count = int(rows[-1]) - header_line - len(rows)
     if count == 0:
         return ()
@@ -103,9 +103,9 @@ def tell_blank_lines(header_line: int, rows: np.ndarray) -> tuple[str, ...]:
 def doubt_last_cell(
     kept: list[tuple[int, str]], header: tuple[str, ...], separator: str, values: np.ndarray, problems: list[Problem]
 ) -> None:
-    """Report the last number of a file without final newline as a problem where it may be cut off: every other row ends
-    in a separator and this one does not, or else its value is suddenly below half of the last. Many complete files lack
-    that newline. kept : number and text of each line; values : (T, C) of them, of which the last becomes NaN"""
+    """Add the last number of a file without a final newline to problems, and make it NaN, if it may be cut off: if
+    other rows end in a separator and this one does not, or if it falls below half of the number above it. (Many whole
+    files lack that newline.) kept : number and text of each line; values : (T, C) numbers in these lines"""
     number, line = kept[-1]
     if len(kept) < 2 or line.count(separator) != len(header) - 1 or not np.isfinite(values[-1, -1]):
         return

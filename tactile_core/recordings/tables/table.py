@@ -1,4 +1,4 @@
-"""Parse a text table; every bad cell is reported by line and column."""
+"""Parse text tables; every bad cell is reported with its line and column."""
 
 from __future__ import annotations
 
@@ -26,15 +26,16 @@ OVERLAP = 200  # rows of the block before by which the last cell of a file is ju
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Parsed table of a text.
+    """Table parsed from a text, or made of arrays.
 
-    header : column names; values : (T, C) float, NaN at bad cells; lines : (T,) int, header is line 1
-    problems : bad cells; exact : index of a column that float32 values would round, as time stamps -> (T,) float64
-    start : line after which the rows begin
-    left_out : columns of the file that were parsed and not kept
-    taken : names of the columns that were read so far, or that belong to another recording of the file
-    words : distinct texts of text columns, whose values are indices
-    texts : name -> (T,) further labels, which the file has beside its columns"""
+    header : names of the columns; values : (T, C) float, NaN at bad cells; lines : (T,) int, each row's line in the
+    file
+    problems : bad cells; exact : index of a column that float32 would round, such as time stamps -> (T,) float64
+    start : number of the line after which the rows begin
+    left_out : names of columns that were parsed and not kept
+    taken : names of columns that were read so far, or belong to another recording in the file
+    words : name of a column of texts -> its distinct texts, whose indices are in `values`
+    texts : name -> (T,) labels that the file has beside its columns"""
 
     path: str
     header: tuple[str, ...]
@@ -50,7 +51,7 @@ class Table:
     texts: dict[str, np.ndarray] = field(default_factory=dict)
 
     def columns(self, names: list[str], dtype: type = np.float64) -> np.ndarray:
-        """Return columns' values (T, len(names)) of a dtype; texts are parsed. TactileError names a missing one."""
+        """Return columns `names` as numbers (T, n) of a dtype. Raises TactileError for a missing one, or texts."""
         missing = [name for name in names if not self.has(name)]
         if missing:
             more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -70,8 +71,8 @@ class Table:
         return found
 
     def _numbers_of(self, name: str, words: Words, values: np.ndarray) -> np.ndarray:
-        """Return the numbers (T,) in the column `name` of texts. Raises TactileError where none of them is a number.
-        words, values : its distinct texts, and (T,) float, their indices"""
+        """Return the numbers (T,) in column `name` of texts. Raises TactileError if none is. words, values : distinct
+        texts, and (T,) float, the rows' indices in these"""
         found, told = words.values(values), [word for word in words if word.lower() not in MISSING]
         if told and not np.isfinite(found).any():
             expected = "numbers as 3315 or 3.315, or times as 2012-11-08 17:12:03.45"
@@ -81,7 +82,7 @@ class Table:
         return found
 
     def labels(self, used: Collection[str]) -> dict[str, np.ndarray]:
-        """Return name -> (T,) texts of columns not used, and of numbers whose column's name is that of a label."""
+        """Return labels, name -> (T,) texts: columns of texts not used, and of numbers with a label's usual name."""
         found = dict(self.texts)
         for column, name in enumerate(self.header):
             values = self.exact.get(column, self.values[:, column])
@@ -93,7 +94,7 @@ class Table:
         return labels_of(found)
 
     def counts(self, names: list[str]) -> np.ndarray:
-        """Return values (T, n) of names, float32 where exact, NaN for missing ones. TactileError for half missing."""
+        """Return columns `names` (T, n), float32 if exact, NaN for missing ones; TactileError if half are."""
         self.taken.update(names)
         held = [name for name in names if self.has(name)]
         if len(held) < len(names) and len(held) > len(names) / 2:
@@ -112,17 +113,17 @@ class Table:
         return name in self.header or name in self.left_out
 
     def column(self, name: str) -> np.ndarray:
-        """Return the values (T,) float of a column."""
+        """Return the column `name` as numbers (T,) float."""
         return self.columns([name])[:, 0]
 
     def essential(self, names: Iterable[str], also: Iterable[str] = ()) -> list[Problem]:
-        """Return the problems in columns `names`, marked essential, and those in `also`, marked not essential."""
+        """Return the problems in the columns `names`, marked essential, and those in columns `also`, marked not so."""
         keep, read = {*names, "row"}, {*names, "row", *also}
         return [replace(p, essential=p.field in keep) for p in self.problems if p.field in read]
 
 
 def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | None:
-    """Parse whole lines of a growing file, after `before` earlier lines; None if they hold no data row."""
+    """Return the table in whole lines of a growing file, after `before` earlier lines; None if they hold no row."""
     lines = text_lines(path, data)
     skipped = max(0, header.lines - before)
     if not any(line.strip(" \t") for line in lines[skipped:]):
@@ -131,14 +132,15 @@ def read_lines(path: str, header: Header, data: bytes, before: int) -> Table | N
 
 
 def read_header(path: str, file: BinaryIO) -> tuple[str, ...]:
-    """Read the lower-case column names in the file's first megabyte."""
+    """Return the names of the file's columns, in lower case, from its first megabyte."""
     file.seek(0)
     return Header.parse(path, text_lines(path, _whole_lines(path, file, file.read(MAX_LINE)))).names
 
 
 def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None = None) -> Table:
-    """Parse the file, a block at a time. Raises TactileError: not text, empty, no header, no data, twin columns.
-    left_out : true for the name of a column that is parsed but not held; only of a file of more than WHOLE bytes"""
+    """Return the table in a file. Raises TactileError for no text, an empty, headless or too long one, and twin
+    columns.
+    left_out : function that is true for the name of a column that files of over `WHOLE` bytes need not keep"""
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
         found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
@@ -149,7 +151,7 @@ def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None
 
 
 def _joined(first: Table, blocks: Iterator[tuple[Table, int]], size: int, left_out: Callable[[str], bool]) -> Table:
-    """Join blocks in half the memory, in float32 where exact. size : bytes of the file; left_out : columns to drop"""
+    """Return a file's blocks as one table, float32 if exact. size : bytes of the file; left_out : see `read_table`"""
     path = first.path
     held = [column for column, name in enumerate(first.header) if name in first.words or not left_out(name)]
     header = tuple(first.header[column] for column in held)
@@ -201,8 +203,8 @@ def _check_problems(path: str, problems: list[Problem], line: int) -> None:
 
 
 def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Iterator[tuple[Table, int]]:
-    """Yield the file in parts of about `part_bytes` of text, each with the number of its first rows (at most `context`)
-    that repeat the part before. Raises TactileError like `read_table`."""
+    """Yield pairs (table, repeated) of a file, in parts of about `part_bytes` of text; `repeated` first rows of a part,
+    at most `context`, are the last of the part before. Raises TactileError for the same files as `read_table`."""
     file.seek(0)
     data = _whole_lines(path, file, file.read(part_bytes))
     lines = text_lines(path, data)
@@ -222,7 +224,7 @@ def read_tables(path: str, file: BinaryIO, part_bytes: int, context: int) -> Ite
 
 
 def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
-    """Return the bytes already read from a file, and those up to the end of their last line."""
+    """Return data, bytes of a file, up to the end of their last line. Raises TactileError for a long line."""
     if data and not data.endswith(b"\n"):
         data += file.readline(MAX_LINE)
         if not data.endswith(b"\n") and file.read(1):
@@ -231,7 +233,7 @@ def _whole_lines(path: str, file: BinaryIO, data: bytes) -> bytes:
 
 
 def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool = True) -> Table:
-    """Parse the lines after line `first` to a table; last : the file ends with them."""
+    """Return the table in the lines that follow line number `first`; last : true if the file ends with them."""
     ended = not lines or not lines[-1]
     if ended:
         lines = lines[:-1]
@@ -258,8 +260,8 @@ def _parsed(path: str, header: Header, lines: list[str], first: int, last: bool 
 
 
 def text_lines(path: str, data: bytes) -> list[str]:
-    """Split the text of a file into lines, with an empty one after its last newline. Raises TactileError, of the file
-    `path`, for bytes that are no UTF-8 text, and for a line of over MAX_LINE characters."""
+    """Return the lines of a file's text, with an empty one after its last newline. Raises TactileError, on the file
+    `path`, for bytes that are no UTF-8 text, and for a line of over `MAX_LINE` characters."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise TactileError(path, "UTF-16 text", "UTF-8 text", "Save the file as UTF-8 (in a spreadsheet: CSV UTF-8)")
     if b"\0" in data:

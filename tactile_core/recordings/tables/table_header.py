@@ -1,4 +1,4 @@
-"""Header of a text table: names, separator, and the comments before it; columns of a table without one are numbered."""
+"""Header of a text table: names, separator, and the comments before. Columns of a table without header are numbered."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ NUMBERED = "column{}"  # names of columns without a header, from 1
 
 @dataclass
 class Header:
-    """Header of a table; names : lower case; lines : up to and including it; separator : of cells; line : its text"""
+    """Header of a table. names : of the columns, in lower case; lines : number of lines up to it, with it
+    separator : character between cells; line : text of the header, "" if it is a comment or missing"""
 
     names: tuple[str, ...]
     lines: int
@@ -30,9 +31,9 @@ class Header:
 
     @classmethod
     def parse(cls, path: str, lines: Sequence[str]) -> Header:
-        """Parse the header of a text that starts with these lines. Comments before the rows are passed over, except the
-        last one where it names the columns, as in files of ``np.savetxt`` and ``rostopic echo -p``.
-        Raises TactileError, of the file `path`, for a text without a line, too many columns, or two of one name."""
+        """Return the header of a text that starts with these lines. Comments before the rows are skipped, except the
+        last one if it names the columns, as in files of ``np.savetxt`` and ``rostopic echo -p``.
+        Raises TactileError, on the file `path`, for a text without a line, too many columns, or two of one name."""
         first, comment = _first_row(lines)
         if first is None:
             raise TactileError(path, "an empty file", "a recording", "Check that the recording was written to its end")
@@ -48,14 +49,14 @@ class Header:
         return cls(_names(path, cells, first), first + 1, separator, lines[first])
 
     def cells(self, rows: Sequence[str]) -> Cells:
-        """Return the kinds of the columns, which the first rows decide."""
+        """Return the kinds of the columns, which the first `rows` (lines) ever given decide."""
         if self._cells is None:
             self._cells = Cells(self.names, [split(row, self.separator) for row in rows[:LOOKED_AT]])
         return self._cells
 
 
 def split(line: str, separator: str) -> list[str]:
-    """Split a line into cells at the separator; decimal commas become points, but where commas separate."""
+    """Return a line's cells; decimal commas become points, unless the comma is the separator."""
     cells = line.split() if separator == SPACE else line.split(separator)
     if separator == "," or not ("," in line or INSIDE[ord(",")] in line):
         return cells
@@ -63,7 +64,7 @@ def split(line: str, separator: str) -> list[str]:
 
 
 def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
-    """Return the index of the first of lines that is no comment or title, and of the last comment before, or None."""
+    """Return the index of the first line but comments and titles, and of the last comment before, or None."""
     filled = [place for place, line in enumerate(lines) if line.strip()]
     first = next((place for place in filled if not lines[place].lstrip().startswith(COMMENTS)), None)
     if first is None:
@@ -80,7 +81,7 @@ def _width(line: str) -> int:
 
 
 def _separator(line: str) -> str:
-    """Return the separator of a line's cells; commas, at most one per cell, are decimals beside semicolons or tabs."""
+    """Return the separator of cells: semicolon or tab, unless cells have several commas, then comma, or space."""
     commas = line.count(",")
     return next((mark for mark in ";\t" if mark in line and commas <= line.count(mark) + 1), "," if commas else SPACE)
 
@@ -93,7 +94,7 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _is_data(cells: Sequence[str]) -> bool:
-    """Return true for cells of numbers, unless they count from 0 or 1, as pandas names columns."""
+    """Return true if most cells are numbers, unless they count up from 0 or 1, as pandas names columns."""
     values = [value for cell in cells if (value := number(cell)) is not None]
     counts = len(values) > 1 and values[0] in (0, 1) and values == [values[0] + step for step in range(len(values))]
     return len(values) > len([cell for cell in cells if cell]) // 2 and not (counts and len(values) >= MANY)

@@ -1,14 +1,15 @@
 """Check whether the contacts of a recording, taken together, resemble simulated ones.
 
-A wrong polarity, gains, order of channels or rest turns each contact into a signal that some contact may have: one
-frame hardly shows it. Three statistics over the different contacts of a recording do: the share that a few neighbouring
-simulated contacts leave unexplained; how much less is left with two electrodes exchanged; and how much less with a gain
-for each electrode, if the fitted gains differ widely. A softer or otherwise filled skin moves the electrodes alike at
-another fluid pressure, which shows it where recorded (table: docs/accuracy.md).
+A wrong polarity, gain, order of channels or rest turns each contact into signals that some other contact may have, so
+one frame hardly shows it. Three statistics over the different contacts of a recording do: the share of the changes that
+a few neighbouring simulated contacts leave unexplained; how much less is unexplained if two electrodes are exchanged;
+and how much less with a gain for each electrode, if the fitted gains differ widely. A softer or otherwise filled skin
+moves the electrodes alike at another fluid pressure, which shows it if it was recorded (table: docs/accuracy.md).
 
-A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Of what a free
-conductivity leaves of a level's difference to a typical rest, one contact leaves .53 to .84 in five real units at rest,
-and .23 to .38 in eight hard grips; soft grips (.47 to .87) are not separable. A `sensor` has the simulated contacts."""
+A level that was taken for rest may be a contact, too: a steady grip is as calm as an untouched finger. Its difference
+to a typical rest is fitted by the fluid's conductivity, and then by one contact beside it. The contact leaves .53 to
+.84 of what conductivity alone leaves in five real units at rest, .23 to .38 in eight hard grips; soft grips (.47 to
+.87) cannot be told from rest. A `sensor` is the name of the one whose simulated contacts are compared."""
 
 from __future__ import annotations
 
@@ -58,7 +59,7 @@ LEAST_APART = 100.0  # counts, norm of a level's difference without conductivity
 
 
 def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return the mean share of change (n, 19) counts that no simulated contact explains, and how many differ."""
+    """Return the share of change (n, 19) counts that no simulated contact explains, and how many contacts differ."""
     if not len(change):
         return 0.0, 0
     change = change[spread_out(len(change), MOST)]
@@ -73,7 +74,7 @@ def unexplained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, 
 
 
 def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
-    """Rebuild unit vectors chosen (n, 19) from the nearest simulated ones; like : (n, P) cosines to all of these"""
+    """Return unit vectors chosen (n, 19) as fitted by simulated ones; like : (n, P) cosines to all of these"""
     near = patterns(sensor)[np.argpartition(-like, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]]
     products = near @ near.transpose(0, 2, 1) + RIDGE * np.eye(NEIGHBOURS)
     weights = np.linalg.solve(products, (near @ chosen[:, :, None]))
@@ -81,7 +82,7 @@ def _rebuilt(chosen: np.ndarray, like: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float]:
-    """Fit gains to change (n, 19) in contact; return the unexplained share's drop and the gains' spread (log rms)."""
+    """Return how much less of change (n, 19) is unexplained by fitted gains, and their spread (rms of logarithms)."""
     change = change[spread_out(len(change), MOST_MATCHED)]
     even, log_gain = change, np.zeros(change.shape[1])
     for _ in range(FITS):
@@ -92,8 +93,8 @@ def gained_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, float
 
 
 def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tuple[int, int]]:
-    """Find the two electrodes whose exchange reduces the unexplained share of change (n, 19) counts most; return the
-    reduction and the pair. (The residual of each exchanged electrode correlates with the other's simulated change.)"""
+    """Return how much less of change (n, 19) counts is unexplained if two electrodes are exchanged, and the best pair's
+    indices. (The residual of each exchanged electrode correlates with the other's simulated change.)"""
     change = change[spread_out(len(change), MOST_MATCHED)]
     chosen = unit(change)
     product = chosen.T @ _rebuilt(chosen, chosen @ patterns(sensor).T, sensor)
@@ -110,7 +111,7 @@ def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tu
 
 
 def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
-    """Count the different contacts in change (n, 19) counts: mutually dissimilar ones among the nearest simulated."""
+    """Return the number of different contacts in change (n, 19) counts: dissimilar ones among the nearest simulated."""
     known = patterns(sensor)
     near, counts = np.unique((unit(change[spread_out(len(change), MOST)]) @ known.T).argmax(axis=1), return_counts=True)
     kept: list[int] = []
@@ -121,9 +122,9 @@ def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
 
 
 def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURCE) -> tuple[float, int]:
-    """Return measured over simulated pressure, the median over different contacts, and their number; (NaN, 0) for none.
-    change : (n, 19) counts in contact; pressure : (n,) Pa over rest, NaN where it was not measured
-    The simulated pressure is that of the most similar contacts of nearly that size, scaled to the size."""
+    """Return the ratio of measured to simulated pressure, median over different contacts, and the number of these;
+    (NaN, 0) for none. The simulated pressure is that of the most similar contacts, scaled to the change's size.
+    change : (n, 19) counts in contact; pressure : (n,) Pa over rest, NaN if not measured"""
     simulated, size = contact_pressures_of(sensor), np.linalg.norm(change, axis=1)
     judged = np.flatnonzero((size > PRESSED) & np.isfinite(pressure))
     if simulated is None or not len(judged):
@@ -147,13 +148,14 @@ def pressure_ratio(change: np.ndarray, pressure: np.ndarray, sensor: str = SOURC
 
 
 def limit(contacts: int) -> float:
-    """Return the unexplained share above which a recording is doubted; contacts : number of its different contacts"""
+    """Return the largest unexplained share that is not doubted, for a recording's number of different contacts."""
     return LEFT + MORE / float(np.sqrt(contacts))
 
 
 def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = SOURCE) -> Doubt | None:
-    """Return the doubt of change (n, 19) counts in contact, of a typical unit; None where there is none.
-    pressure : (n,) Pa, of the fluid over its level at rest, NaN where it was not measured; None without"""
+    """Return the doubt whether change (n, 19) counts, of a typical unit in contact, resembles simulated contacts, or
+    None.
+    pressure : (n,) Pa of the fluid over its level at rest, NaN if not measured; or None"""
     left, contacts = unexplained_share(change, sensor)
     enough, most = contacts >= FEWEST, limit(max(contacts, 1))
     if contacts and apart(change, sensor) >= FEWEST_APART:
@@ -172,10 +174,11 @@ def doubt(change: np.ndarray, pressure: np.ndarray | None = None, sensor: str = 
 def flagged(
     typical: Framewise, kind: str, quiet: np.ndarray, flags: np.ndarray, pdc: np.ndarray, sensor: str
 ) -> tuple[np.ndarray, Doubt | None]:
-    """Return flags (T,) with `LAW_DOUBTED` in the contacts where the recording is doubted, and the doubt, or None.
+    """Return flags (T,) uint16 with `LAW_DOUBTED` in all frames in contact if they do not resemble simulated contacts,
+    else without it; and the doubt, or None.
 
-    typical : (T, e) counts, a typical unit's changes; quiet : (T,) bool; flags : (T,) uint16; pdc : (T,) counts
-    kind : of the recording; other than raw and tared ones are not judged"""
+    typical : (T, e) counts, changes converted to a typical unit; quiet : (T,) bool, frames at rest; flags : (T,) uint16
+    pdc : (T,) counts over rest; kind : the recording's; only "raw" and "tared" are judged"""
     if kind not in ("raw", "tared") or contacts_of(sensor) is None:
         return flags, None
     contact = touching(typical) & ~quiet
@@ -191,7 +194,7 @@ def flagged(
 
 
 def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt | None:
-    """Return the doubt that explains of change (n, 19) more than `beyond`: exchanged electrodes, wrong gains."""
+    """Return the doubt of exchanged electrodes or of gains, if it explains over `beyond` of change (n, 19), or None."""
     less, (first, second) = exchanged_share(change, sensor)
     if less > max(EXCHANGED, beyond):
         return Doubt(Reason.LAW_EXCHANGED, share=less, first=first + 1, second=second + 1, most=EXCHANGED)
@@ -202,11 +205,11 @@ def _doubt_electrodes(change: np.ndarray, beyond: float, sensor: str) -> Doubt |
 
 
 def as_contact(level: np.ndarray, sensor: str, readings: Sequence[np.ndarray] = ()) -> float | None:
-    """Return the share (0..1) that one contact explains of a level (e,) counts, beside the conductivity that fits best.
+    """Return the share (0..1) that one contact explains of a level's difference to a typical unit's rest, of what the
+    best conductivity leaves of it; None if that is too little for a contact, and for sensors without simulated ones.
 
-    It is of the level's difference to a typical unit's rest. None if too little for a contact, or without a model.
-    readings : (T, e) counts of each recording; electrodes that stand still in all, or rest where none does, are faulty
-    and left out, where most others are not"""
+    level : (e,) counts taken for rest; readings : (T, e) counts of each recording, by which faulty electrodes are left
+    out: those that stand still in all, or are outside the range of rests (unless most are)"""
     typical = typical_rest(sensor)
     if typical is None or contacts_of(sensor) is None:
         return None

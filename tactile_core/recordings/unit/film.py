@@ -1,4 +1,4 @@
-"""Find a unit's fluid film from its recording: how thick it is, and how the fluid's conductivity drifts.
+"""Find a unit's fluid film from its recording: its thickness, and the drift of the fluid's conductivity.
 
 The film over an electrode has an impedance of 1 / (thickness * conductivity). The same movement of the skin raises
 impedances more where the film is thinner: the networks would read contacts of a unit with films half as thick as a
@@ -58,9 +58,10 @@ NO_SKIN = 8.0  # nats, four spreads: if no film brings the pressure's doubt belo
 @dataclass(frozen=True)
 class Film:
     """Fluid film of the unit that made a recording.
-    thickness : divided by a typical unit's; evidence : for it, in words
-    conductivity : (P,) log of the fluid's, divided by that at rest, at rising frames (P,); linear between them
-    sensor : whose simulated contacts separate drift from contact; idle : true if no change exceeds what drift leaves
+    thickness : divided by a typical unit's; evidence : what shows it, in words
+    frames, conductivity : (P,) rising frames, and the log of the fluid's conductivity over that at rest there, linear
+        between them; sensor : name of the one whose simulated contacts separate drift from contact
+    idle : true if no change is larger than drift may leave, so that all are taken for drift
     unsure : true if it may be a typical film over another fluid: neither the user nor the fluid's pressure decides"""
 
     thickness: float
@@ -77,11 +78,11 @@ class Film:
         return cls(thickness, "given", np.zeros(1), np.zeros(1))
 
     def changes(self, change: Changes, rest: Baseline, perhaps_idle: np.ndarray | None = None) -> Changes:
-        """Convert change (T, e) counts from rest to what a unit of typical films would show from the same rest.
+        """Convert change (T, e) counts to what a unit with a typical film would show from the same rest, without drift.
 
-        They are zero where they are no larger than what the largest drift leaves, and like no simulated contact. A rest
-        from another recording may be off by `REST_OFF`: then smaller ones are zero, too, in the frames perhaps_idle.
-        perhaps_idle : (T,) bool, frames in which PDC shows no contact; None where rest is of the recording itself"""
+        Changes become zero if they are no larger than the largest drift may leave, and like no simulated contact.
+        perhaps_idle : (T,) bool, frames in which PDC shows no contact: there changes that the error `REST_OFF` of a
+            rest from another recording may explain become zero, too; None if rest was found in this recording"""
         if self.thickness == 1 and not self.conductivity.any() and perhaps_idle is None:
             return change
 
@@ -89,7 +90,7 @@ class Film:
         known = known / np.linalg.norm(known, axis=1, keepdims=True)
 
         def of_typical_film(frames: np.ndarray) -> np.ndarray:
-            """Return a typical unit's changes (n, 19) counts in frames (n,), without drift."""
+            """Return the changes (n, 19) counts that a typical film would show in frames (n,), without drift."""
             since_rest = np.exp(np.interp(frames, self.frames, self.conductivity))[:, None]
             seen, still = change[frames], rest.at(frames)
             found = divider.of_typical_film(seen, still, self.thickness, since_rest)
@@ -108,13 +109,12 @@ class Film:
 
     @property
     def warnings(self) -> list[str]:
-        """Warnings for the user: changes so small that all were taken for drift; a film that may be misjudged."""
+        """Return warnings for the user: that all changes were taken for drift; that the film may be misjudged."""
         found = [TOO_SMALL] if self.idle else []
         return [*found, UNSURE.format(self.thickness, 1 / self.thickness)] if self.unsure else found
 
     def report(self) -> dict[str, object]:
-        """Return, for JSON: thickness over a typical unit's, evidence in words, and conductivity_since_rest, least and
-        most of the fluid's over that at rest."""
+        """Return thickness, evidence, and conductivity_since_rest, its least and largest over that at rest."""
         least, most = np.exp([self.conductivity.min(), self.conductivity.max()])
         return {
             "thickness": round(self.thickness, 4), "evidence": self.evidence,
@@ -123,7 +123,7 @@ class Film:
 
 
 class _Seen:
-    """Sampled frames of a recording: change (n, e) counts from rest (n, e) counts, at time (n,) s."""
+    """Sampled frames of a recording, in windows: change (n, e) counts from rest (n, e) counts at time (n,) s."""
 
     def __init__(self, change: np.ndarray, rest: np.ndarray, time: np.ndarray, sensor: str) -> None:
         self.change, self.rest, self.sensor = change, rest, sensor
@@ -135,13 +135,13 @@ class _Seen:
         self._squares = np.square(self._known).sum(axis=1)
 
     def typical(self, thickness: float, conductivity: float | np.ndarray) -> np.ndarray:
-        """Convert changes to (n, e) counts of a typical unit, by a film's thickness, conductivity (n, 1) over rest."""
+        """Return changes (n, e) counts of a typical unit, for a film's thickness and conductivity (n, 1) over rest."""
         change = divider.of_typical_film(self.change, self.rest, thickness, conductivity)
         return divider.typical(change, self.rest, self.typical_rest)
 
     def apart(self, typical: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the squared distance (n,) of typical (n, e) counts, changes of a typical unit, to the nearest
-        simulated contact, its index (n,), and squared length (n,); on an asinh scale."""
+        """Return, for changes typical (n, e) counts of a typical unit, the squared distance (n,) to the nearest
+        simulated contact, that contact's index (n,), and their squared length (n,); on an asinh scale."""
         seen = np.arcsinh(typical / SCALE)
         length = np.square(seen).sum(axis=1)
         apart = length[:, None] - 2 * seen @ self._known.T + self._squares
@@ -149,8 +149,8 @@ class _Seen:
         return np.maximum(apart[np.arange(len(seen)), nearest], 0), nearest, np.maximum(length, 1e-9)
 
     def unexplained(self, typical: np.ndarray) -> np.ndarray:
-        """Return the share (n,) of the squared length of typical (n, e) counts, on an asinh scale, that no simulated
-        contact explains, as firm as simulated or lighter."""
+        """Return the share (n,) of the squared length of changes typical (n, e) counts, on an asinh scale, that no
+        simulated contact explains, as firm as simulated or lighter."""
         seen = np.arcsinh(typical / SCALE)
         along = seen @ self._known.T
         firmness = np.clip(along / self._squares, 0, 1)
@@ -162,11 +162,11 @@ def find(
     change: Framewise, rest: Framewise, time: np.ndarray, pressure: np.ndarray | None, sensor: str, *,
     thickness: float | None = None, own_rest: bool, drifts: bool = True,
 ) -> Film:  # fmt: skip
-    """Find the film of the unit that made a raw recording.
+    """Return the fluid film of the unit that made a raw recording.
 
-    change : (T, e) counts from rest (T, e); time : (T,) s; pressure : (T,) Pa, NaN where it was not measured
-    thickness : if known; own_rest : true if rest was found in this recording; drifts : true if conductivity may drift
-    sensor : whose simulated contacts separate contact from drift"""
+    change : (T, e) counts from rest (T, e) counts; time : (T,) s; pressure : (T,) Pa, NaN if not measured; or None
+    thickness : the film's over a typical one's, if known; own_rest : true if rest was found in this recording
+    drifts : true if conductivity may drift; sensor : name of the one with the simulated contacts"""
     frames = spread_out(len(change), FRAMES)
     seen = _Seen(change[frames], rest[frames], time[frames], sensor)
     believed = _believed(_doubt_at_rest(_impedance_at_rest(seen))) if thickness is None else thickness
@@ -186,27 +186,28 @@ def find(
 
 
 def _drift_left(conductivity: np.ndarray, rest: np.ndarray, thickness: float) -> np.ndarray:
-    """Return the norm (T,) over electrodes, counts, of what the largest drift leaves of a film; 0 without drift.
-    conductivity : (P,) log of the fluid's over that at rest; thickness : over a typical unit's; rest : (T, e) counts"""
+    """Return the norm (T,) counts, over electrodes, of changes that the largest drift may leave unexplained; 0 without
+    drift. conductivity : (P,) log of the fluid's conductivity over that at rest
+    rest : (T, e) counts; thickness : the film's over a typical unit's"""
     most = float(np.exp(conductivity[np.abs(conductivity).argmax()]))
     drift = divider.of_typical_film(np.zeros_like(rest), rest, thickness, most)
     return DRIFT_LEFT * np.linalg.norm(drift, axis=1)
 
 
 def _impedance_at_rest(seen: _Seen) -> float:
-    """Return the impedance at rest over a typical unit's, median of the electrodes."""
+    """Return the impedance at rest divided by a typical unit's, the median over electrodes."""
     unit, typical = divider.film_impedance(seen.rest[0]), divider.film_impedance(seen.typical_rest)
     return float(np.median(unit / typical))
 
 
 def _doubt_at_rest(impedance: float) -> np.ndarray:
-    """Return minus the log probability (k,) of each thickness, nats, by impedance at rest (over a typical unit's)."""
+    """Return minus the log probability (k,) nats of `THICKNESSES`, by impedance at rest over a typical unit's."""
     of_fluid = np.log(impedance * THICKNESSES) / CONDUCTIVITY_SPREAD
     return (np.square(np.log(THICKNESSES) / THICKNESS_SPREAD) + np.square(of_fluid)) / 2
 
 
 def _believed(doubt: np.ndarray) -> float:
-    """Return the mean thickness by doubt (k,), minus log probabilities; 1 (typical) unless another is much likelier."""
+    """Return 1 unless another thickness is clearly likelier, then their mean; doubt : (k,) minus log probabilities"""
     if doubt[TYPICAL] < doubt.min() + CLEARLY:
         return 1.0
     likely = np.exp(doubt.min() - doubt)
@@ -214,11 +215,12 @@ def _believed(doubt: np.ndarray) -> float:
 
 
 def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
-    """Return the most plausible course c (windows,) of the conductivity, log over that at rest, by Viterbi's algorithm.
+    """Return the most plausible course c (windows,) of the log of conductivity over that at rest, by Viterbi's
+    algorithm.
 
-    It minimises the sum over windows of min(distance to a contact, to none)^2 / scale, on average, plus c_0^2 /
-    (2 at_start^2) and, for each step, (c_1 - c_0)^2 / (2 A_SECOND^2 seconds). It is 0 throughout where drift explains
-    too little. thickness : of the film"""
+    It minimises the sum over windows of the frames' mean min(distance to a simulated contact, to none)^2 / scale, plus
+    c_0^2 / (2 at_start^2) and, for each step, (c_1 - c_0)^2 / (2 A_SECOND^2 seconds). It is 0 throughout if drift
+    explains too little. thickness : the film's over a typical one's; at_start : prior standard deviation of c_0"""
     still = seen.apart(seen.typical(thickness, 1.0))[2]
     scale = 2 * (len(seen.rest[0]) * (NOISE / SCALE) ** 2 + MISFIT**2 * still)
     cost = np.empty((len(seen.windows), len(CONDUCTIVITIES)))
@@ -241,9 +243,9 @@ def _tracked(seen: _Seen, thickness: float, at_start: float) -> np.ndarray:
 
 
 def _thickness(seen: _Seen, conductivity: np.ndarray, pressure: np.ndarray | None) -> tuple[float, str, bool]:
-    """Return the most plausible thickness, its evidence, and whether the fluid's pressure is part of that, beside the
-    counts at rest and enough different contacts.
-    conductivity : (n, 1), over that at rest; pressure : (n,) Pa, NaN where it was not measured, or None"""
+    """Return the most plausible thickness over a typical unit's, its evidence in words, and true if the fluid's
+    pressure helped to decide, beside the counts at rest and the contacts, if these are enough.
+    conductivity : (n, 1) over that at rest; pressure : (n,) Pa, NaN if not measured; or None"""
     impedance = _impedance_at_rest(seen)
     doubt, evidence = _doubt_at_rest(impedance), f"impedance at rest {impedance:.2f} of a typical unit's"
     at_first = seen.typical(_believed(doubt), conductivity)

@@ -1,9 +1,8 @@
-"""Fit gains and offsets of an unknown sensor by matching its signals to the simulated ones most like them.
+"""Fit gains and offsets of an unknown unit by matching its signals to the simulated signals most like them.
 
-Alternately, every frame is assigned its nearest typical signal, and every electrode the gain that fits its readings to
-them, until nothing changes (as in k-means and iterated closest points). Frames are matched as wholes, so a recording
-may hold any mixture of contacts; matching the distribution of each electrode would take a finger touched in one place
-for a finger of wrong gains."""
+In turns, each frame is assigned its nearest simulated signal, and each electrode the gain that fits its readings to
+these, until nothing changes (as in k-means and iterated closest points). Whole frames are matched, so a recording may
+hold any mixture of contacts; matching each electrode's distribution would take a finger touched in one place for wrong gains."""
 
 from __future__ import annotations
 
@@ -24,8 +23,8 @@ PRIOR = 5.0
 @dataclass(frozen=True, eq=False)
 class Match:
     """Fitted gains and offsets.
-    log_gain : (19,) natural logarithm; offset : (19,) counts; contacts : (19,) number that determined the gain.
-    alike : number of different typical signals matched; settled : true if the last iteration changed nothing"""
+    log_gain : (19,) natural logarithm of the gain; offset : (19,) counts; contacts : (19,) number behind each gain
+    alike : number of different simulated signals that were matched; settled : true if the last turn changed none"""
 
     log_gain: np.ndarray
     offset: np.ndarray
@@ -35,9 +34,10 @@ class Match:
 
 
 def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float = PRIOR) -> Match:
-    """Match frames in contact to typical signals. prior : contacts that a gain of 1 counts as
-    change : (n, 19) counts, absolute where `rectified`; typical : (P, 19) counts, signed
-    Rectified signals give no offset: it is folded away with the sign."""
+    """Return gains and offsets by which frames in contact match simulated signals best.
+    change : (n, 19) counts, absolute if `rectified` is true; typical : (P, 19) counts, simulated, signed
+    prior : number of contacts that the prior, gain 1 and offset 0, counts as
+    Rectified signals give no offset: it is lost with the sign."""
     typical = np.abs(typical) if rectified else np.asarray(typical, np.float64)
     compressed = np.arcsinh(typical / SCALE)
     log_gain, offset = np.zeros(change.shape[1]), np.zeros(change.shape[1])
@@ -55,14 +55,15 @@ def match(change: np.ndarray, typical: np.ndarray, rectified: bool, prior: float
 
 
 def _nearest(frames: np.ndarray, typical: np.ndarray) -> np.ndarray:
-    """Index (n,) of the nearest row of typical (P, 19) for each of frames (n, 19)."""
+    """Return the index (n,) of the row of typical (P, 19) that is nearest to each of frames (n, 19)."""
     return (np.square(typical).sum(axis=1) - 2 * frames @ typical.T).argmin(axis=1)
 
 
 def _log_gain(
     change: np.ndarray, typical: np.ndarray, near: np.ndarray, before: np.ndarray, rectified: bool, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return log gains (19,) and contacts behind each: a mean of logarithms is unbiased by noise on both sides.
+    """Return log gains (19,) and the number (19,) of contacts behind each: a mean of logs has no bias by noise on both
+    sides.
     near : (n,) each frame's row in ``typical``; before : (19,) log gains so far; change, prior : see `match`"""
     wanted = typical[near]
     size = np.square(wanted * np.exp(before))
@@ -74,7 +75,7 @@ def _log_gain(
 
 
 def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: float) -> np.ndarray:
-    """Return offsets (19,) counts, from readings that should be small: the gain matters little there.
+    """Return offsets (19,) counts, from changes that should be small, on which the gain has little effect.
     change : (n, 19) counts; typical : (P, 19) counts; near : (n,) index into it; prior : contacts that 0 counts as"""
     wanted = typical[near]
     weight = SURE**2 / (np.square(wanted) + SURE**2)
@@ -84,9 +85,9 @@ def _offset(change: np.ndarray, typical: np.ndarray, near: np.ndarray, prior: fl
 def _over_contacts(
     values: np.ndarray, weight: np.ndarray, near: np.ndarray, prior: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the weighted means (19,) of values (n, 19), shrunk towards 0 by `prior`, and the sums of weight (n, 19).
-    All frames with the same match, near (n,) int, count as one contact, so a finger that rests on a table for a minute
-    counts as much as for a second."""
+    """Return the weighted means (19,) of values (n, 19) over contacts, shrunk towards 0 by `prior` (in contacts), and
+    the sums (19,) of the contacts' weights. weight : (n, 19); near : (n,) int, each frame's match: all frames of one
+    match count as one contact, so a finger that rests on a table for a minute counts as much as for a second"""
     groups, index, count = np.unique(near, return_inverse=True, return_counts=True)
     weights, sums = (np.zeros((len(groups), values.shape[1])) for _ in range(2))
     np.add.at(weights, index, weight)

@@ -1,4 +1,4 @@
-"""Detect the unit of measurement of raw PDC: 12-bit counts, that of the electrodes, or one of pressure."""
+"""Detect the unit of measurement of raw PDC: 12-bit counts, the electrodes' unit, or one of pressure."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ MOST = 1.01 * COUNT_MAX
 
 
 def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
-    """Convert pdc (T,), as a file has it, to counts; None if its unit of measurement cannot be told.
-    unit : counts that 1 means in the file's electrodes; warnings : extended by what was assumed; sensor : whose PDC"""
+    """Return pdc (T,), as a file has it, in counts; None if its unit of measurement cannot be found.
+    unit : counts that 1 means in the file's electrodes; warnings : list, extended by what was assumed"""
     if not pdc.any():
         warnings.append("PDC is 0 in all frames: taken as not recorded")
         return None
@@ -32,7 +32,7 @@ def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) ->
 
 
 def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
-    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the pressure unit that it is in, "" for counts.
+    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the name of its unit of pressure, "" for counts.
     unit : counts that 1 means in the file's electrodes"""
     known = pdc[np.isfinite(pdc)]
     values = np.unique(known)
