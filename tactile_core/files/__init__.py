@@ -1,1 +1,1 @@
-"""File handling independent of content: atomic writing, checked reading, packs, pictures, locks, caches, provenance."""
+"""Read and write files whatever they hold: atomic writing, checked reading, pictures, locks, caches, provenance."""

@@ -28,7 +28,7 @@ def cache_folder() -> Path:
 
 
 def entries() -> list[Path]:
-    """List the cache's folders of arrays; if one is deleted, its arrays are computed again when needed."""
+    """Return the cache's folders of arrays; the arrays of a deleted one are computed again when needed."""
     return sorted(file.parent for file in cache_folder().glob(f"*/{HASHES}"))
 
 
@@ -37,7 +37,7 @@ class DamagedError(Exception):
 
 
 def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Map arrays that `store` wrote, name -> array, read-only. Raises DamagedError for another hash (0.6 ms per MB)."""
+    """Return arrays that `store` wrote, name -> read-only memory map. Raises DamagedError unless their hashes match."""
     try:
         stated = json.loads(outside.read(folder / HASHES, _MOST))
         return {name: _checked(folder / f"{name}.npy", stated[name]) for name in names}
@@ -46,7 +46,7 @@ def load(folder: Path, names: Iterable[str]) -> dict[str, np.ndarray]:
 
 
 def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> dict[str, np.ndarray]:
-    """Write named arrays as they come, each whole or not at all, and their hashes last; return them as `load` does.
+    """Write named arrays as they come, each whole or not at all, then their hashes; return them, name -> memory map.
     room : space needed, in words, such as "350 MB". Raises TactileError for a folder that cannot be written."""
     with atomic.writing(folder, f"room for {room}", "Make room, or name a folder in TACTILE_CACHE"):
         hashes = {name: _stored(folder / f"{name}.npy", values) for name, values in arrays}
@@ -55,14 +55,15 @@ def store(folder: Path, arrays: Iterable[tuple[str, np.ndarray]], room: str) -> 
 
 
 def claim(folder: Path, room: str) -> None:
-    """Make an entry's folder and try it before its arrays are computed; room, in words, and errors as `store`."""
+    """Make a folder of the cache, before its arrays are computed. room : space needed, in words
+    Raises TactileError if it cannot be made or written."""
     with atomic.writing(folder, f"a folder for {room}", "Name one in TACTILE_CACHE"):
         folder.mkdir(parents=True, exist_ok=True)
         atomic.probe(folder)
 
 
 def _stored(file: Path, values: np.ndarray) -> str:
-    """Write an array, values of any shape; returns the hash of its file's bytes."""
+    """Write values, an array of any shape, to a file; return the SHA-256 of the file's bytes."""
     with atomic.new_file(file) as partial:
         with open(partial, "wb") as out:
             np.save(out, values)
@@ -71,7 +72,7 @@ def _stored(file: Path, values: np.ndarray) -> str:
 
 
 def _checked(file: Path, stated: str) -> np.ndarray:
-    """Map the array of a file whose hash is as stated; raises DamagedError otherwise."""
+    """Return the array in a file as a memory map. Raises DamagedError if the file's SHA-256 is not the stated one."""
     with outside.open_file(file) as opened:
         found = hashlib.file_digest(opened, "sha256").hexdigest()
     if found != stated:

@@ -50,14 +50,14 @@ def new_file(path: str | os.PathLike, *, shared: bool = False) -> Iterator[Path]
 
 
 def write_bytes(path: str | os.PathLike, content: bytes, *, shared: bool = False) -> None:
-    """Write a whole file or nothing; shared : several processes may write it at once."""
+    """Write content to a file, whole or not at all. shared : true if several processes may write it at once"""
     with new_file(path, shared=shared) as partial:
         partial.write_bytes(content)
 
 
 def write_json(path: str | os.PathLike, content: Any, *, shared: bool = False) -> None:
-    """Write content as readable JSON, keys sorted, lists of numbers or names in one line. Raises ValueError for NaN.
-    shared : several processes may write it at once"""
+    """Write content as readable JSON, keys sorted, lists of numbers or names on one line. Raises ValueError for NaN.
+    shared : true if several processes may write it at once"""
     text = json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
     text = _PLAIN_LIST.sub(lambda found: "[" + ", ".join(_PLAIN.findall(found[0])) + "]", text)
     # A file name that is no UTF-8 holds lone surrogates, which become JSON's own escapes.
@@ -93,7 +93,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 
 
 def sweep(folder: str | os.PathLike) -> None:
-    """Remove what killed writers of folders left in `folder`; running writers and third-party files are left alone."""
+    """Remove what killed writers of folders left in `folder`; what running writers and others made stays."""
     for file in Path(folder).glob(".*.tactile-lock"):
         name = file.name.removeprefix(".").removesuffix(".tactile-lock")
         if name in ("", ".", "..") or file.is_symlink() or not file.is_file():
@@ -111,14 +111,14 @@ def sweep_files(folder: str | os.PathLike) -> None:
 
 
 def _beside(path: Path, role: str) -> Path:
-    """Return a hidden name beside a path that no other program uses. Raises TactileError without a name."""
+    """Return a hidden path beside `path` for a role, such as "lock". Raises TactileError if `path` has no name."""
     if not path.name:
         raise TactileError(path, "no name", "a new file or folder")
     return path.with_name(f".{_short(path.name)}.tactile-{role}")
 
 
 def _short(name: str) -> str:
-    """Return the name; a long one as its beginning and hash, so that hidden names made from it fit the file system."""
+    """Return a name, a long one cut and with its hash, so that hidden names made from it fit the file system."""
     encoded = os.fsencode(name)
     if len(encoded) <= _LONGEST:
         return name
@@ -126,7 +126,7 @@ def _short(name: str) -> str:
 
 
 def _recover(path: Path) -> None:
-    """Undo an exchange that was interrupted between its two moves, then remove its leftovers."""
+    """Finish or undo an exchange of folders that was interrupted, and remove what it left beside `path`."""
     partial, old = _beside(path, "partial"), _beside(path, "old")
     if old.is_dir() and not old.is_symlink() and not path.exists():
         os.replace(old, path)
@@ -139,7 +139,7 @@ def _recover(path: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Hold the lock of the only writer of the folder `path`; raises TactileError when another process holds it."""
+    """Hold the lock of the only writer of the folder `path`. Raises TactileError if another process holds it."""
     file = _beside(path, "lock")
     while True:
         try:
@@ -178,7 +178,7 @@ def _sync(path: Path) -> None:
 
 
 def _sync_all(paths: list[Path]) -> None:
-    """Flush the files at paths. Raises OSError where the disk refuses one."""
+    """Flush files to disk. Raises OSError if the disk refuses one."""
     from concurrent.futures import ThreadPoolExecutor
 
     # The disk gathers what several ask for at once: 700 pictures took 2.9 s one by one and 0.1 s so, on one core.
@@ -188,7 +188,7 @@ def _sync_all(paths: list[Path]) -> None:
 
 
 def _sync_folder(path: Path) -> None:
-    """Flush the folder's own entries, where the system can (Windows cannot open folders)."""
+    """Flush a folder's list of files to disk, if the system can (Windows cannot open folders)."""
     if os.name != "nt":
         descriptor = os.open(path, os.O_RDONLY)
         try:
@@ -198,9 +198,8 @@ def _sync_folder(path: Path) -> None:
 
 
 def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
-    """Check before a long job that `path` is free and can be written; the folders that this needs are made later.
-    advice : what to do where something is there
-    Raises TactileError for an empty name, an existing file, or a folder that cannot be made or written."""
+    """Check before a long job that a file can be written to `path`. advice : what to do if something is there
+    Raises TactileError for an empty or long name, for what exists, and if the folder cannot be made or written."""
     if not os.fspath(path):
         raise TactileError("--out", "an empty name", "a file to write")
     path = Path(path)
@@ -214,7 +213,7 @@ def claim(path: str | os.PathLike, advice: str = "Choose another name") -> None:
 
 
 def probe(folder: str | os.PathLike) -> None:
-    """Try to write in a folder, and leave nothing: one that is missing is made and removed. Raises OSError."""
+    """Raise OSError if a folder cannot be written; a missing one is made and removed. Nothing is left behind."""
     made = _make_parents(Path(folder) / "probe")
     try:
         with tempfile.TemporaryFile(dir=os.fspath(folder)):
@@ -225,7 +224,7 @@ def probe(folder: str | os.PathLike) -> None:
 
 @contextlib.contextmanager
 def _parents(path: Path) -> Iterator[None]:
-    """Make the folders above a path; an error inside the block removes those that were missing and are empty."""
+    """Make the folders above a path; if the block raises, remove those that were missing and are empty."""
     made = _make_parents(path)
     try:
         yield
@@ -235,7 +234,7 @@ def _parents(path: Path) -> Iterator[None]:
 
 
 def _make_parents(path: Path) -> list[Path]:
-    """Make the folders above a path; returns those that were missing, the innermost first."""
+    """Make the folders above a path; return those that were missing, the innermost first."""
     missing = [folder for folder in path.parents if not os.path.lexists(folder)]
     path.parent.mkdir(parents=True, exist_ok=True)
     return missing
@@ -248,7 +247,7 @@ def _remove_empty(folders: list[Path]) -> None:
 
 
 def _kind(path: Path) -> str:
-    """Say in words what is at a path."""
+    """Return in words what is at a path: a link, folder or file."""
     if path.is_symlink():
         return "a link"
     return "a folder" if path.is_dir() else "a file"
@@ -260,7 +259,7 @@ def writing(
     expected: str = "a writable folder",
     advice: str = "Make room, or name another --out folder",
 ) -> Iterator[None]:
-    """Turn an OSError of writing ``path``, as of a full disk, into a TactileError with `expected` and `advice`."""
+    """Raise an OSError of the block, as of a full disk, as TactileError on ``path``, with `expected` and `advice`."""
     try:
         yield
     except OSError as error:

@@ -23,7 +23,7 @@ _DIGITS = 64
 
 
 def write_checksum(path: Path, rows: int | None = None) -> str:
-    """Write the checksum, and where given the number of rows, into the user block of a closed file; return the hash."""
+    """Write the SHA-256 of a closed file and, if given, its number of rows into its user block; return the SHA-256."""
     digest = _digest(path, rows)
     with open(path, "rb+") as file:
         file.write(_line(digest, rows))
@@ -31,7 +31,7 @@ def write_checksum(path: Path, rows: int | None = None) -> str:
 
 
 def verified_checksum(path: Path) -> str | None:
-    """Return a file's hash if its own first bytes state the same; None if it is missing, cut or changed."""
+    """Return the SHA-256 that a file states if its content still has it; None if it is missing, cut or changed."""
     try:
         digest, rows = stated(path)
         return digest if digest is not None and _digest(path, rows) == digest else None
@@ -40,8 +40,7 @@ def verified_checksum(path: Path) -> str | None:
 
 
 def stated(path: Path) -> tuple[str | None, int | None]:
-    """Return the hash and the number of rows that a file's first bytes state, without checking that its content still
-    matches; None for either where there is none."""
+    """Return the SHA-256 and the number of rows that a file states, None if it states none; nothing is checked."""
     try:
         with outside.open_file(path) as file:
             room = file.read(ROOM)
@@ -67,7 +66,7 @@ def _digest(path: Path, rows: int | None) -> str:
 
 
 def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write arrays by name, in the order of their names; the same arrays give the same bytes."""
+    """Write arrays, name -> array, to a checksummed HDF5 file; the same arrays give the same bytes."""
     import h5py
 
     memory = io.BytesIO()
@@ -80,7 +79,7 @@ def write(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def read(file: Path, rows: Any = (), names: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
-    """Read arrays by name: all, or those in `names`, and of each all rows, or those that `rows`, an index, selects.
+    """Return the arrays in a file, name -> array: all, or those in `names`; rows : index that selects their rows
     Raises TactileError for a damaged file."""
     import h5py
 
@@ -103,7 +102,7 @@ def write_files(file: Path, folder: Path) -> None:
 
 
 def unpack(file: Path, folder: Path) -> None:
-    """Unpack a pack's files into a folder that has none of those names. Raises TactileError for a damaged pack."""
+    """Unpack the files of a pack into a folder that has none of their names. Raises TactileError for damage."""
     for name, content in read(file).items():
         path = folder / name
         if not path.resolve().is_relative_to(folder.resolve()):

@@ -30,13 +30,13 @@ def available() -> bool:
 
 
 def add_scaled(total: Any, factor: Any, line: Any) -> None:
-    """Add ``factor`` times line (n,) to ``total`` (n,), in place; in loops compiled without a copy."""
+    """Add ``factor`` times line (n,) to ``total`` (n,) in place, without a copy in compiled loops."""
     total += factor * line
 
 
 @functools.cache
 def _teach_numba() -> None:
-    """Give numba an ``add_scaled`` of our own: the one it compiles by itself takes twice as long."""
+    """Make numba compile ``add_scaled`` to a plain loop: what it makes by itself takes twice as long."""
     import numba.extending
 
     @numba.extending.overload(add_scaled)
@@ -49,11 +49,10 @@ def _teach_numba() -> None:
 
 
 class Loop:
-    """A function that is compiled when that pays; other threads may run during the compilation.
+    """A function that numba compiles once that pays; other threads may run during the compilation.
 
-    waits : false to compile it at its first call: for loops that may run long whatever the size of their arrays
-    The function must hold no ``**``: compiled code rounds powers otherwise.
-    """
+    waits : false to compile it at its first call, for loops that may run long whatever the size of their arrays
+    The function must hold no ``**``: compiled code rounds powers otherwise."""
 
     def __init__(self, function: Callable[..., Any], *, waits: bool = True) -> None:
         functools.update_wrapper(self, function)
@@ -62,7 +61,7 @@ class Loop:
         self._spent = 0.0  # s, uncompiled
 
     def __call__(self, *arguments: Any) -> Any:
-        """Run the function, uncompiled where numba is missing or switched off, or compiling does not pay yet."""
+        """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
         return self._run(*arguments) if available() else self._function(*arguments)
 
     def _first_call(self, *arguments: Any) -> Any:
@@ -78,7 +77,7 @@ class Loop:
         return self._run(*arguments)
 
     def _never_waits(self) -> bool:
-        """Return true if it is on disk, is to be compiled at once, or would give other bits uncompiled."""
+        """Return true if its compiled code is on disk, it must not wait, or plain Python would give other bits."""
         import numpy as np
 
         exact = np.lib.NumpyVersion(np.__version__) >= "2.0.0"  # before, a float32 times a number was a float64

@@ -18,7 +18,7 @@ _INSTALLED = f"share/tactile/scenes/{_ONE}"  # as pyproject.toml's data-files ha
 
 
 def folder() -> Path:
-    """Return the folder of the example scenes. Raises TactileError where this installation has none."""
+    """Return the folder of the example scenes. Raises TactileError if this installation has none."""
     beside = Path(__file__).resolve().parents[2] / "scenes"
     if (beside / _ONE).is_file():
         return beside
@@ -29,15 +29,15 @@ def folder() -> Path:
 
 
 def described() -> list[str]:
-    """Return a line on each scene: its name and what it is."""
+    """Return a line for each scene: its name and its description."""
     found = {name: _about(folder() / name) for name in _names()}
     width = max(map(len, found))
     return [f"{name:<{width}}  {text}" for name, text in found.items()]
 
 
 def copy(names: Sequence[str], out: str | Path) -> list[Path]:
-    """Copy the scenes called `names`, all if none, to ``out``/NAME, each whole; returns these folders. Raises
-    TactileError for unknown names, and where a folder exists."""
+    """Copy the scenes called `names`, or all if there are none, to ``out``/NAME, each whole; return these folders.
+    Raises TactileError for unknown names, and for a folder that exists."""
     known = _names()
     for name in names:
         if name not in known:
@@ -64,7 +64,7 @@ def _about(scene: Path) -> str:
 
 
 def _installed_files() -> list[Path]:
-    """List the installed package's files; none where it has no metadata."""
+    """Return the scene files of the installed package; none if it has no metadata."""
     from importlib import metadata
 
     try:

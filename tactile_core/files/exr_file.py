@@ -15,7 +15,7 @@ HEIGHT_CHANNELS = ("height", "Y", "Z", "R")  # where a height map of others is l
 
 
 def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about: Mapping[str, str]) -> None:
-    """Write channels (H, W) as float32, lossless, whole or not at all; about : attributes, text by name."""
+    """Write channels, name -> (H, W), as float32, whole or not at all; about : name -> text, the attributes"""
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **about}
@@ -25,7 +25,7 @@ def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:
-    """Read channels (H, W) by name, unchanged, and the text attributes; raises TactileError for another file."""
+    """Return an EXR file's channels, name -> (H, W), and text attributes. Raises TactileError for other files."""
     import OpenEXR
 
     try:
@@ -44,7 +44,7 @@ def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, 
 
 
 def _check_size(path: str | os.PathLike) -> None:
-    """Raise ValueError for a file whose parts declare more than MOST_BYTES in all, and for deep ones."""
+    """Raise ValueError for a deep EXR file, and for one whose parts declare over `MOST_BYTES` in all."""
     import OpenEXR
 
     size, flat = 0, (OpenEXR.scanlineimage, OpenEXR.tiledimage)
@@ -59,7 +59,7 @@ def _check_size(path: str | os.PathLike) -> None:
 
 
 def read_height(path: str | os.PathLike) -> np.ndarray:
-    """Read heights (H, W) m of an EXR file: its only channel, or the first of height, Y, Z, R; else TactileError."""
+    """Return heights (H, W) m: the only channel of an EXR file, or the first of height, Y, Z, R; else TactileError."""
     planes, _ = read_exr(path)
     if len(planes) == 1:
         return next(iter(planes.values()))

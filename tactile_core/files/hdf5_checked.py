@@ -34,9 +34,9 @@ MAX_OPENING = 128 * 2**20  # bytes that names and headers may take (assumed enou
 
 @contextmanager
 def bounded_memory(more: int) -> Iterator[None]:
-    """Limit the process to ``more`` bytes beyond its present data; larger allocations fail. Linux only: macOS and
-    Windows have no such limit within a process. Main thread only: in a Dask worker, which has its own limit, the work
-    of other threads would fail too."""
+    """Let the process take at most ``more`` bytes beyond its present data in the block; larger allocations fail. It
+    acts on Linux, in the main thread alone: other systems have no such limit, and in a Dask worker, which has its own,
+    other threads' work would fail."""
     if not sys.platform.startswith("linux") or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -55,15 +55,14 @@ def bounded_memory(more: int) -> Iterator[None]:
 
 @contextmanager
 def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
-    """Open an HDF5 file to read. Raises h5py's errors, and TactileError where it may take more memory than it declares.
+    """Open an HDF5 file to read. Raises h5py's errors, and TactileError for what may take more memory than it declares.
 
-    Refused: datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters other
-    than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. Reading a row then takes at
-    most one chunk of memory beyond the row, reading a dataset takes its declared size, which the caller has to limit:
-    see ``declared``. Every object is opened once under `bounded_memory`: fuzzing found two kinds of file with which the
-    HDF5 library (up to 2.0) uses up all memory, one with driver information of up to 4 GB, one whose list of free
-    places one changed byte makes circular.
-    """
+    Refused are datasets in other files (external links, external or virtual storage), chunks of over 256 MB, filters
+    other than gzip, lzf, shuffle and checksums, and chunks that unpack to more than their size. To read a row then
+    takes at most one chunk beyond the row; a dataset takes its declared size, which the caller has to limit by
+    ``declared``. Every object is opened once under `bounded_memory`: fuzzing found two kinds of file with which the
+    HDF5 library (up to 2.0) uses up all memory, one with driver information of up to 4 GB, one with a circular list of
+    free places."""
     import h5py
 
     outside.check(path, "an HDF5 file")
@@ -79,7 +78,7 @@ def open_checked(path: str | os.PathLike) -> Iterator[h5py.File]:
 
 
 def _visit(place: h5py.File | h5py.h5g.LinkProxy, path: str | os.PathLike, check: Callable) -> None:
-    """Call check(path, name, item) for all objects of a file, or all links; raises the first error that it returns."""
+    """Call check(path, name, item) for all objects of a file, or all links; raise the first error that it returns."""
     links = {} if hasattr(place, "visititems") else {"info": True}
     visit = place.visit if links else place.visititems
     try:
@@ -91,7 +90,7 @@ def _visit(place: h5py.File | h5py.h5g.LinkProxy, path: str | os.PathLike, check
 
 
 def declared(data: h5py.Dataset, where: str) -> None:
-    """Raise TactileError, of ``where``, for a dataset that declares more data than its stored bytes can unpack to."""
+    """Raise TactileError, on ``where``, for a dataset that declares more than its stored bytes can unpack to."""
     stored = data.id.get_storage_size()
     if data.size * data.dtype.itemsize > MAX_RATIO * stored + STEP:
         found = f"shape {data.shape} in {stored} stored bytes"
@@ -99,7 +98,7 @@ def declared(data: h5py.Dataset, where: str) -> None:
 
 
 def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
-    """Return a dataset's array, or some rows, in small parts. TactileError for a row of over MOST_CHUNKS chunks."""
+    """Return a dataset's array, or some rows, read in small parts. Raises TactileError for a row of too many chunks."""
     if data.chunks is None or not data.ndim:
         return data[()] if rows is None else data[rows]
     start, stop, _ = (rows or slice(None)).indices(len(data))
@@ -113,7 +112,7 @@ def read_rows(data: h5py.Dataset, rows: slice | None = None) -> np.ndarray:
 
 
 def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -> TactileError | None:
-    """Return what is wrong with a link, before the library follows it; None for a good one."""
+    """Return the error of a link to another file or too deep, before the library follows it; None for a good one."""
     import h5py
 
     if name.count(b"/") >= MAX_DEPTH:
@@ -124,8 +123,8 @@ def _check_link(path: str | os.PathLike, name: bytes, link: h5py.h5l.LinkInfo) -
 
 
 def _check(path: str | os.PathLike, name: str, data: h5py.Dataset | h5py.Group) -> list:
-    """Refuse a dataset with values elsewhere, large chunks or unknown filters. Returns [(name, dataset, bytes of a
-    chunk, filters)] where its chunks are to be unpacked, else []."""
+    """Return [(name, dataset, bytes of a chunk, filters)] if a dataset's chunks are packed, else []. Raises
+    TactileError for values in other files, large chunks and unknown filters."""
     if not hasattr(data, "chunks"):
         return []
     layout = data.id.get_create_plist()
@@ -144,7 +143,7 @@ def _check(path: str | os.PathLike, name: str, data: h5py.Dataset | h5py.Group) 
 
 
 def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None:  # noqa: ANN001
-    """Raise TactileError for a packed chunk that unpacks to more than its size, unless it is small enough."""
+    """Raise TactileError for a packed chunk that may take over `MAX_CHUNK` and unpacks to more than its size."""
     if MAX_RATIO * chunk.size <= MAX_CHUNK:
         return
     if chunk.size > size + size // 8 + STEP:  # packing makes hardly more of what it cannot pack
@@ -154,7 +153,7 @@ def _check_chunk(path, name, data, chunk, size: int, filters: list[int]) -> None
 
 
 def _unpacked(packed: bytes, limit: int) -> int:
-    """Count the bytes that a deflate stream unpacks to, stopping just beyond `limit`."""
+    """Return the number of bytes that a deflate stream unpacks to, counted until just beyond `limit`."""
     unpacker, count = zlib.decompressobj(), 0
     try:
         while packed and not unpacker.eof and count <= limit:

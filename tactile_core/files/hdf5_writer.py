@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Disk(io.FileIO):
-    """File object for HDF5 that hides a full disk from the library; `check` reports it. HDF5 cannot close a file whose
+    """File for HDF5 that hides the disk's errors from the library; `check` raises them. HDF5 cannot close a file whose
     writing failed: it keeps the space on the disk and crashes at exit (seen with HDF5 1.14 and packed datasets). With
     this object it always closes; the file is thrown away."""
 
@@ -28,7 +28,7 @@ class Disk(io.FileIO):
             raise OSError(self._failure.errno, self._failure.strerror, str(self._path)) from self._failure
 
     def write(self, data: Any) -> int:
-        """Write all of the data like any file, but without raising: `check` raises the error."""
+        """Write all of the data as any file does; an error of the disk is kept for `check`."""
         rest = memoryview(data).cast("B")
         count = len(rest)
         try:
@@ -39,7 +39,7 @@ class Disk(io.FileIO):
         return count
 
     def truncate(self, size: int | None = None) -> int:
-        """Truncate like any file, but without raising: `check` raises the error."""
+        """Truncate as any file does; an error of the disk is kept for `check`."""
         try:
             return super().truncate(size)
         except OSError as error:
@@ -49,9 +49,9 @@ class Disk(io.FileIO):
 
 @contextmanager
 def new_hdf5(path: Path, attributes: Mapping[str, Any], room: int = 0) -> Iterator[tuple[h5py.File, Disk]]:
-    """Yield a new file, and its disk to `check` between its parts; the end of the block closes it.
-    attributes : of its root; room : bytes before the HDF5 part, 0, 512 or a doubling of it
-    Raises what the block raises; but the disk's OSError where HDF5 fails by it first."""
+    """Yield a new HDF5 file, and its `Disk` to check between parts; the end of the block closes it.
+    attributes : those of its root; room : bytes before the HDF5 part: 0, 512, 1024 and so on
+    Raises what the block raises, or the disk's OSError if HDF5 failed by that."""
     import h5py
 
     with Disk(path) as disk:

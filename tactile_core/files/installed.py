@@ -1,5 +1,5 @@
-"""Advice on how to install an extra, by how this package was installed (its name is not on the package index), and the
-modules that a package holds: a format, layout, job or indenter is one file there."""
+"""Advise how to install an extra, by how this package was installed (its name is not on the package index); and import
+the modules in a package: a format, layout, job or indenter is one file there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ PACKAGE = "tactile-core"
 
 
 def advice(extra: str) -> str:
-    """Return, for a message, the command that installs an extra: in the checkout, or each library by its own name."""
+    """Return the command, for a message, that installs an extra: in the checkout, or each library by its own name."""
     root = checkout()
     size = " (torch on Linux fetches CUDA's libraries too, some GB)" if extra == "train" else ""
     if root is not None:
@@ -27,14 +27,14 @@ def advice(extra: str) -> str:
 
 
 def checkout() -> Path | None:
-    """Return the folder of the checkout that this package is run from; None where it was installed from a wheel."""
+    """Return the folder of the checkout that this package runs from; None if it was installed from a wheel."""
     root = Path(__file__).resolve().parents[2]
     return root if (root / "pyproject.toml").is_file() and (root / "constraints.txt").is_file() else None
 
 
 @contextmanager
 def needing(extra: str) -> Iterator[None]:
-    """Add how to install the extra as a note to a ModuleNotFoundError raised in the block."""
+    """Add a note on how to install the extra to a ModuleNotFoundError of the block."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -43,14 +43,14 @@ def needing(extra: str) -> Iterator[None]:
 
 
 def require(extra: str, library: str) -> None:
-    """Raise ModuleNotFoundError, with how to install the extra, where its ``library`` is missing; imports nothing."""
+    """Raise ModuleNotFoundError, with how to install the extra, if its ``library`` is missing; import nothing."""
     with needing(extra):
         if find_spec(library) is None:
             raise ModuleNotFoundError(f"No module named {library!r}", name=library)
 
 
 def libraries(extra: str) -> list[str]:
-    """List the requirements of an extra, quoted where a shell needs it; [] where the package has no metadata."""
+    """Return the requirements of an extra, quoted if a shell needs it; [] if the package has no metadata."""
     from importlib import metadata
 
     try:
@@ -69,6 +69,6 @@ def libraries(extra: str) -> list[str]:
 
 @cache
 def modules_of(package: str) -> dict[str, ModuleType]:
-    """Import all modules of a package, given by its full name; return name -> module, in the order of names."""
+    """Import all modules of a package, given by its full name; return name -> module, in the order of their names."""
     names = sorted(info.name for info in pkgutil.iter_modules(importlib.import_module(package).__path__))
     return {name: importlib.import_module(f"{package}.{name}") for name in names}

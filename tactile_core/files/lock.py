@@ -1,4 +1,4 @@
-"""Lock that allows one job per folder; the system drops it when its holder dies."""
+"""Locks that allow one job per folder; the system drops a lock when its holder dies."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ FILE = ".tactile-batch-lock"
 @contextlib.contextmanager
 def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
     """Hold the lock of a job's folder; with `part` (i, n) share it with the job's other parts, as in a queue's array.
-    Raises TactileError where another job, or the same part, is running. On a network file system the lock works only
-    if that forwards locks (NFS 4 and Lustre with flock do)."""
+    Raises TactileError if another job, or the same part, is running. On a network file system it works if that forwards
+    locks (NFS 4 and Lustre with flock do)."""
     with contextlib.ExitStack() as stack:
         if part is None:
             stack.enter_context(_lock(folder / FILE, folder, shared=False))
@@ -29,7 +29,7 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def awaited(file: Path) -> Iterator[None]:
-    """Wait for the lock on ``file``, which stays, and hold it; on a file system without locks nobody waits."""
+    """Wait for the lock on ``file`` and hold it; the file stays. On a file system without locks nobody waits."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         with contextlib.suppress(OSError):
@@ -41,7 +41,8 @@ def awaited(file: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
-    """Hold a lock on ``file``, which stays afterwards: a lock on a file that others remove protects nothing."""
+    """Hold a lock on ``file``, shared or not; the file stays, as one that others remove would protect nothing. Raises
+    TactileError, on `where`, if another process holds it."""
     descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         take(descriptor, shared=shared)
@@ -56,8 +57,8 @@ def _lock(file: Path, where: str | Path, shared: bool) -> Iterator[None]:
 
 
 def take(descriptor: int, *, shared: bool = False) -> None:
-    """Lock an open file, given by its descriptor, without waiting; raises OSError where another process holds its lock.
-    shared : true allows other processes that share the lock, too"""
+    """Lock an open file, by its descriptor, without waiting. Raises OSError if another process has locked it.
+    shared : true allows other shared locks on it"""
     if os.name == "nt":
         import msvcrt
 

@@ -24,13 +24,13 @@ MOST_DOTS = 100  # in a TOML key; tomllib's time grows with the square of them (
 
 
 def check(path: str | os.PathLike, expected: str = "a regular file") -> os.stat_result:
-    """Return a file's status. Raises TactileError, which says what was `expected`, for a pipe, socket or device, and
-    OSError for a missing file or a folder; links are followed."""
+    """Return a file's status; links are followed. Raises TactileError, with what was `expected`, for a pipe, socket or
+    device, and OSError for a missing file or a folder."""
     return _regular(path, os.stat(path), expected)
 
 
 def open_file(path: str | os.PathLike, expected: str = "a regular file") -> BufferedReader:
-    """Open a regular file to read its bytes, without waiting. Raises as `check` does."""
+    """Open a regular file's bytes, without waiting. Raises TactileError for a pipe, socket or device, and OSError."""
     check(path, expected)  # before opening: some devices act when they are opened
     file = open(path, "rb", opener=_open)  # noqa: SIM115 - the caller closes it
     try:
@@ -42,7 +42,7 @@ def open_file(path: str | os.PathLike, expected: str = "a regular file") -> Buff
 
 
 def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -> bytes:
-    """Read a file of at most ``most`` bytes. Raises what `open_file` raises, and TactileError for a longer file."""
+    """Return a file's bytes, at most ``most``. Raises TactileError for a longer or no regular file, and OSError."""
     with open_file(path, expected) as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -51,17 +51,17 @@ def read(path: str | os.PathLike, most: int, expected: str = "a regular file") -
 
 
 def read_small(path: str | os.PathLike, most: int = MOST_TEXT) -> str:
-    """Read UTF-8 text, at most `most` bytes, no byte-order mark. Raises OSError, UnicodeDecodeError, TactileError."""
+    """Return UTF-8 text of at most `most` bytes. Raises OSError, UnicodeDecodeError, and TactileError as `read`."""
     return read(path, most, "a text file").decode("utf-8-sig")
 
 
 def toml_quoted(text: str) -> str:
-    """Quote text as a TOML basic string: JSON's escapes are valid there, its ASCII keeps names that are no UTF-8."""
+    """Return text as a TOML string: JSON's escapes are valid there, and its ASCII keeps names that are no UTF-8."""
     return json.dumps(text.encode(errors="replace").decode())
 
 
 def toml_value(value: Any, scale: float = 1.0) -> str:
-    """Format a text, a number with six digits, or a list of such as TOML; numbers times ``scale``."""
+    """Return a text, number (six digits) or list of these as TOML; numbers are multiplied by ``scale``."""
     if isinstance(value, str):
         return toml_quoted(value)
     if isinstance(value, list | tuple):
@@ -70,7 +70,7 @@ def toml_value(value: Any, scale: float = 1.0) -> str:
 
 
 def read_toml_text(path: str | os.PathLike) -> str:
-    """Read a TOML file by `read_small`. Raises TactileError, also for a key of over a hundred parts."""
+    """Return the text of a TOML file, raising as `read_small`; and TactileError for a key of over a hundred parts."""
     text = read_small(path)
     if any(piece.count(".") > MOST_DOTS for piece in re.split(r"[=,#{}\[\]\n]", text)):
         raise TactileError(path, f"a key of over {MOST_DOTS} parts", "short keys")
@@ -78,8 +78,8 @@ def read_toml_text(path: str | os.PathLike) -> str:
 
 
 def inside(folder: str | os.PathLike, name: str, expected: str = "a regular file") -> Path:
-    """Return the path of a file, existing or not, in a third-party folder. Raises TactileError, which says what was
-    `expected`, if it leads out."""
+    """Return the path of a file, existing or not, in a stranger's folder. Raises TactileError, with what was
+    `expected`, if it leads out of the folder."""
     path = Path(folder) / name
     try:
         within = path.resolve().is_relative_to(Path(folder).resolve())
@@ -111,7 +111,7 @@ def _size(count: int) -> str:
 def damage_reported(
     where: str | os.PathLike, what: str, advice: str = "Copy or export the recording again"
 ) -> Iterator[None]:
-    """Turn a library's error in the block into a TactileError: `where`, a file or part of one, "damaged `what`".
+    """Raise a library's error of the block as TactileError: `where`, a file or a part of one, is "damaged `what`".
     TactileError and MemoryError pass."""
     try:
         yield

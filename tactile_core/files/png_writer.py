@@ -25,12 +25,12 @@ UP = 2  # PNG's filter of each row: less the row above, modulo 256
 
 
 def write_png(file: str | os.PathLike, picture: np.ndarray) -> None:
-    """Write a picture (H, W, 3) uint8 to a file. Raises OSError where the disk refuses."""
+    """Write a picture (H, W, 3) uint8 to a PNG file. Raises OSError if the disk refuses."""
     Path(file).write_bytes(pack_png(picture))
 
 
 def pack_png(picture: np.ndarray, packing: Mapping[str, int] = PACKING) -> bytes:
-    """Pack a picture (H, W, 3) uint8 as a PNG; packing : options of Pillow's PNG, used without libdeflate."""
+    """Return the PNG of a picture (H, W, 3) uint8; packing : options of Pillow's PNG, used without libdeflate"""
     if _has_libdeflate():
         return _packed(picture)
     from PIL import Image
@@ -46,7 +46,7 @@ def _has_libdeflate() -> bool:
 
 
 def _packed(picture: np.ndarray) -> bytes:
-    """Pack a picture (H, W, 3) uint8 by libdeflate, every row filtered by the one above."""
+    """Return the PNG of a picture (H, W, 3) uint8, packed by libdeflate, each row less the one above."""
     import deflate
 
     height, width, _ = picture.shape
@@ -58,8 +58,8 @@ def _packed(picture: np.ndarray) -> bytes:
 
 
 def png_file(size: tuple[int, int], depth: int, color: int, packed: bytes) -> bytes:
-    """Return the bytes of a PNG of ``size`` (width, height) px. depth : bits of a value; color : 0 grey, 2 red, green
-    and blue; packed : by zlib, its rows, each behind the number of its filter"""
+    """Return the bytes of a PNG of ``size`` (width, height) px. depth : bits of a value; color : 0 grey, 2 RGB
+    packed : zlib's output for its rows, each behind the number of its filter"""
     head = struct.pack(">IIBBBBB", *size, depth, color, 0, 0, 0)
     chunks = b"IHDR" + head, b"IDAT" + packed, b"IEND"
     return SIGNATURE + b"".join(

@@ -1,4 +1,4 @@
-"""Provenance of a result: hashes of its input files, versions of libraries, the machine."""
+"""Describe where a result comes from: hashes of its input files, versions of libraries, the machine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .version import __version__
 
 
 def sha256(path: str | os.PathLike) -> str:
-    """Hash of a file's bytes; for a folder (a bag), hash of its files' names and hashes."""
+    """Return the SHA-256 of a file's bytes; for a folder (a bag) that of its files' hashes and names."""
     import hashlib
 
     if os.path.isdir(path):
@@ -22,12 +22,12 @@ def sha256(path: str | os.PathLike) -> str:
 
 
 def entry(path: str | os.PathLike) -> dict[str, str]:
-    """Return ``file``, its name without folders, and ``sha256``, hash of its content, for a result's note."""
+    """Return, for a result's note, ``file``, the name without folders, and ``sha256``, the hash of its content."""
     return {"file": os.path.basename(path), "sha256": sha256(path)}
 
 
 def versions(*more: str) -> dict[str, str]:
-    """Return name -> version of what can change a result's bytes: this package, Python, numpy, h5py, libraries more."""
+    """Return name -> version of what can change a result: this package, Python, numpy, h5py, libraries `more`."""
     import importlib
     import platform
 
@@ -44,7 +44,7 @@ def machine() -> dict[str, str | int | None]:
 
 
 def _processor() -> str:
-    """Name of the processor; Linux gives it only in /proc."""
+    """Return the name of the processor; Linux has it only in /proc."""
     import platform
 
     try:

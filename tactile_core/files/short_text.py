@@ -1,4 +1,4 @@
-"""Short texts: of what messages quote, and of results that hold large arrays, for ``print`` and notebooks."""
+"""Shorten texts: what messages quote, and results that hold large arrays, for ``print`` and notebooks."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ LONGEST = 9  # numbers: an array up to this long (a force, a rotation) is writte
 
 
 def shown(text: str) -> str:
-    """Quote the text for a message, cut when long."""
+    """Return the text quoted for a message, cut if it is long."""
     return repr(text if len(text) <= SHOWN else text[:SHOWN] + "…")
 
 
 def listed(names: Sequence[str], most: int = 8) -> str:
-    """Join names by commas for a message: the first `most`, then how many more there are."""
+    """Return names joined by commas for a message: the first `most`, then how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 

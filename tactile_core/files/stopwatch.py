@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Sums by stage of wall time, `seconds`, and of this process's CPU time, `cpu_seconds`; a stage may come again."""
+    """Sums, by the stage's name, of wall time (`seconds`) and of this process's CPU time (`cpu_seconds`)."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -16,7 +16,7 @@ class Stopwatch:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Add the time of the block to the stage ``name``."""
+        """Add the time that the block takes to the stage ``name``."""
         start, cpu_start = time.perf_counter(), time.process_time()
         try:
             yield
@@ -25,7 +25,7 @@ class Stopwatch:
             self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + time.process_time() - cpu_start
 
     def per_frame(self, count: int) -> dict[str, dict[str, float]]:
-        """Return ms per frame (of `count`): ms_a_frame, by the wall clock, cpu_ms_a_frame; each by stage, and all."""
+        """Return ms per frame, of `count`: ms_a_frame by the wall clock, cpu_ms_a_frame; by stage, and in all."""
         return {"ms_a_frame": _per_frame(self.seconds, count), "cpu_ms_a_frame": _per_frame(self.cpu_seconds, count)}
 
 

@@ -18,7 +18,7 @@ ONE = dict.fromkeys(VARIABLES, "1")
 
 
 def one_thread() -> threadpoolctl.threadpool_limits:
-    """Keep linear algebra in one thread: libraries loaded already, and by the environment those loaded later.
+    """Keep linear algebra in one thread: that of libraries loaded already, and by the environment those loaded later.
 
     It stays so for good, or for a block with the returned context manager (the environment stays). The same input then
     gives the same bytes in every process of a machine. A frame or contact gains nothing by several threads: on a busy
@@ -59,8 +59,8 @@ if hasattr(os, "register_at_fork"):  # a child has none of the threads that are 
 
 @functools.cache
 def _libraries(scipy_is_loaded: bool) -> list[threadpoolctl.LibController]:
-    """Find the libraries of linear algebra that are loaded; scipy brings one of its own. None where Blender has
-    none of the extension's wheels."""
+    """Return the loaded libraries of linear algebra, of which scipy brings its own; [] without threadpoolctl, as in a
+    Blender without the extension's wheels."""
     if importlib.util.find_spec("threadpoolctl") is None:
         return []
     import threadpoolctl
@@ -69,8 +69,8 @@ def _libraries(scipy_is_loaded: bool) -> list[threadpoolctl.LibController]:
 
 
 def _set_threads(library: threadpoolctl.LibController, count: int) -> None:
-    """Set a library's number of threads, from any thread: threadpoolctl keeps that to the first one that did, since
-    version 3.7, until told otherwise."""
+    """Set a library's number of threads, from any thread: since version 3.7 threadpoolctl lets only the first thread
+    that set it do so, until told otherwise."""
     free = getattr(library, "clear_controlling_thread", None)
     if free is not None:
         free(force=True)

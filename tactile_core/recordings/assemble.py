@@ -203,7 +203,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
-    """Return sentences on the first `SHOWN` problems, by row_word ("line" or "frame"), and on how many more there are."""
+    """Return sentences on the first `SHOWN` problems, by row_word ("line" or "frame"), and on how many follow."""
     sentences = [
         f"{row_word} {p.row}, {p.field}: {p.found}; "
         + ("interpolated from the frames around it" if p.essential else "left empty")

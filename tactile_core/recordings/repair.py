@@ -116,7 +116,7 @@ def _is_flat_jump(samples: np.ndarray, neighbour_step: np.ndarray | float) -> np
 
 
 def _leaves_usual(column: np.ndarray, first: int, last: int) -> bool:
-    """Return true if the run between samples `first` and `last` of column (T,) leaves the level around; a gap does not."""
+    """Return true if the run between samples `first` and `last` of column (T,) leaves the level around it."""
     samples = column[first : last + 1]
     jump = min(abs(samples[1] - samples[0]), abs(samples[-1] - samples[-2]))
     usual = np.median(column[max(0, first - STUCK) : last + 1 + STUCK])

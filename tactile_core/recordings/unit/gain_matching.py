@@ -2,7 +2,8 @@
 
 In turns, each frame is assigned its nearest simulated signal, and each electrode the gain that fits its readings to
 these, until nothing changes (as in k-means and iterated closest points). Whole frames are matched, so a recording may
-hold any mixture of contacts; matching each electrode's distribution would take a finger touched in one place for wrong gains."""
+hold any mixture of contacts; matching each electrode's distribution would take a finger touched in one place for wrong
+gains."""
 
 from __future__ import annotations
 
