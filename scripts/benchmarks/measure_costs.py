@@ -38,7 +38,7 @@ SETS = {  # what is added -> the outputs asked for, each beside those before it
 
 
 class Part(NamedTuple):
-    """Measured cost. start : CPU s before the first frame; ms : CPU per frame; mb : peak memory; kb : disk per frame"""
+    """Measured cost. start : CPU s before the first frame; ms : CPU ms a frame; mb : MB, peak; kb : kB disk a frame"""
 
     start: float
     ms: float
@@ -69,19 +69,20 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
-    """Return a ball's path over the pad, rows (s, x mm, z mm, N): a frame at 0 N, then ``contacts`` at ``force`` N."""
+    """Return a ball's path, rows (s, x mm, z mm, N): a frame at 0 N, then ``contacts`` frames at ``force`` N."""
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 
 def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """Return a part's cost at its start and per frame; costs, sizes (bytes), frames : of a run on few, then on many"""
+    """Return a part's cost at its start and per frame, by a straight line through two runs.
+    costs, sizes (bytes), frames : pairs, of a run on few frames and of one on many"""
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
 
 
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
-    """Measure the cost of `tactile simulate --keep`; folder : scratch; keep : the outputs; force : N, of the ball"""
+    """Measure the cost of `tactile simulate --keep KEEP` under a ball; folder : for scratch files; force : N"""
     costs, sizes = [], []
     scene, out = folder / "scene", folder / "out.h5"
     scene.mkdir(exist_ok=True)
@@ -94,8 +95,8 @@ def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
 
 
 def conversions(folder: Path) -> dict[str, Part]:
-    """Measure time, memory and bytes of `convert --keep` for each kind of output ("convert_latent") and of the fast
-    picture ("render_fast"), with each number of frames of `FRAMES`; folder : scratch"""
+    """Measure `convert --keep` for each kind of output ("convert_latent", ...) and the fast picture ("render_fast"), on
+    the numbers of frames `FRAMES`; return name -> cost. folder : for scratch files"""
     found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}
@@ -111,14 +112,14 @@ def conversions(folder: Path) -> dict[str, Part]:
 
 
 def full_tier() -> dict[str, dict[str, float]]:
-    """Measure the full tier's CPU ms a contact at a force, by sensor: "smooth", and "rough" with friction 0.78."""
+    """Measure the full tier's CPU ms per contact at a given force: sensor -> "smooth" and, with friction, "rough"."""
     ways = {"smooth": 0.0, "rough": FRICTION}
     sensors: tuple[Sensor, ...] = "biotac", "digit"
     return {sensor: {way: contact_ms(sensor, friction) for way, friction in ways.items()} for sensor in sensors}
 
 
 def contact_ms(sensor: Sensor, friction: float) -> float:
-    """Return the mean CPU time of a contact of the full tier at FORCES, ms. friction : Coulomb's coefficient"""
+    """Return the CPU ms per contact that the full tier takes at FORCES, the mean. friction : Coulomb's coefficient"""
     began = time.process_time()
     for force in FORCES:
         solve(sensor, Sphere(3.5e-3), Placement(-8e-3, 0.0, 0.0), force=force, tier="full", friction=friction)
@@ -126,7 +127,7 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
 
 
 def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
-    """Return two rows per part, ms per frame and MB; and a row for each time, ms, in ``full``, of ``full_tier``."""
+    """Return report rows: ms per frame and MB of each part, and each time, ms, in ``full``, by ``full_tier``."""
     rows = []
     for name, part in parts.items():
         rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))

@@ -1,14 +1,14 @@
-"""Measure contacts in a simulator's loop: alone and along paths, their pictures, and whole steps of a ``Gel``.
+"""Measure what a simulator's loop asks for: contacts, alone and along paths, pictures, whole steps of a ``Gel``.
 
     python scripts/benchmarks/measure_loop.py --count 500 --json FILE   docs/in_the_loop.md's
     python scripts/benchmarks/measure_loop.py --count 18                                  a quick look
 
-Random contacts of nine indenters on each sensor, with friction. Alone: each from nothing. On a path: ten depths to the
-same goal, the first left out. A step and picture: what a simulator's loop asks of a ``Gel`` of the DIGIT, five depths
-to the goal and five slides of 0.1 mm along the finger. As meshes: four bodies by formula and, at the same places and
-depths, as meshes of up to 82,000 triangles, each from nothing, and how long a mesh takes to load. Median, 95 and 99 %
-of CPU and wall ms per contact on one core, warm. Beside them the fast tier's error against the full one
-(`mechanics_tiers.json`). Needs the extra [fem].
+Random contacts of nine indenters on each sensor, with friction. Alone: each is solved without one before. On a path:
+the same depth is reached in ten steps, the first untimed. Step and picture: a ``Gel`` of the DIGIT goes down in five
+steps, then slides along the finger in five of 0.1 mm. Meshes: four bodies by formula and, at the same places and
+depths, as meshes of up to 82,000 triangles, each contact alone; and how long a mesh takes to load. Prints quantiles,
+50, 95 and 99 %, of CPU and wall ms per contact on one core, code compiled before; beside them the fast tier's error
+against the full tier (`mechanics_tiers.json`). Needs the extra [fem].
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def quantiles(times: Times) -> list[float]:
-    """Return median, 95 % and 99 % quantile of CPU ms, then the three of wall ms."""
+    """Return the median, 95 % and 99 % quantile of CPU ms, then the same three of wall ms."""
     return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
 
 def as_rows(name: str, times: Times, error: str) -> list[Row]:
-    """Return six rows, the ``quantiles`` of times; name : what took them; error : of the measured contacts, in words"""
+    """Return six rows, the ``quantiles`` of times. name : what was timed; error : text, of what was timed"""
     of = f"{len(times)} contacts, one core; error {error}"
     labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
     key = f"loop_{name.replace(', ', '_').replace(' ', '_')}"
@@ -86,7 +86,7 @@ def as_rows(name: str, times: Times, error: str) -> list[Row]:
 
 
 def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield each measured thing's name, times, and error in words; count : contacts per sensor"""
+    """Yield name, times and a text on the error of each thing that is measured; count : contacts per sensor"""
     for sensor in ("digit", "biotac"):
         for name, times, error, last in of_sensor(sensor, count):
             yield name, times, error
@@ -97,7 +97,7 @@ def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
 
 
 def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
-    """Yield name, times, error in words and last contacts, of a sensor's ``count`` contacts alone and on paths."""
+    """Yield name, times, a text on the error, and the deepest contacts, of ``count`` contacts alone, then on paths."""
     tier = measured()["tiers"]["fast"][sensor]["bins"][1]
     stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
     for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
@@ -107,8 +107,9 @@ def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[F
 
 
 def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:
-    """Measure ``count`` random contacts, WARM before, in ``steps`` even steps of depth, the first of several untimed.
-    Returns times of the steps, and contacts at the ends, those of WARM first, None where none is found."""
+    """Time ``count`` random contacts, each reached in ``steps`` even steps of depth; of several the first is untimed.
+    Return the steps' times, and the contacts at the last steps, None for one not found. WARM more contacts come first;
+    they are returned, but not timed."""
     times: Times = []
     last = []
     for number, contact in enumerate(random_contacts(count + WARM, SEED)):
@@ -124,8 +125,8 @@ def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContac
 
 
 def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
-    """Yield name, times and remarks of loading four meshes, and of ``count`` contacts of the DIGIT by formula, then as
-    meshes, with the difference of force."""
+    """Yield name, times and a remark: of loading four meshes, of ``count`` contacts of the DIGIT with these bodies by
+    formula, and of the same contacts with the meshes, whose remark is the difference of force."""
     import trimesh
 
     made = trimesh.creation
@@ -169,7 +170,7 @@ def meshes(count: int) -> Iterator[tuple[str, Times, str]]:
 
 
 def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
-    """Yield name, times and error in words of height maps, then of fast pictures, of the contacts' gels."""
+    """Yield name, times and a text on the error of the contacts' height maps, then of their fast pictures."""
     renderer = Renderer(preset="fast")
     mapper = gel_mapper(renderer.camera)
     heights: Times = []
@@ -184,7 +185,7 @@ def pictures(contacts: list[FastContact]) -> Iterator[tuple[str, Times, str]]:
 
 
 def gel_steps(count: int) -> Times:
-    """Time whole steps of a ``Gel``, with their pictures, along paths to ``count`` contacts."""
+    """Return the times of ``count`` steps of a ``Gel`` with their pictures, along paths (``pressed_and_slid``)."""
     times: Times = []
     for number, contact in enumerate(random_contacts(-(-count // STEPS) + WARM, SEED)):
         gel = Gel("digit", contact.indenter)
@@ -210,7 +211,7 @@ def pressed_and_slid(contact: RandomContact) -> list[np.ndarray]:
 
 
 def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:
-    """Return the contact at a depth, m; None where none is found, whose time counts too."""
+    """Return the contact at a depth, m; None if none is found: the time to find that counts too."""
     try:
         found = press.at_depth(depth)
     except (TactileError, UnsolvedError):
@@ -219,7 +220,7 @@ def at_depth(press: CorrectedPress, depth: float) -> FastContact | None:
 
 
 def timed(work: Callable[[], Any]) -> tuple[tuple[float, float], Any]:
-    """Do ``work`` and return (CPU ms, wall ms) of it, and its result."""
+    """Call ``work``; return the (CPU ms, wall ms) that it took, and its result."""
     wall, cpu = time.perf_counter(), time.process_time()
     found = work()
     return (1e3 * (time.process_time() - cpu), 1e3 * (time.perf_counter() - wall)), found

@@ -3,9 +3,9 @@
     python scripts/benchmarks/measure_photographs.py DATA                  DATA holds digit_real, biotac_force ...
     python scripts/benchmarks/measure_photographs.py DATA --parts levels   that part alone; the file's others stay
 
-Fits begin at round numbers (`start.toml`) or at the unit that ships, end on the fast picture, and are tried on
-photographs that they have not seen. `levels` compares how dark, bright and colourful photographs are with pictures of
-real recordings; `told_apart`, how well a classifier tells the two (scikit-learn).
+Calibrations are fitted, by the fast preset, from round numbers (`start.toml`) or from the unit that ships, and are
+judged on photographs that were not fitted. `levels` compares how dark, bright and colourful photographs are with
+pictures of real recordings; `told_apart` measures how well a classifier tells the two apart (scikit-learn).
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ def own_unit(data: Path) -> Photographs:
 
 
 def deeper(data: Path, known: Photographs) -> Photographs:
-    """Read two deeper presses of another ball and day from the folder ``data``; background : that of ``known`` ones"""
+    """Read two deeper presses, of another ball and day, from the folder ``data``; their background is that of ``known``
+    photographs."""
     files = sorted((data / "digit_real" / "deeper").glob("*.png"))
     found = (press_of(file.name, read_photograph(file), known.background) for file in files)
     return dataclasses.replace(known, presses=tuple(press for press in found if press is not None))
@@ -73,7 +74,8 @@ def other_unit(data: Path) -> Photographs:
 
 
 def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
-    """Split photographs into ``count`` parts; for each, yield a fit, from ``start``, to all others, and that part."""
+    """Split photographs into ``count`` parts; for each part yield a fit to all other parts, begun at ``start``, and the
+    part."""
     names = [press.name for press in photographs.presses]
     for fold in range(count):
         apart = names[fold::count]
@@ -82,7 +84,7 @@ def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[
 
 
 def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
-    """Yield the metrics' means over the photographs ``tried``, and the worst PSNR; of : the photographs, in words"""
+    """Yield rows of the metrics' means over evaluated photographs, and of the worst PSNR; of : names them, a text"""
     ours, baseline = mean_metrics(tried)
     for name, unit in (("roi_psnr", "dB"), ("roi_l1", "levels"), ("through_psnr", "dB"), ("through_l1", "levels")):
         yield row(name, ours[name], unit, baseline=baseline[name], of=of)
@@ -92,7 +94,8 @@ def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
 
 
 def thirds(data: Path) -> Iterator[Row]:
-    """Yield rows of fits to two thirds of ``own_unit``, from round numbers, tried on the last third and ``deeper``."""
+    """Yield rows of fits to two thirds of ``own_unit``'s photographs in ``data``, begun at round numbers and judged on
+    the other third and on ``deeper`` presses."""
     known = own_unit(data)
     start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
     for unit, third in folds(known, 3, start):
@@ -103,7 +106,7 @@ def thirds(data: Path) -> Iterator[Row]:
 
 
 def five(data: Path) -> Iterator[Row]:
-    """Yield rows of the shipped calibration on five photographs in ``data`` kept apart, and on another unit's."""
+    """Yield rows of the shipped calibration on the five photographs that it was not fitted to and on another unit's."""
     unit, known = load_calibration(), own_unit(data)
     apart = [press.name for press in known.presses if press.name not in unit.fit.photographs]
     for of, each in (("5 not fitted", chosen(known, apart)), ("another unit", other_unit(data))):
@@ -111,7 +114,7 @@ def five(data: Path) -> Iterator[Row]:
 
 
 def fifths(data: Path) -> Iterator[Row]:
-    """Yield rows of fits to four fifths of another unit's photographs, begun at the unit that ships, on the fifth."""
+    """Yield rows of fits to four fifths of another unit's photographs, from the shipped unit, judged on the fifth."""
     tried = []
     for unit, fifth in folds(other_unit(data), 5, load_calibration()):
         tried += evaluate_unit(unit, fifth, DIAMETER / 2, search_radius=False)
@@ -161,8 +164,8 @@ def level_rows(pictures: np.ndarray, rest: np.ndarray, of: str) -> Iterator[Row]
 
 
 def told_apart(data: Path) -> Iterator[Row]:
-    """Yield rows of a classifier that tells photographs from their pictures: its share right on pieces of photographs
-    that it was not trained on; 0.5 if they cannot be told. A picture is drawn on the photographs' background."""
+    """Yield rows of how often a classifier tells photographs from drawn pictures of the same presses, on pieces that it
+    was not trained on: 0.5 if it cannot tell. Pictures have the photographs' background."""
     unit, known = load_calibration(), own_unit(data)
     tried = evaluate_unit(unit, known, DIAMETER / 2, search_radius=False)
     drawn = [np.random.default_rng(number) for number in range(len(tried))]
@@ -177,8 +180,8 @@ def told_apart(data: Path) -> Iterator[Row]:
 
 
 def share_told(photographs: list[np.ndarray], pictures: list[np.ndarray]) -> float:
-    """Return the share of pieces that a support vector machine takes for what they are, each pair held out in turn.
-    photographs, pictures : n pairs of (H, W, 3) grey levels"""
+    """Return the share of pieces that a support vector machine classifies rightly, with each pair held out in turn.
+    photographs, pictures : n each, in pairs, (H, W, 3) grey levels"""
     from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -193,8 +196,8 @@ def share_told(photographs: list[np.ndarray], pictures: list[np.ndarray]) -> flo
 
 
 def patch_statistics(picture: np.ndarray) -> np.ndarray:
-    """Return (squares, 24), for squares of PATCH px of a picture (H, W, 3): the size of grey levels, of their slopes
-    and second differences, how like neighbouring slopes are, and how like the slopes of two colours."""
+    """Return 24 statistics (squares, 24) of each square of PATCH px of a picture (H, W, 3): spread of levels, of their
+    first and second differences, and products of neighbouring differences and of those of two colours."""
     levels, found = picture.astype(float), []
     for down, right in np.ndindex(levels.shape[0] // PATCH, levels.shape[1] // PATCH):
         patch = np.moveaxis(levels[down * PATCH :, right * PATCH :][:PATCH, :PATCH], -1, 0)

@@ -4,10 +4,10 @@
     python scripts/benchmarks/measure_presets.py --fields 4            on fewer fields, which the file says; 10 else
     python scripts/benchmarks/measure_presets.py --quick --json FILE   two fields, 240 x 320; writes FILE alone
 
-Errors are grey levels rms over the picture, its channels and the fields, before rounding: ``_error_direct`` from
-converged direct light, others from the full model of a matte coating: 64 pictures from 512 points per LED, four bounces
-gathered over horizons, the window. It shares no code with our integrator and has next to no noise; Mitsuba's own path
-integrator, the preset `reference`, is compared with it too.
+Errors are grey levels rms over the picture, its channels and the fields, before rounding: rows ``_error_direct`` from
+converged direct light, in others from the full model of a matte coating: 64 pictures from 512 points per LED, four
+bounces gathered over horizons, the window. That model shares no code with our integrator and has next to no noise;
+Mitsuba's own path integrator, the preset `reference`, is compared with it too.
 Times are CPU time on one core, so that other programs do not count. Prints a table; exits 1 when an error row misses
 its target. Needs the extras [render] and [fem]; rows of llvm_ad_rgb only where LLVM works.
 """
@@ -72,8 +72,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
-    """Yield all rows, on ``count`` fields; errors are of the faster variant, and once between the variants.
-    quick : a reference of fewer passes, times of one field, one size"""
+    """Yield all rows, on ``count`` height maps. Errors are those of Mitsuba's faster variant, and one between variants.
+    quick : true for a reference of fewer passes, and times of one height map in one size"""
     heights = fields(unit, count)
     variants = working_variants()
     best = variants[0]
@@ -94,7 +94,7 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:
-    """Make ``count`` height maps (H, W) m of random contacts by the fast tier, up to ``DEEPEST``; seed : of the draw"""
+    """Return ``count`` height maps (H, W) m of random contacts, solved by the fast tier, no deeper than ``DEEPEST``."""
     camera, found = unit.camera, []
     for contact in random_contacts(40 * count, seed):
         row, column = camera.to_pixel(contact.place.x, contact.place.z)
@@ -122,8 +122,8 @@ def working_variants() -> list[str]:
 
 
 def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset) -> Iterator[Row]:
-    """Yield every preset's error on heights (H, W) m, from converged direct light and the full model ``truth``.
-    Baseline: the background alone."""
+    """Yield every preset's errors on heights (H, W) m, against converged direct light and against the full model.
+    variant : of Mitsuba; truth : preset of the full model. Baseline: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
     of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
     changes = {
@@ -144,8 +144,8 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
 def converge(
     unit: Calibration, heights: list[np.ndarray], variant: str, truth: Preset, seed: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield each field's change from rest, levels (H, W, 3), as a pair: by direct light alone, by the full model.
-    heights : (H, W) m of each field; variant : of Mitsuba; truth : preset of the full model; seed : of its samples"""
+    """Yield, for each of heights (H, W) m, the picture's change from rest, levels (H, W, 3), twice: by direct light
+    alone, and by the full model. variant : of Mitsuba; truth : preset of the full model; seed : of its samples"""
     rest = of_unit(rest_height_map(unit.camera), unit)
     light, levels = MatteLight(unit, truth, variant, rest, seed), spread_in_levels(unit)
     resting, seen = light.direct(rest)
@@ -158,19 +158,19 @@ def converge(
 
 
 def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function from a light's radiance (H, W, 3) to grey levels (H, W, 3), spread by the coating."""
+    """Return a function that blurs a light's radiance (H, W, 3) as the coating does, and returns levels (H, W, 3)."""
     in_levels, spread = Renderer(unit, FAST).in_levels, CoatingSpread(unit.camera, unit.coating.spread)
     return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
 
 
 def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
-    """Return the root mean square of all numbers of pictures, or of their differences from others of equal shapes."""
+    """Return the root mean square of all pictures' numbers, or of their differences from ``others`` of equal shapes."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))
 
 
 def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
-    """Yield rows of how far the two variants' pictures of height (H, W) m differ."""
+    """Yield rows of how far pictures of height (H, W) m by Mitsuba's two variants differ, by preset."""
     for name in ("standard", "quality"):
         one, other = (Renderer(unit, name, variant) for variant in (LLVM, SCALAR))
         difference = one.in_levels(one.radiance(height) - other.radiance(height))
@@ -178,8 +178,8 @@ def agreement(unit: Calibration, height: np.ndarray) -> Iterator[Row]:
 
 
 def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray], quick: bool) -> Row:
-    """Measure the preset ``name``'s CPU ms per frame on one thread: median over heights (H, W) m of the least of a few
-    calls, as other programs only lengthen it; quick : of one height map"""
+    """Measure the CPU ms per frame of the preset ``name`` on one thread: the median over heights (H, W) m of the least
+    of a few calls (other programs can only lengthen one). variant : of Mitsuba; quick : take one height map alone"""
     one_thread(variant)
     renderer = Renderer(unit, name, None if name == FAST else variant)
     slow = name == REFERENCE.name
@@ -198,7 +198,7 @@ def speed(unit: Calibration, name: str, variant: str, heights: list[np.ndarray],
 
 
 def one_thread(variant: str) -> None:
-    """Limit a variant of Mitsuba to one thread, as the targets of time are for one core."""
+    """Limit a variant of Mitsuba to one thread, since targets of time are for one core."""
     if variant == LLVM:
         import drjit
         import mitsuba
@@ -208,7 +208,7 @@ def one_thread(variant: str) -> None:
 
 
 def table(rows: list[Row], count: int) -> dict:
-    """Return the content of the presets' data file from measured rows; count : fields that were measured"""
+    """Return the content of the presets' data file from measured rows; count : number of height maps measured"""
     value = {found["name"]: found["value"] for found in rows}
     presets = {}
     for name in NAMES:

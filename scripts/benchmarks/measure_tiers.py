@@ -71,8 +71,8 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def table(work: Path, quick: bool) -> tuple[dict, dict[Sensor, list]]:
-    """Return the data file, by tier and sensor ms and errors in bins of depth, and the reference tier's contacts, as of
-    ``keep``, by sensor. work : folder of solved contacts; quick : a few contacts, no reference tier"""
+    """Return the data file's content, for each tier and sensor ms and errors in bins of depth, and sensor -> the
+    reference tier's contacts by ``keep``. work : folder of solved contacts; quick : few contacts, no reference tier"""
     found, truth = {tier: {"says": says} for tier, says in SAYS.items()}, {}
     for sensor in SENSORS:
         entries, truth[sensor] = measure(sensor, work, quick)
@@ -103,7 +103,7 @@ def measure(sensor: Sensor, work: Path, quick: bool) -> tuple[dict[Tier, dict], 
 
 
 def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomContact) -> dict[str, np.ndarray]:
-    """Return a random contact in one tier, read from its file, or solved and written there; {} if the tier finds none.
+    """Return a random contact in one tier, read from its file, or else solved and written there; {} if there is none.
     Arrays by name: number, share (depth over thickness), displacement (n, 3) m, force N (its size), seconds of CPU."""
     path = work / f"{sensor}_{tier}_{SEED}_{number:03d}.npz"
     if tier == "fast" or not path.exists():
@@ -123,8 +123,8 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
 
 
 def misses(found: list[dict], true: list[dict]) -> Iterator[Miss]:
-    """Yield the errors of one tier's contacts ``found`` against ``true`` ones of a finer tier, both lists as of
-    ``keep``, where both found one."""
+    """Yield the errors of one tier's contacts ``found`` against a finer tier's, ``true``, if both tiers found them.
+    Both lists hold what ``keep`` returns, in the same order."""
     for one, other in zip(found, true, strict=False):
         if one and other:
             pair = one["displacement"], float(one["force"]), other["displacement"], float(other["force"])
@@ -143,13 +143,13 @@ def validated(sensor: Sensor) -> Iterator[Miss]:
 
 
 def share_of(full: dict) -> dict:
-    """Return the reference tier's entry: the full tier's with its errors times REFERENCE_SHARE."""
+    """Return a bin of the reference tier's errors: the full tier's errors, ``full``, times REFERENCE_SHARE."""
     errors = ("shape_um", "shape_95_um", "force", "force_95")
     return full | {name: float(f"{REFERENCE_SHARE * full[name]:.4g}") for name in errors} | {"assumed": True}
 
 
 def middle(kept: list[dict]) -> float | None:
-    """Return the median CPU ms of the contacts ``kept``, as of ``keep``; None where none was solved."""
+    """Return the median CPU ms of the contacts ``kept``, which ``keep`` returned; None if none was solved."""
     return float(f"{1e3 * np.median([one['seconds'] for one in kept if one]):.4g}") if any(kept) else None
 
 

@@ -26,7 +26,7 @@ def parser_of(about: str | None) -> argparse.ArgumentParser:
 
 
 def printed(rows: Iterable[Row]) -> list[Row]:
-    """Print the head of a table and each row as soon as it is measured; returns the rows."""
+    """Print a table's head, then each row as soon as it is measured; return the rows."""
     print(HEADER)
     found = []
     for each in rows:
@@ -36,7 +36,7 @@ def printed(rows: Iterable[Row]) -> list[Row]:
 
 
 def in_processes(work: Callable[[Any], str], jobs: Sequence[Any], count: int) -> None:
-    """Do jobs by ``work`` in ``count`` processes of one thread each; print the line that it returns for each job."""
+    """Call ``work`` with each job, in ``count`` processes of one thread; print the line that each call returns."""
     with threads.one_thread(), concurrent.futures.ProcessPoolExecutor(count) as pool:
         for done, line_of in enumerate(pool.map(work, jobs), 1):
             print(f"{done}/{len(jobs)} {line_of}", flush=True)
@@ -59,10 +59,10 @@ def read_table(path: Path) -> list[dict[str, str]]:
 
 
 def renew_tables(page: Path, tables: dict[str, list[str]]) -> None:
-    """Put tables in the place of old ones in a page of Markdown, whose words stay.
+    """Replace tables in a page of Markdown; its other text stays.
 
-    tables : text that the page has once -> the lines of the first table at or after it
-    Raises ValueError for a page without one of them.
+    tables : text that the page has once -> new lines of the first table at or after that text
+    Raises ValueError if the page lacks a text or a table.
     """
     text = page.read_text(encoding="utf-8")
     for before, lines in tables.items():
@@ -74,12 +74,12 @@ def renew_tables(page: Path, tables: dict[str, list[str]]) -> None:
 
 
 def short(value: float | None) -> str:
-    """Format a value with two digits, from 10 on without decimals; "-" for None."""
+    """Return a value as text with two digits, from 10 on without decimals; "-" for None."""
     return "-" if value is None else f"{float(f'{value:.2g}'):,.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def png_of(figure: Any) -> bytes:
-    """Draw a figure of matplotlib as the bytes of a PNG, without a date; nothing of pyplot's is touched."""
+    """Return a matplotlib figure as the bytes of a PNG without a date; pyplot's state is not touched."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     content = io.BytesIO()

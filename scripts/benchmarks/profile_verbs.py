@@ -1,6 +1,6 @@
 """Measure the cost of each verb of ``tactile``, in its own process: time, memory, and the heavy libraries it loads.
 
-    python scripts/benchmarks/profile_verbs.py --json FILE   and 700 frames converted, stage by stage
+    python scripts/benchmarks/profile_verbs.py --json FILE   also convert 700 frames, stage by stage
     python scripts/benchmarks/profile_verbs.py --quick --json FILE  each verb on as little as it takes, about a minute
 
 CPU time is user and system together, on one thread; a machine's load changes it less than wall time. The cases and
@@ -56,8 +56,8 @@ open(sys.argv[1], "w").write(json.dumps(record))
 
 class Case(NamedTuple):
     """A command line of ``tactile``, and the exit status it ends with.
-    name : of its rows; loads : libraries of HEAVY that it may load, by spaces
-    words : {} stands for a scratch folder, which holds what cases before have written, touch.csv and scene.toml"""
+    name : begins the names of its rows; loads : libraries of HEAVY that it may load, separated by spaces
+    words : in which {} stands for a scratch folder with touch.csv, scene.toml and what earlier cases wrote"""
 
     name: str
     words: str
@@ -97,7 +97,7 @@ CASES = (
 
 
 class Cost(NamedTuple):
-    """Cost of one run. status : exit status; cpu, wall, imports : s; peak : MB; loaded : libraries of HEAVY."""
+    """Cost of one run. status : exit status; cpu, wall, imports : s; peak : MB of memory; loaded : of HEAVY"""
 
     status: int
     cpu: float
@@ -130,7 +130,7 @@ def write_inputs(folder: Path) -> None:
 
 
 def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
-    """Write scene.toml of a 7 mm ball into ``folder``; points : the ball's way, (time s, x mm, z mm, force N)"""
+    """Write scene.toml of a 7 mm ball into ``folder``; points : of the ball's path, (time s, x mm, z mm, force N)"""
     lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
     (folder / "scene.toml").write_text(
         f"""format = "tactile-scene-1"
@@ -150,7 +150,7 @@ points = [
 
 
 def run(case: Case, folder: Path) -> Cost:
-    """Run one case in a fresh process; folder : its scratch. Raises AssertionError where the process breaks off."""
+    """Run one case in a process of its own; folder : for scratch files. Raises AssertionError if the process dies."""
     file = folder / "record.json"
     file.unlink(missing_ok=True)
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
@@ -169,7 +169,8 @@ def run(case: Case, folder: Path) -> Cost:
 
 
 def verbs(folder: Path) -> list[Row]:
-    """Return rows of CPU time and peak memory of each verb; of its exit status if it is wrong. folder : scratch"""
+    """Yield rows of CPU time and peak memory of each verb, or of its exit status if that is wrong.
+    folder : for scratch files"""
     for case in CASES:
         cost = run(case, folder)
         if cost.status != case.status:
@@ -183,7 +184,7 @@ def verbs(folder: Path) -> list[Row]:
 
 
 def write_long(path: Path) -> None:
-    """Write the shipped recording, again and again, LONG frames in all."""
+    """Write a recording of LONG frames to ``path``: the shipped one, again and again."""
     one = recordings.read(RECORDING)
     rows = np.arange(LONG) % len(one)
     held = {name: getattr(one.truth, name) for name in Truth.__dataclass_fields__}
@@ -194,7 +195,7 @@ def write_long(path: Path) -> None:
 
 
 def long_conversion(folder: Path) -> list[Row]:
-    """Yield cost of `convert` of a long recording with default outputs, and where its time goes; folder : scratch"""
+    """Yield rows of what `convert` of a long recording costs, in all and by stage; folder : for scratch files"""
     write_long(folder / "long.h5")
     cost = run(Case("long", "convert {}/long.h5 --out {}/whole"), folder)
     of = f"{LONG} frames, {cost.wall:.1f} s on the wall, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"

@@ -3,9 +3,9 @@
     python scripts/benchmarks/same_answers.py before.json                       on the commit before
     python scripts/benchmarks/same_answers.py after.json --than before.json     on the one after, on the same machine
 
-Translations, solved gels, pairs, a simulation and pictures of each preset, of recordings and scenes that ship, and the
-contacts of ``tactile.solve``. Writes the SHA-256 of each file (minutes); with --than it names those that differ, are
-gone or new, and exits with 1 if there are any. Notes and timings, which hold versions and clocks, are left out.
+The commands make translations, solved gels, pairs, a simulation and pictures of each preset, from recordings and scenes
+that ship, and contacts by ``tactile.solve``. Writes the SHA-256 of each file (minutes); with --than it names those that
+differ, are gone or are new, and exits with 1 if there are any. Notes and timings hold versions and clocks: left out.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def words_of(command: str, out: str) -> list[str]:
-    """Return the words of one of COMMANDS, its places filled in, that writes to the folder ``out``."""
+    """Return the words of one of COMMANDS, with the names in braces replaced; out : folder that it writes to"""
     frames = f"{out}/demo/{RECORDING.stem}/frames.h5"
     return [word.format(recording=RECORDING, scenes=SCENES, out=out, frames=frames) for word in command.split()]
 
@@ -75,7 +75,7 @@ def digests(folder: Path) -> dict[str, str]:
 
 
 def contacts() -> dict[str, str]:
-    """Return SHA-256 of the displacement under a ball of 3 mm radius, by a key such as "solve digit 0.5 N"."""
+    """Return name, such as "solve digit 0.5 N", -> SHA-256 of the displacement under a ball of 3 mm radius."""
     ball, found = tactile.indenters.Sphere(radius=3e-3), {}
     for sensor, place in PLACES.items():
         for force in FORCES:

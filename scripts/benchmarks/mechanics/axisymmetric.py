@@ -1,10 +1,8 @@
-"""The reference tier's solid with axial symmetry: the same material and contact on a mesh of the half plane.
+"""An axisymmetric counterpart of the reference tier's solid: the same material and contact on a mesh of the half plane.
 
-Quadratic quadrilaterals with a linear discontinuous pressure per cell. Coordinates (x, y, z) = (radius, axis, hoop).
-A node keeps three degrees of freedom, of which the hoop's is fixed, so that ``newton.FiniteStrainContact`` takes this
-solid as it takes the one in space. Forces and energies are those of the whole turn.
-
-``pressed`` is the contact of a ball pressed into the middle of a disc that is bonded below.
+Cells are quadratic quadrilaterals with a linear discontinuous pressure. Coordinates (x, y, z) are (radius, axis, hoop).
+A node keeps three degrees of freedom, the hoop's fixed, so that ``newton.FiniteStrainContact`` takes this solid as it
+takes the three-dimensional one. Forces and energies are those of the whole turn.
 """
 
 from __future__ import annotations
@@ -29,8 +27,9 @@ _ENTRIES = [0, 1, 3, 4, 8]  # of F (3, 3) as 9 numbers: those that axial symmetr
 class QuadMesh:
     """Axisymmetric mesh.
 
-    nodes : (n, 3) m, x >= 0 and z = 0; cells : (n_cells, 9), node a + 3 b at (xi, eta) = (a, b) - 1
-    clamped : (n,) bool; surface : (k,) nodes of the free side, outward
+    nodes : (n, 3) m, x >= 0 and z = 0; clamped : (n,) bool, nodes on the bonded side
+    cells : (n_cells, 9) node numbers; entry a + 3 b is the node at (xi, eta) = (a - 1, b - 1)
+    surface : (k,) node numbers of the free side, from the axis outward
     """
 
     nodes: np.ndarray
@@ -40,7 +39,7 @@ class QuadMesh:
 
     @property
     def fixed(self) -> np.ndarray:
-        """Mask (3 n,) bool: clamped nodes, the hoop, and the radius on the axis."""
+        """Mask (3 n,) bool of the fixed degrees of freedom: of clamped nodes, all hoops, and the radius on the axis."""
         fixed = np.repeat(self.clamped, 3).reshape(-1, 3)
         fixed[:, 2] = True
         fixed[self.nodes[:, 0] == 0, 0] = True
@@ -50,9 +49,9 @@ class QuadMesh:
 def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
     """Make the mesh of a disc bonded at y = 0 with its free side toward -y.
 
-    radii (n,), heights (m,) : m, of the nodes, from 0; n and m odd
-    The second node of a row is moved outward by a tenth of its step: were it in the middle of its cell, a constant
-    pressure would put no force on the node of the axis, contact would lose that node, and the cell would buckle."""
+    radii (n,), heights (m,) : m, of the nodes, each beginning with 0; n and m odd
+    The second radius is moved outward by a tenth: were that node in the middle of its cell, a constant pressure would
+    put no force on the node on the axis, contact would lose that node, and the cell would buckle."""
     radii = np.r_[radii[0], 1.1 * radii[1], radii[2:]]
     nodes = np.zeros((len(radii), len(heights), 3))
     nodes[..., 0], nodes[..., 1] = radii[:, None], -heights
@@ -65,8 +64,8 @@ def disc(radii: np.ndarray, heights: np.ndarray) -> QuadMesh:
 
 
 def graded(even: float, spacing: float, end: float, growth: float) -> np.ndarray:
-    """Return node places, m (odd count), from 0: some ``spacing`` m apart up to ``even`` m, then in steps that grow by
-    the factor ``growth`` to ``end`` m."""
+    """Return an odd number of places, m, from 0 to ``end`` m: about ``spacing`` m apart up to ``even`` m, then in steps
+    that grow by the factor ``growth``."""
     inside = np.linspace(0, even, 2 * max(round(even / spacing / 2), 1) + 1)
     steps = [spacing * growth]
     while sum(steps) < end - even:
@@ -110,8 +109,8 @@ class AxisymmetricSolid:
         return f, 1 + change
 
     def _deformation(self, displacement: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return F and J - 1, as ``deformation`` of a displacement, the volume change summed from F - 1: a large bulk
-        modulus would show the rounding of J."""
+        """Return F and J - 1 = det F - 1 by a displacement (n, 3) m. J - 1 is summed from F - 1, since a large bulk
+        modulus would magnify the rounding of J."""
         h = np.einsum("eqci,ei->eqc", self.strain, displacement.ravel()[self.dofs], optimize=True)
         rr, ra, ar, aa, hoop = np.moveaxis(h, -1, 0)
         plane = rr + aa + rr * aa - ra * ar
@@ -120,7 +119,7 @@ class AxisymmetricSolid:
         return f.reshape(*self.weight.shape, 3, 3) + np.eye(3), plane + hoop + plane * hoop
 
     def linearise(self, state: State) -> Linearised:
-        """Compute residual and tangent at a state; raises FloatingPointError where a cell is turned inside out."""
+        """Compute residual and tangent at a state. Raises FloatingPointError if a cell is turned inside out."""
         f, change = self._deformation(state.displacement)
         j = 1 + change
         if not (j > 0).all():
@@ -143,7 +142,7 @@ class AxisymmetricSolid:
 
 
 def _reference() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Gauss points (9, 2), weights (9,), shape functions (9, 9) and slopes (9, 9, 2) in the reference square."""
+    """Return Gauss points (9, 2), weights (9,), shape functions (9, 9), slopes (9, 9, 2) of the reference square."""
     xi, eta = (axis.ravel() for axis in np.meshgrid(_POINT, _POINT, indexing="ij"))
     (fx, dx), (fy, dy) = (quadratic(t) for t in (xi, eta))
     shape, along, across = (np.einsum("qa,qb->qba", x, y).reshape(9, 9) for x, y in ((fx, fy), (dx, fy), (fx, dy)))
@@ -158,15 +157,15 @@ _TOLERANCE = Tolerance(gap=1e-9, balance=1e-8, step=1e-13)
 def disc_mesh(
     radius: float, thickness: float, reach: float, spacing: float, fine_depth: float, growth: float = 1.1
 ) -> QuadMesh:
-    """Make a disc of a radius and thickness, m: nodes ``spacing`` m apart out to ``reach`` m and down to ``fine_depth``
-    m, steps growing by the factor ``growth`` beyond."""
+    """Make the mesh of a disc of a radius and thickness, m: nodes ``spacing`` m apart out to ``reach`` m and down to
+    ``fine_depth`` m; beyond, steps grow by the factor ``growth``."""
     heights = thickness - graded(fine_depth, spacing, thickness, growth)[::-1]
     heights[0] = 0.0
     return disc(graded(reach, spacing, radius, growth), heights)
 
 
 def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) -> FiniteStrainContact:
-    """Return the contact problem of a ball that touches the middle, and nodes within ``reach`` m of the axis."""
+    """Return the contact problem of a ball on the disc's middle; nodes within ``reach`` m of the axis can touch it."""
     near = mesh.surface[mesh.nodes[mesh.surface, 0] < reach]
     middle = mesh.nodes[mesh.surface[0]]
     solid = AxisymmetricSolid(mesh, NeoHookean.from_material(material))
@@ -175,7 +174,7 @@ def pressed(mesh: QuadMesh, material: Material, ball: Indenter, reach: float) ->
 
 
 def contact_radius(contact: FiniteStrainContact, touch: ContactState) -> float:
-    """Return a contact's radius at rest, m: halfway between the last node that touches and the first that does not."""
+    """Return a contact's radius, m, by places at rest: halfway between its last node and the first beyond it."""
     radii = np.sort(contact.solid.mesh.nodes[contact.touchable, 0])
     last = int(np.searchsorted(radii, contact.solid.mesh.nodes[touch.outer.nodes, 0].max()))
     return float(radii[last : last + 2].mean())

@@ -1,4 +1,4 @@
-"""A block of brick cells, and its equilibrium where the boundary is given: what small checks are made of."""
+"""Make a block of brick cells for small checks, and find its equilibrium under a given boundary."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _SETTLED = 1e-15  # of the block's size: rounding
 
 
 def block(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> HexMesh:
-    """Make a block of bricks with node planes x, z (m) and y (m, falling from clamped back to surface); odd counts."""
+    """Make a block with nodes on planes x, y, z, m, odd numbers; y falls from the clamped back to the surface."""
     grid = np.stack(np.meshgrid(x, z, y, indexing="ij"), -1)[..., [0, 2, 1]]
     ids = np.arange(grid[..., 0].size).reshape(grid.shape[:-1])
     clamped = np.zeros(ids.size, bool)
@@ -29,8 +29,8 @@ def inside(mesh: HexMesh) -> np.ndarray:
 
 
 def equilibrium(solid: FiniteStrainSolid, start: State, free: np.ndarray, load: np.ndarray | None = None) -> State:
-    """Return the equilibrium under outer forces ``load`` (3 n,) N, None for none; nodes move where free (n,) bool is
-    true, and others stay as in ``start``. Raises ArithmeticError where none is found."""
+    """Return the equilibrium under outer forces ``load`` (3 n,) N, None for none. Nodes move if ``free`` (n,) bool is
+    true for them, others stay as in ``start``. Raises ArithmeticError if no equilibrium is found."""
     state, loose = start.copy(), np.repeat(free, 3)
     size = np.ptp(solid.mesh.nodes, axis=0).max()
     for _ in range(_MAX_ITERATIONS):

@@ -32,8 +32,9 @@ Bin = dict[str, float | int]
 class Miss:
     """Error of one contact against the truth at the same depth.
 
-    press : number of the press that the contact belongs to; share : depth from first touch over the thickness there
-    shape : rms m over nodes that truly move more than 10 um; force : relative; baseline : rms m of no displacement
+    press : number of the press that the contact belongs to; share : depth divided by the thickness at first touch
+    shape : rms error, m, over nodes that truly move more than 10 um; force : relative error
+    baseline : m, shape error of no displacement at all
     """
 
     press: int
@@ -44,8 +45,8 @@ class Miss:
 
 
 def miss(press: int, share: float, found: np.ndarray, force: float, true: np.ndarray, true_force: float) -> Miss:
-    """Return the error of displacement found (n, 3) m and force N against true (n, 3) m, true_force N.
-    press : its number; share : depth / thickness"""
+    """Return the error of a contact's displacement ``found`` (n, 3) m and force N against true (n, 3) m, true_force N.
+    press : the number of its press; share : depth / thickness"""
     error, baseline = (
         float(accuracy.rms_in_contact(moved[None], true[None])[0]) for moved in (found, np.zeros_like(true))
     )
@@ -53,7 +54,7 @@ def miss(press: int, share: float, found: np.ndarray, force: float, true: np.nda
 
 
 def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
-    """Yield the fast tier's errors, where it converges, at depths of a scene's ``pairs`` solved by the full tier."""
+    """Yield the fast tier's errors against a scene's ``pairs``, solved by the full tier, for contacts that converge."""
     for press in np.unique(pairs.press):
         rows = np.flatnonzero(pairs.press == press)
         indenter = scene.indenters[int(pairs.indenter[rows[0]])].build()
@@ -72,8 +73,8 @@ def fast_misses(sensor: Sensor, pairs: Pairs, scene: Scene) -> Iterator[Miss]:
 
 
 def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution, float, float]:
-    """Solve a contact from rest, without friction, its depth stretched from DEEPEST to DEPTH_LIMIT; return it, its
-    depth over the thickness, and CPU s. Raises TactileError where ``solve_path`` does."""
+    """Solve a contact from rest, without friction; its depth, drawn up to DEEPEST, is scaled to reach DEPTH_LIMIT.
+    Return the solution, its depth over the thickness, and CPU s. Raises TactileError if it cannot be solved."""
     pose = pose_at(sensor, contact.indenter, contact.place)
     share = contact.depth / DEEPEST * DEPTH_LIMIT * _ALMOST
     depth, thick = depth_at(share, sensor, contact.indenter, pose), thickness_under(sensor, contact.indenter, pose)
@@ -83,10 +84,10 @@ def solved(sensor: Sensor, contact: RandomContact, tier: Tier) -> tuple[Solution
 
 
 def by_depth(misses: Iterable[Miss], edges: Sequence[float]) -> list[Bin]:
-    """Return median and 95 % of the errors in bins of depth over thickness with upper ends edges; empty ones left out.
+    """Return the errors in bins of depth over thickness, whose upper ends are ``edges``; empty bins are left out.
 
-    depth_share_to : the upper end; contacts : how many; shape_um, force : rms um and relative, the median;
-    shape_95_um, force_95 : 95 of 100 have less; baseline_um : of no displacement, median"""
+    depth_share_to : a bin's upper end; contacts : their number; shape_um, force : median errors, um rms and relative
+    shape_95_um, force_95 : their 95 % quantiles; baseline_um : median shape error of no displacement"""
     misses, found = list(misses), []
     for low, high in itertools.pairwise((0.0, *edges)):
         here = [each for each in misses if low < each.share <= high]
@@ -109,8 +110,8 @@ def _digits(value: float) -> float:
 class Truth:
     """A contact in the reference tier, from rest and without friction.
 
-    number, contact : of the random contacts of the file's seed; share : depth over the thickness
-    displacement : (n, 3) m; force : N; seconds : CPU, that it took
+    number : of the random contact that the file's seed draws; share : depth over the thickness
+    displacement : (n, 3) m; force : N; seconds : of CPU, to solve it
     """
 
     number: int
@@ -122,8 +123,8 @@ class Truth:
 
 
 def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], seed: int) -> None:
-    """Write contacts found, by sensor, each with number, share, displacement (n, 3) m, force N, seconds, to a file.
-    seed : of the random contacts"""
+    """Write contacts of the reference tier to a file; seed : of the random contacts
+    found : sensor -> contacts, each with number, share, displacement (n, 3) m, force N, seconds"""
     arrays = {"seed": np.int64(seed)}
     for sensor, contacts in found.items():
         for name in ("number", "share", "force", "seconds"):
@@ -134,7 +135,7 @@ def write_truth(file: Path, found: dict[str, Sequence[dict[str, np.ndarray]]], s
 
 
 def read_truth(file: Path, sensor: str) -> list[Truth]:
-    """Return the reference tier's contacts on one sensor, from a file of ``write_truth``."""
+    """Read the reference tier's contacts on one sensor from a file that ``write_truth`` wrote."""
     with np.load(file, allow_pickle=False) as arrays:
         columns = {name: arrays[f"{sensor}_{name}"] for name in ("number", "share", "displacement", "force", "seconds")}
         contacts = list(random_contacts(int(columns["number"].max()) + 1, int(arrays["seed"])))

@@ -1,4 +1,4 @@
-"""A block with a cavity full of incompressible fluid: its volume stays, or is what was pumped in."""
+"""Check a block with a cavity full of incompressible fluid: its volume must stay, or grow by what is pumped in."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def hollow() -> tuple[HexMesh, FluidCavity]:
 
 
 def _outward(side: np.ndarray, nodes: np.ndarray, middle: np.ndarray) -> np.ndarray:
-    """Return a face's node indices ``side`` (3, 3), its two directions and outward right-handed. nodes : (n, 3) m;
-    middle : (3,) m, of the body"""
+    """Return a face's node numbers ``side`` (3, 3), transposed if need be: its two directions and the way out of the
+    body must be right-handed. nodes : (n, 3) m; middle : (3,) m, of the body"""
     across = np.cross(nodes[side[2, 1]] - nodes[side[0, 1]], nodes[side[1, 2]] - nodes[side[1, 0]])
     return side if across @ (nodes[side[1, 1]] - middle) > 0 else side.T
 
 
 def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
-    """Press a ball into the block; return the contact, and the cavity's volume then, m3.
+    """Press a ball into the block; return the contact, and the cavity's volume, m3, under it.
     full : true for a cavity full of fluid, to which ``pumped`` m3 are added; false for an empty one"""
     mesh, cavity = hollow()
     ball = Sphere(2e-3)
@@ -61,7 +61,8 @@ def pressed(*, full: bool, pumped: float = 0.0) -> tuple[ContactState, float]:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield relative errors of a full cavity's volume under a ball, and the ball's force over that on an empty one."""
+    """Yield relative errors of a full cavity's volume under a ball, and the ball's force divided by that without fluid.
+    quick : changes nothing"""
     mesh, cavity = hollow()
     rest = cavity.volume(mesh.nodes)
     empty, lost = pressed(full=False)

@@ -36,11 +36,11 @@ _QUARTERS = (
 def quarter_disc(
     radius: float, thickness: float, fine: float, intervals: tuple[int, int], layers: np.ndarray
 ) -> tuple[HexMesh, np.ndarray]:
-    """Make a quarter of a disc of a radius and thickness, m; return it and its fixed degrees of freedom (3 n,) bool.
+    """Make the mesh of a quarter disc of a radius and thickness, m; return it and its fixed degrees of freedom (3 n,).
 
-    fine : m, side of the even grid in the middle; intervals : node intervals inside and outside of it, both even
-    layers : (k,) 0 at the bonded back to 1 at the surface (-y), k odd
-    The grid of the square is bent onto the disc by (u sqrt(1 - v^2 / 2), v sqrt(1 - u^2 / 2))."""
+    fine : m, side of the evenly spaced middle; intervals : numbers of node intervals within and beyond it, both even
+    layers : (k,), k odd, heights of the nodes, from 0 at the bonded back to 1 at the surface (-y)
+    A square grid (u, v) is bent onto the disc by (u sqrt(1 - v^2 / 2), v sqrt(1 - u^2 / 2))."""
     inside, outside = intervals
     u = np.concatenate([np.linspace(0, fine / radius, inside + 1), _growing(fine / radius, 1, outside, 1 / inside)])
     a, b = np.meshgrid(u, u, indexing="ij")
@@ -60,7 +60,7 @@ def quarter_disc(
 
 
 def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
-    """Return ``count`` points after ``start`` up to ``end`` whose steps grow evenly, the first of ``first * start``."""
+    """Return ``count`` points from after ``start`` to ``end``; steps begin at ``first * start`` and grow linearly."""
     step = first * start
     growth = (end - start - count * step) / (count * (count - 1) / 2) if count > 1 else 0.0
     return start + np.cumsum(step + growth * np.arange(count))
@@ -69,13 +69,13 @@ def _growing(start: float, end: float, count: int, first: float) -> np.ndarray:
 def exact_layer(
     depth: float, radius: float, thickness: float, youngs: float, poisson: float
 ) -> tuple[float, float, float]:
-    """Return contact radius, m, ``depth``, m, as it was solved, and force, N, of a rigid paraboloid of tip radius
-    ``radius`` m, at ``depth`` in a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
+    """Return contact radius, m, depth, m, as the equations give it back, and force, N, of a rigid paraboloid of tip
+    ``radius`` m, ``depth`` m in a bonded layer (``thickness`` m, ``youngs`` Pa, ``poisson``), exact at small strain.
 
     With p = integral of phi(t) cos(xi t) the pressure's Hankel transform, the dual integral equations become
     pi/2 phi(x) - integral of K(x, t) phi(t) dt = E / (2 (1 - nu^2)) (d - x^2 / R), where phi vanishes at the contact's
-    edge. K holds what the layer's compliance lacks to the half space's. Lebedev, Ufliand, PMM 22, 1958; the compliance:
-    Dhaliwal, Int. J. Eng. Sci. 8, 1970. To 1e-10 up to a contact of ten thicknesses."""
+    edge. K comes from the layer's compliance less the half space's. Lebedev, Ufliand, PMM 22, 1958; the compliance:
+    Dhaliwal, Int. J. Eng. Sci. 8, 1970. Right to 1e-10 for contacts up to ten thicknesses wide."""
     import scipy.optimize
 
     equations = _LayerEquations(thickness, youngs, poisson)
@@ -85,7 +85,7 @@ def exact_layer(
 
 
 class _LayerEquations:
-    """The integral equation of ``exact_layer`` on Gauss points. thickness : m; youngs : Pa; poisson : its ratio"""
+    """The integral equation of ``exact_layer`` on Gauss points. thickness : m; youngs : Pa; poisson : a ratio"""
 
     def __init__(self, thickness: float, youngs: float, poisson: float) -> None:
         self.stiffness = youngs / (2 * (1 - poisson**2))
@@ -115,7 +115,7 @@ def disc(spacing: float) -> FiniteStrainContact:
 
 
 def path(contact: FiniteStrainContact) -> Iterator[ContactState]:
-    """Yield the solved contacts at the depths of the golden forces, each going on from the one before."""
+    """Yield the solved contacts at the depths of the golden forces, each begun at the one before."""
     touch = None
     for depth in GOLDEN_FORCE:
         touch = contact.press(depth, touch, _STEP)
@@ -123,8 +123,8 @@ def path(contact: FiniteStrainContact) -> Iterator[ContactState]:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the errors, %, of forces solved in axial symmetry from the golden ones, the smallest volume ratio, and the
-    time; unless ``quick`` also ``in_space``'s errors."""
+    """Yield errors, %, of axisymmetric forces against the golden ones, the smallest volume ratio, and the time; unless
+    ``quick``, also those of ``in_space``."""
     started = time.perf_counter()
     of = "axisymmetric, nodes 0.05 mm apart"
     contact = disc(0.05e-3)
@@ -139,7 +139,7 @@ def rows(quick: bool) -> Iterator[Row]:
 
 
 def in_space() -> Iterator[Row]:
-    """Yield the errors, %, from the golden forces in space, with the 27-node cells of the sensors, on quarter discs."""
+    """Yield errors, %, and times of forces on three-dimensional quarter discs, with the sensors' 27-node cells."""
     for (inside, outside), side, layers, depths in _QUARTERS:
         mesh, fixed = quarter_disc(GOLDEN_RADIUS, GOLDEN_THICKNESS, side, (inside, outside), np.array(layers))
         ball = Sphere(GOLDEN_BALL)

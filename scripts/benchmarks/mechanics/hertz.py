@@ -1,4 +1,4 @@
-"""Hertz: a small contact on a deep block."""
+"""Compare a small contact on a deep block with Hertz's solution."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ _NODES = 50  # along the contact radius
 
 
 def force(depth: float, ball: float, youngs: float, poisson: float) -> float:
-    """Return the force, N, on a rigid ball of radius ``ball`` m, ``depth`` m in a half space of moduli youngs, Pa, and
-    poisson. Johnson, Contact Mechanics, 1985, eq. 4.23."""
+    """Return Hertz's force, N, on a rigid ball of radius ``ball`` m, ``depth`` m in a half space of ``youngs`` Pa and
+    Poisson's ratio ``poisson``. Johnson, Contact Mechanics, 1985, eq. 4.23."""
     return 4 / 3 * youngs / (1 - poisson**2) * np.sqrt(ball) * depth**1.5
 
 
 def solve(poisson: float, slope: float) -> tuple[FiniteStrainContact, ContactState, float]:
-    """Return a problem, the contact whose radius by Hertz is ``slope`` times the ball's, and that radius, m.
+    """Solve the contact whose radius is by Hertz ``slope`` times the ball's; return problem, contact, that radius, m.
     poisson : Poisson's ratio of the block"""
     radius = slope * BALL
     block = _BLOCK * radius
@@ -40,7 +40,7 @@ def solve(poisson: float, slope: float) -> tuple[FiniteStrainContact, ContactSta
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the errors of force and contact radius against Hertz, at nu = .3 and .48; quick : for one contact each"""
+    """Yield errors of force and contact radius against Hertz, at nu = .3 and .48; quick : one contact for each nu"""
     for poisson in (0.3, 0.48):
         for slope in (0.05,) if quick else (0.05, 0.025):
             started = time.perf_counter()

@@ -1,4 +1,5 @@
-"""Order of accuracy: a smooth finite deformation is prescribed, its load is worked out, and the mesh is refined."""
+"""Measure the order of accuracy by a manufactured solution: prescribe a smooth finite deformation, compute its load and
+solve for it on finer and finer meshes."""
 
 from __future__ import annotations
 
@@ -34,7 +35,8 @@ def gradient(points: np.ndarray) -> np.ndarray:
 
 
 def errors(cells: int, poisson: float) -> tuple[float, float]:
-    """Return rms errors of displacement (side 1) and its gradient, ``cells`` a side; poisson : of the material"""
+    """Return rms errors of displacement and its gradient in a cube of side 1 with ``cells`` along each side.
+    poisson : Poisson's ratio"""
     planes = np.linspace(0, 1, 2 * cells + 1)
     mesh = block(planes, planes[::-1], planes)
     solid = FiniteStrainSolid(mesh, Material(1.0, poisson))
@@ -59,7 +61,7 @@ def _rms(weight: np.ndarray, values: np.ndarray) -> float:
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield errors and orders of accuracy, of displacement (L2) and its gradient (H1); quick : coarse, orders alone"""
+    """Yield errors and orders of accuracy, of displacement (L2) and its gradient (H1); quick : orders alone, coarse"""
     counts = (2, 3, 4) if quick else (2, 3, 4, 6, 8)
     for poisson in (0.49,) if quick else (0.3, 0.49):
         found = []

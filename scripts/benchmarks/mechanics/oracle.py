@@ -1,4 +1,5 @@
-"""Use scikit-fem as oracle: energy, forces, coupling and tangent assembled by it, the law by complex steps."""
+"""Check the finite-strain solid against scikit-fem, which assembles the same energy, forces, coupling and tangent;
+derivatives of the material law are taken by complex steps."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ _MATERIAL = Material(1e6, 0.49)
 
 
 def skewed() -> FiniteStrainSolid:
-    """Make 2 x 2 x 2 cells with straight edges, none a brick: scikit-fem's hexahedra have eight corners."""
+    """Make 2 x 2 x 2 skewed cells. Edges are straight, since scikit-fem defines its hexahedra by eight corners."""
     planes = np.linspace(-1e-3, 1e-3, 5)
     mesh = block(planes, planes[::-1], planes)
     x, y, z = mesh.nodes.T / 1e-3
@@ -36,7 +37,7 @@ def disturbed(solid: FiniteStrainSolid) -> State:
 
 
 def differences() -> dict[str, float]:
-    """Return largest differences from scikit-fem, relative: energy, force, condensed_force, tangent, pressure_step."""
+    """Return name -> largest relative difference from scikit-fem: energy, force, condensed_force, tangent, ..."""
     solid = skewed()
     state = disturbed(solid)
     other = _Other(solid.mesh, state)
@@ -80,7 +81,7 @@ class _Other:
         self._assemble(self.basis.interpolate(field).grad)
 
     def _numbering(self) -> np.ndarray:
-        """Degree of freedom (n, 3) in scikit-fem of each of our nodes, found by place."""
+        """Return scikit-fem's number (n, 3) of each degree of freedom of our nodes, found by the nodes' places."""
         places = self.basis.doflocs.T
         axes, dofs = np.empty(self.basis.N, int), self.basis.dofs
         for table in (dofs.nodal_dofs, dofs.edge_dofs, dofs.facet_dofs, dofs.interior_dofs):
@@ -93,8 +94,8 @@ class _Other:
         return order
 
     def _assemble(self, gradient: np.ndarray) -> None:
-        """Compute energy, force, tangent, and coupling, mass and gap of the pressures, by the displacement's gradient
-        (3, 3, cell, point); stress and tangent are derivatives of the energy by complex steps of F."""
+        """Compute energy, force, tangent, and the pressures' coupling, mass and gap; stress and tangent are derivatives
+        by complex steps of F. gradient : (3, 3, cell, point), of the displacement"""
         import skfem
 
         shear = _MATERIAL.youngs / (2 * (1 + _MATERIAL.poisson))
@@ -131,32 +132,32 @@ class _Other:
                     self.mass[4 * cell + k, 4 * cell + m] = (weight * shape * self.linear[m]).sum() / bulk
 
     def solve(self, values: np.ndarray) -> np.ndarray:
-        """Return the pressures (4 n_cells,) of volume excesses ``values`` (4 n_cells,), or of columns of them."""
+        """Return the pressures (4 n_cells,) to volume excesses ``values`` (4 n_cells,), or to columns of these."""
         return np.linalg.solve(self.mass, values)
 
 
 def _determinant(f: np.ndarray) -> np.ndarray:
-    """Return the determinants (...) of f (3, 3, ...), by cofactors of the first row; complex steps go through it."""
+    """Return the determinants (...) of f (3, 3, ...), by cofactors of the first row, which admits complex steps."""
     minors = [f[1, (k + 1) % 3] * f[2, (k + 2) % 3] - f[1, (k + 2) % 3] * f[2, (k + 1) % 3] for k in range(3)]
     return sum(f[0, k] * minors[k] for k in range(3))
 
 
 def _density(f: np.ndarray, shear: float) -> np.ndarray:
-    """Return the isochoric neo-Hookean energy density (...) of F f (3, 3, ...), shear Pa (docs/sources.md,
-    Mechanics)."""
+    """Return the isochoric neo-Hookean energy density (...) (docs/sources.md, Mechanics).
+    f : (3, 3, ...), deformation gradient; shear : modulus, Pa"""
     return shear / 2 * (_determinant(f) ** (-2 / 3) * (f * f).sum((0, 1)) - 3)
 
 
 def _stress(f: np.ndarray, p: np.ndarray, shear: float) -> np.ndarray:
-    """Return the first Piola-Kirchhoff stress (3, 3, ...) of complex f (3, 3, ...).
-    p : (...) Pa, of a cell; shear : Pa"""
+    """Return the first Piola-Kirchhoff stress (3, 3, ...), complex as f is.
+    f : (3, 3, ...), deformation gradient; p : (...) Pa, pressure; shear : modulus, Pa"""
     j = _determinant(f)
     inverse = np.moveaxis(np.linalg.inv(np.moveaxis(f, (0, 1), (-2, -1))), (-1, -2), (0, 1))
     return shear * j ** (-2 / 3) * (f - (f * f).sum((0, 1)) / 3 * inverse) + p * j * inverse
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield the ``differences`` from scikit-fem, a row each; none where it is missing. quick changes nothing."""
+    """Yield a row for each of ``differences``; none if scikit-fem is not installed. quick : changes nothing"""
     try:
         found = differences()
     except ImportError:

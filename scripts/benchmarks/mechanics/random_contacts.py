@@ -1,4 +1,4 @@
-"""Contacts drawn at random over a whole sensor, to count how many of them a solver settles."""
+"""Draw contacts at random over a whole sensor, to measure solvers by."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RIM = 1e-3  # m, places this close to the gel's outline are left out
 @dataclasses.dataclass(frozen=True)
 class RandomContact:
     """Random contact. name : of the indenter, in ``INDENTERS``
-    depth : share of the thickness at first touch, so that one draw serves both sensors"""
+    depth : divided by the thickness at first touch, so that one draw serves both sensors"""
 
     name: str
     indenter: Indenter
@@ -40,8 +40,8 @@ class RandomContact:
 
 
 def random_contacts(count: int, seed: int = 0) -> Iterator[RandomContact]:
-    """Draw ``count`` contacts, indenters in turn, each from ``seed`` and its number: places even over the gel but for
-    its rim, axes even in a cone of 30 degrees, depths even up to half of the thickness."""
+    """Draw ``count`` contacts, indenters in turn, each from ``seed`` and its number. Distributions are uniform: of
+    places over the gel without its rim, of axes in a cone of 30 degrees, of depths up to half of the thickness."""
     names, digit = list(INDENTERS), shape_of("digit")
     for number in range(count):
         random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(number,)))

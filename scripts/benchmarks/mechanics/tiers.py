@@ -1,4 +1,4 @@
-"""Fast and full tier against the reference tier on both sensors: error beside time, along presses of growing depth."""
+"""Compare the fast and the full tier with the reference tier on both sensors: error and time, deeper and deeper."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ _DEPTHS = {"digit": (0.2, 0.4, 0.6, 0.8, 1.2), "biotac": (0.3, 0.6, 0.9, 1.2)}  
 
 
 def rows(quick: bool) -> Iterator[Row]:
-    """Yield tiers' errors and times under a ball of 7 mm diameter at one place; quick : one depth per sensor, without
-    friction, else all depths, and one of them with friction"""
+    """Yield the tiers' errors and times under a ball of 7 mm diameter at one place, at all depths, and at one of them
+    with friction too. quick : at one depth per sensor, without friction"""
     for sensor in ("digit", "biotac"):
         depths = _DEPTHS[sensor][1:2] if quick else _DEPTHS[sensor]
         yield from _sensor(sensor, [1e-3 * d for d in depths], 0.0)
@@ -57,7 +57,7 @@ def _sensor(sensor: Sensor, depths: list[float], friction: float) -> Iterator[Ro
 
 
 def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> Iterator[tuple[Solution, float]]:
-    """Yield contact and seconds of each of the depths, m, on its own, from rest: a mesh is made for it.
+    """Yield the contact at each of the depths, m, and its CPU s. Each is solved from rest, on a mesh of its own.
     friction : Coulomb's coefficient"""
     for depth in depths:
         began = time.process_time()
@@ -65,7 +65,7 @@ def _timed(sensor: Sensor, tier: Tier, depths: list[float], friction: float) -> 
 
 
 def gel_normals(displacement: np.ndarray) -> np.ndarray:
-    """Return unit normals (201, 153, 3) of the camera's part of a gel under displacement (n, 3) m, by cubic splines."""
+    """Return unit normals (201, 153, 3) of a gel in the camera's view under displacement (n, 3) m, by cubic splines."""
     surface = digit_surface()
     grid = surface.grid(surface.rest + displacement)[surface.window]
     splines = [EvenSpline(0.0, 1.0, size) for size in grid.shape[:2]]
@@ -77,7 +77,7 @@ def gel_normals(displacement: np.ndarray) -> np.ndarray:
 
 
 def _normal_error(where: str, found: Solution, exact: Solution) -> Iterator[Row]:
-    """Angle between normals inside the contact, mean and largest, degrees; baseline: a gel that is not pressed."""
+    """Yield mean and largest angle between true and found normals in contact, degrees; baseline: of a gel at rest."""
     surface = digit_surface()
     patch = surface.grid(exact.contact_patch[:, None].astype(float))[surface.window][..., 0]
     fine = np.kron(patch > 0, np.ones((4, 4), bool))[: 4 * patch.shape[0] - 3, : 4 * patch.shape[1] - 3]
