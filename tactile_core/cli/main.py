@@ -22,7 +22,7 @@ NAMES = ("SIGTERM", "SIGHUP")  # Windows has no SIGHUP
 
 
 class Stopped(KeyboardInterrupt):
-    """Exception raised by one of the stop signals. number : of the signal"""
+    """Exception that a stop signal raises. number : the signal's"""
 
     def __init__(self, number: int) -> None:
         super().__init__(signal.Signals(number).name)

@@ -12,13 +12,13 @@ from ..errors import TactileError
 
 
 def tell(text: str) -> None:
-    """Print a result on stdout; its line breaks are kept. Raises TactileError where it cannot be written."""
+    """Print a result on stdout; its line breaks are kept. Raises TactileError if it cannot be written."""
     with _written():
         sys.stdout.write("\n".join(map(printable, text.split("\n"))) + "\n")
 
 
 def flush() -> None:
-    """Flush stdout. Raises TactileError where it cannot be written."""
+    """Flush stdout. Raises TactileError if it cannot be written."""
     with _written():
         sys.stdout.flush()
 
@@ -97,7 +97,7 @@ EVERY = 10.0  # s between two lines of progress in a log
 @contextmanager
 def bar(name: str, unit: str, forced: bool) -> Iterator[Callable[[int, int], None]]:
     """Yield a callback (done, in all) that shows progress: a bar on a terminal or if `forced`, else a line every 10 s.
-    name : of the work, before the numbers; unit : what is counted, in the singular"""
+    name : word for the work, before the numbers; unit : what is counted, in the singular"""
     if not forced and not sys.stderr.isatty():
         yield _lines(name, unit)
         return

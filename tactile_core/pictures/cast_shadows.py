@@ -105,8 +105,8 @@ class ShadowCaster:
         return int(np.ceil((highest - lowest) / slope / GRID_STEP)) + 1
 
     def _march(self, field: np.ndarray, polar: tuple[slice, slice], reach: int) -> np.ndarray:
-        """Return the sight (rows, columns), -1 to FREE: at distance r from the foot ((foot - h(r)) / r - horizon)
-        radii, with foot the mapped LED's height and horizon the largest (h(r - d) - h(r)) / d over steps d.
+        """Return the sight (rows, columns), -1 to FREE: at distance r from the LED's foot point ((height - h(r)) / r -
+        horizon) radii, height that of the mapped LED, horizon the largest (h(r - d) - h(r)) / d over steps d.
         field : (rows, columns) m, h in the part ``polar`` of the polar grid; reach : columns of the longest shadow"""
         if available():
             steps = np.array(march_steps(min(reach, field.shape[1] - 1)), np.int64)

@@ -137,8 +137,8 @@ def _cast_shadow(caster: ShadowCaster, lit: Lit, k: int, height: np.ndarray, map
     The part of its disc above the horizon shines. With l the vector to the LED and e the unit vector upward across l,
     that part's centre is l + (radius moment / share) e, and
     normal . e = (tilt |l|^2 - above facing) / (|l| sqrt(|l|^2 - above^2)).
-    lit : its light is changed; mapped : (H, W) m, height by the map of ``cast_shadows``; edge : box of shadows'
-        beginnings"""
+    lit : its light is changed; mapped : (H, W) m, mapped field of ``cast_shadows``; edge : box where shadows may
+        begin"""
     sight, box = caster.sight(mapped, edge)
     facing, square = lit.facing[k][box], lit.square[k][box]
     share, moment = disc_share(sight)

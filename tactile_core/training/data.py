@@ -38,12 +38,11 @@ class Batch:
 
 
 class Contacts:
-    """Contacts with their split and both surfaces. Row SILENT is no contact, row C + i the mirror image of contact i of
-    C.
-    frames : moving frames by "biotac" (source) and "digit" (target); generator : of the bases' random start
+    """Contacts with their split and both surfaces. Row SILENT is no contact; row C + i mirrors contact i of the C.
+    frames : moving frames by "biotac" (source) and "digit" (target); generator : random numbers that start the bases
     biotac, digit : `SurfaceCodec` of these; electrodes : how many a signal has; depth : (C,) m, of the gel's dent
-    rest : (e,) counts of the unit that changes are from
-    device : where batches go; the contacts themselves stay in the host's memory"""
+    rest : (e,) counts from which changes are counted
+    device : that batches go to; the contacts themselves stay in the host's memory"""
 
     def __init__(
         self, pairs: Pairs, split: Split, options: Options, frames: dict[str, ContactFrame], generator: torch.Generator,
@@ -74,7 +73,7 @@ class Contacts:
         return rows + turned * len(self.pairs.press)
 
     def read(self, rows: np.ndarray, rng: np.random.Generator, rectified: float = 0.0, unit: float = 0.0) -> np.ndarray:
-        """Simulate readings (B, 20) of rows (B,), `measured`; rectified, unit : shares of readings, see `measured`"""
+        """Simulate readings (B, 20) of rows (B,), counts and 1 if rectified; rectified, unit : as in `measured`"""
         at, turned = self._which(rows)
         true = self.pairs.signal[at] * (rows != SILENT)[:, None]
         true[turned] = true[turned][:, image_of_electrodes(self.pairs.pair[0])]

@@ -41,7 +41,7 @@ SILENT_FRAMES = 2048  # two of them lie above the outermost quantile
 
 class Measure:
     """The exported networks, and the test presses: their rows (C,), and their signals change (C, 19) counts with noise.
-    bodies : surfaces of the sensors; seed : of the training, by which noise is drawn"""
+    bodies : surfaces of the sensors; seed : the training's, by which noise is drawn"""
 
     def __init__(self, networks: Networks, contacts: Contacts, bodies: Bodies, seed: int) -> None:
         self.networks, self.contacts, self.bodies, self.seed = networks, contacts, bodies, seed
@@ -133,8 +133,8 @@ def distance_quantiles(measure: Measure) -> dict[str, dict[str, list[float]]]:
 
 
 def fit_error_bounds(measure: Measure, silence: dict[str, list[float]]) -> dict[str, dict[str, list[float]]]:
-    """Fit `card.fit_bounds` on validation presses; return numbers by kind ("signed", "rectified"), then by "biotac",
-    "digit". silence : of `silence_quantiles`"""
+    """Fit `card.fit_bounds` on validation presses; return numbers by kind ("signed", "rectified"), then by surface
+    ("biotac", "digit"). silence : result of `silence_quantiles`"""
     nets, contacts, rows = measure.networks, measure.contacts, measure.contacts.split.validation
     silent, bounds = silent_level(silence, "digit_m"), {}
     for kind, share in SHARES.items():

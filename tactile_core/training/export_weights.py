@@ -124,8 +124,8 @@ def surface_sizes(surface: SurfaceCodec) -> dict[str, int]:
 
 
 def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, np.ndarray]:
-    """Return `Networks.signal_distance`'s tensors, "distance.": mean (K,), whitening (K, K), of training latents;
-    residual (e,), SVB's rms error in validation. seed : of the noise drawn for the signals"""
+    """Return the tensors of `Networks.signal_distance`, named "distance.mean" and so on: mean (K,) and whitening (K, K)
+    of training latents, residual (e,), SVB's rms error in validation. seed : number that seeds noise"""
     rng = np.random.default_rng([seed, 1])
     rows = np.tile(contacts.with_silence(contacts.split.train), DRAWS)
     left = np.tile(contacts.with_silence(contacts.split.validation), DRAWS)
@@ -176,7 +176,7 @@ def write_nets(folder: Path, tensors: dict, sizes: dict) -> dict[str, dict[str, 
 
 def write_net(folder: Path, net: str, tensors: dict[str, np.ndarray], sizes: dict[str, int]) -> dict[str, object]:
     """Write the file of network `net`; return the card's entry: file, sha256, sizes, shapes.
-    tensors : by their names in `networks.py`; sizes : of `net_sizes`"""
+    tensors : by their names in `networks.py`; sizes : numbers from `net_sizes`"""
     data = to_safetensors(tensors)
     write_bytes(folder / f"{net}.safetensors", data)
     shapes = {name: list(array.shape) for name, array in sorted(tensors.items())}

@@ -145,13 +145,12 @@ def fine_tune(
     progress: Progress | None = None,
     overwrite: bool = False,
 ) -> list[Row]:
-    """Write weights with S2MPN fine-tuned on the recording; return rows of errors before and after, on held-out
-    presses.
+    """Write weights with S2MPN fine-tuned on the recording; return rows of held-out presses' errors, before and after.
 
     out_folder/weights is for ``tactile convert --weights``; its card says what the fine-tuning was made of.
     weights_folder : the weights to begin with, None for those that ship; progress : takes the share done, a text
-    seed : of the split and of the order of training; overwrite : true replaces weights in out_folder
-    Raises TactileError for a recording without labels or of too few contacts, unreadable weights, and a folder that
+    seed : number that seeds the split and the order of training; overwrite : true replaces weights in out_folder
+    Raises TactileError for a recording without labels or with too few contacts, unreadable weights, and a folder that
     holds weights already, unless `overwrite`."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
@@ -248,8 +247,8 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:
-    """Write the weights folder: the source's files but for the tuned network, its own, and last the card with a note.
-    card : of the source; state : the tuned network's tensors; note : entry "fine_tuned" of the new card"""
+    """Write the weights folder: the source's files but for the tuned network's own, and last the card with a note.
+    card : the source's; state : the tuned network's tensors; note : entry "fine_tuned" of the new card"""
     for name in [*(f"{net}.safetensors" for net in card["nets"] if net != tuned), reference_signals.FILE]:
         write_bytes(folder / name, read_bytes(source / name))
     data = to_safetensors(state)

@@ -21,13 +21,13 @@ class Options:
     """Sizes and lengths of a training. On one core the defaults take 23 minutes for 50,000 contacts.
 
     latent_* : numbers in a latent; of a mesh's, two are the place of the dent
-    wide_*, near_* : principal fields of the whole surface, and of the window that moves with the dent
+    wide_*, near_* : number of principal fields of the whole surface, and of the window that moves with the dent
     half_* : cells from that window's middle to its edge (5.6 mm on the DIGIT, 6.7 mm on the BioTac)
-    width, blocks : of the residual MLPs; batch : contacts in a step of training
-    components : Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
-    *_epochs : of each stage, passes over the training contacts; `effort` multiplies all of them. More make simulated
-     contacts better, not real recordings (docs/train.md)
-    parts_steps : batches, times `effort`, of the network that separates two contacts; more hardly lower its error on
+    width, blocks : size of the residual MLPs; batch : contacts in a step of training
+    components : number of Gaussians of S2MPN's posterior over contacts (five: docs/sources.md, Networks)
+    *_epochs : passes of each stage over the training contacts; `effort` multiplies all of them. More make simulated
+        contacts better, not real recordings (docs/train.md)
+    parts_steps : batches, times `effort`, for the network that separates two contacts; more hardly lower its error on
         held-out presses
     beta : weight of the KL divergence against a loss that is 1 for no displacement (1e-4: docs/sources.md, Networks)
     astray : weight of the distance, in cells, of a translated place on the DIGIT from the true one, against the same
@@ -35,19 +35,19 @@ class Options:
     noise : counts, standard deviation of the reading; gain : relative standard deviation per channel (docs/sources.md)
     unit : share of signed training samples with a real unit's uncertainty, whose rest is found from recordings in
         contact throughout. unit_gain : standard deviation of the logarithm of a channel's gain; unit_offset : counts,
-        of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
+        that of its rest (10 to 60 counts between two halves of a unit's recordings; docs/units.md)
     misfit : error of each channel, as a share of the whole signal's size, in these samples and rectified ones. The
         simulated contacts nearest to real slides leave .3 of the signal, .07 per channel (commit d537259); 0.1 was
         chosen against 0.05 (docs/train.md)
-    rectified : share of training samples that lose their sign (assumed). Of these: rectified_gain, standard deviation
-        of the logarithm of a channel's gain (0.5: a real unit's against the simulated one); rectified_offset, counts,
-        of the tare before rectifying (assumed); rectified_missing, share of channels without reading (assumed)
+    rectified : share of training samples that lose their sign (assumed). For these, rectified_gain : standard deviation
+        of the logarithm of a channel's gain (0.5: a real unit's against the simulated one); rectified_offset : counts,
+        that of the tare before rectifying (assumed); rectified_missing : share of channels without reading (assumed)
     silence : share of training samples without contact: no displacement, signals of noise alone (assumed)
     mirrored : share of mirrored training samples, as both sensors are symmetric in z
-    without : names of indenters left out of the training; without_below_x : m, contacts left out beyond this x of the
-        pad
+    without : names of indenters left out of the training; without_below_x : m, contacts at smaller x on the pad are
+        left out
     left_out : stages that are not run; their networks keep their initial weights
-    weight_decay : of AdamW; rectified_decay : of R2MPN, which over-fits rectified signals otherwise
+    weight_decay : AdamW's; rectified_decay : R2MPN's, which over-fits rectified signals otherwise
     rate : largest learning rate
     checkpoint_seconds : least time between two checkpoints; does not change the result"""
 
@@ -117,7 +117,7 @@ class Options:
 
 
 def device_of(name: str) -> torch.device:
-    """Return the torch device of name auto, cpu or cuda. TactileError for others, or a GPU that torch does not see."""
+    """Return the torch device auto, cpu or cuda. Raises TactileError for others, or a GPU that torch does not see."""
     import torch
 
     if name not in DEVICES:

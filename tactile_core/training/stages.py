@@ -173,7 +173,8 @@ def chain_loss(model: Model, contacts: Contacts, batch: Batch, options: Options,
 
 
 def force_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Return the mean relative error of the force from the BioTac's latent, of true meshes and as found by signals."""
+    """Return the mean relative error of forces by latents of the BioTac: of true meshes, and of signals with
+    contacts."""
     with torch.no_grad():
         latent = torch.cat([model.MVB.mean(batch.biotac), model.given(batch.signal, batch.state)[0]])
     true = batch.force.repeat(2, 1)

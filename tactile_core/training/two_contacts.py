@@ -43,9 +43,8 @@ def train_parts(
     presses: Presses, split: Split, options: Options, rest: np.ndarray, sensor: str, seed: int,
     progress: Callable[[float, str], None],
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Train on the split's training presses; return the tensors by `networks.py`'s names. Equal arguments, equal
-    numbers.
-    rest : (e,) counts of the unit that changes are from; sensor : whose electrodes, by name; seed : of what is drawn
+    """Train on the split's training presses; return tensors by `networks.py`'s names, equal for equal arguments.
+    rest : (e,) counts from which changes are counted; sensor : name of the one with these electrodes; seed : of draws
     progress : called now and then with the share done (0 to 1) and a line of text"""
     random, generator = np.random.default_rng([seed, BATCH]), torch.Generator().manual_seed(seed)
     network, image = Residual(**parts_sizes(len(rest))), image_of_electrodes(sensor)

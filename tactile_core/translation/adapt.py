@@ -64,7 +64,7 @@ def adapt(
 ) -> Adapted:  # fmt: skip
     """Fit rest, gains and offsets of one sensor from all of its recordings (paths) together.
 
-    typical : signals of simulated contacts, to which its own are matched; options : of preparation
+    typical : signals of simulated contacts, to which its own are matched; options : how recordings are prepared
     rest : the unit's rest; None estimates it from all recordings. It serves recordings that are never calm near it
     Raises TactileError for a recording that is unreadable or scaled, signed and rectified ones together, too few frames
     in contact, and an estimated rest that looks like a contact."""
@@ -97,9 +97,9 @@ def adapt_hand(
     paths: Sequence[str | os.PathLike], typical: ReferenceSignals, options: PrepareOptions | None = None,
     untouched: str | None = None,
 ) -> tuple[SensorFile, tuple[str, ...]]:  # fmt: skip
-    """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings. Only
-    rest and film are found for a sensor without a typical rest. typical : of simulated contacts; options : of
-    preparation
+    """Fit the unit of recordings (paths) by `adapt`, or one unit for each finger of a hand; also return warnings.
+    typical : signals of simulated contacts; options : how recordings are prepared. Without a typical rest, only rest
+        and film are found
     untouched : path of a recording without contact, if there is one unit; None finds rest in all recordings
     Raises TactileError like `adapt`, and for a mixture of sensors, or of hands and single fingers."""
     columns = None if options is None else options.columns
@@ -189,8 +189,8 @@ def _film(recordings: Sequence[Recording], options: PrepareOptions | None, bare:
 
 
 def rest_unit(path: str, columns: ColumnMap | None = None) -> SensorFile:
-    """Return a unit of which only the rest is known, from a recording (path) of it untouched. Raises TactileError if it
-    is not raw or an electrode moves more than drift does."""
+    """Return a unit with only its rest known, from a recording (path) of it untouched. Raises TactileError if it is not
+    raw or an electrode moves more than drift does."""
     name = os.path.basename(path)
     return units_file({"unit": _rest_alone(read_rest(path, columns), f"rest from {name}, a recording without contact")})
 

@@ -35,8 +35,8 @@ MAX_SIZE = 100_000  # of anything in a card: larger than any network here, small
 
 
 def tensor_shapes(net: str, sizes: dict[str, int], electrodes: int = ELECTRODES) -> dict[str, tuple[int, ...]]:
-    """Return the shapes, by name, of network `net`'s tensors; sizes : of its card entry; electrodes : how many are
-    read"""
+    """Return the shapes, by name, of network `net`'s tensors. sizes : the net's in the card; electrodes : how many it
+    reads"""
     if net == "SVB":
         latent, hidden = sizes["latent"], SIGNAL_HIDDEN
         shapes = plain_shapes("encoder", (electrodes + 1, *hidden, 2 * latent))

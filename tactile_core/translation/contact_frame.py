@@ -115,7 +115,7 @@ class ContactFrame:
         return local
 
     def _overlap(self, cell: np.ndarray) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """Return the part of the lattice that the window around a cell (2,) covers, and where that part is in the
+        """Return rows and columns of the lattice that the window around a cell (2,) covers, and theirs in the
         window."""
         on_grid, in_window = [], []
         for middle, size in zip(cell.tolist(), (self.rows, self.columns), strict=True):

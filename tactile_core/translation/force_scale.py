@@ -99,7 +99,7 @@ def with_stiffness(
 
 
 def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: str) -> ForceScale:
-    """Fit the scale of translated forces (n,) N, in order of time, to measured ones. where : of the force, for errors
+    """Fit the scale of translated forces (n,) N, in order of time, to measured ones; where : name of these, for errors
     measured : function from a lag, s, to the forces (n,) N measured so much later, NaN if unknown"""
     half = len(translated) // 2
     correlations = {lag: _correlation(translated[:half], measured(lag)[:half]) for lag in map(float, LAGS)}

@@ -70,7 +70,7 @@ def silu(x: np.ndarray) -> np.ndarray:
 
 
 def plain(x: np.ndarray, tensors: Tensors, name: str, layers: int) -> np.ndarray:
-    """Apply linear layers with ReLU between them to x (T, inputs); return (T, outputs). tensors : of `plain_shapes`"""
+    """Apply linear layers with ReLU between them to x (T, inputs); return (T, outputs). tensors : see `plain_shapes`"""
     for layer in range(layers):
         x = linear(np.maximum(x, 0) if layer else x, tensors, f"{name}.{layer}")
     return x
@@ -89,8 +89,7 @@ def residual(x: np.ndarray, tensors: Tensors, name: str, blocks: int) -> np.ndar
 
 
 def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]]:
-    """Return `plain`'s tensors' shapes by name, which begins with ``name``; sizes : of inputs, then each layer's
-    outputs"""
+    """Return `plain`'s tensors' shapes by name; name : their prefix; sizes : of inputs, then each layer's outputs"""
     shapes: dict[str, tuple[int, ...]] = {}
     for layer, (inputs, outputs) in enumerate(zip(sizes[:-1], sizes[1:], strict=True)):
         shapes |= {f"{name}.{layer}.weight": (outputs, inputs), f"{name}.{layer}.bias": (outputs,)}
@@ -98,8 +97,7 @@ def plain_shapes(name: str, sizes: tuple[int, ...]) -> dict[str, tuple[int, ...]
 
 
 def residual_shapes(name: str, inputs: int, outputs: int, width: int, blocks: int) -> dict[str, tuple[int, ...]]:
-    """Return `residual`'s tensors' shapes by name, which begins with ``name``; inputs, outputs, width : of its
-    vectors"""
+    """Return `residual`'s tensors' shapes by name; name : their prefix; inputs, outputs, width, blocks : its sizes"""
     shapes: dict[str, tuple[int, ...]] = {
         f"{name}.first.weight": (width, inputs),
         f"{name}.last.weight": (outputs, width),

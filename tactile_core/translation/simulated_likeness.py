@@ -78,9 +78,8 @@ def shipped_patterns(sensor: str = SOURCE) -> Patterns:
 
 
 def residual_shares(change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None) -> np.ndarray:
-    """Return the shares (T, 3) of each change's length that the best pattern, the best two, and drift leave
-    unexplained.
-    change : (T, 19) counts, of a typical unit; patterns : of the sensor, None for a BioTac's
+    """Return shares (T, 3) of each change's length: unexplained by the best pattern, by the best two, and by drift.
+    change : (T, 19) counts, in a typical unit; patterns : the sensor's, None for a BioTac's
     rectified : (T,) bool; these frames and those that change no more than noise are not judged: NaN"""
     patterns = patterns or shipped_patterns()
     found = np.full((len(change), 3), np.nan)
@@ -132,9 +131,9 @@ def residual_lengths(signals: np.ndarray, patterns: Patterns) -> tuple[np.ndarra
 def recovered(
     change: np.ndarray, rectified: np.ndarray, patterns: Patterns | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give change (T, 19) counts its signs back if they are certain; return it and the mask (T,) of frames still
+    """Give change (T, 19) counts its signs back if they are certain; also return the mask (T,) of frames left
     rectified.
-    rectified : (T,) bool, frames that have lost their signs; patterns : of the sensor, None for a BioTac's"""
+    rectified : (T,) bool, frames that have lost their signs; patterns : the sensor's, None for a BioTac's"""
     change, rectified = np.array(change, np.float32), np.array(rectified, bool)
     rows = np.flatnonzero(rectified)
     if not len(rows):

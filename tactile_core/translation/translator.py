@@ -52,14 +52,14 @@ class Translation(Summary):
     pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero without contact
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), share of simulated frames like this one whose largest node error is below ``error_bound_digit``;
-        lower far from the training, and at most `UNTRAINED_CONFIDENCE` where a flag doubts the frame
+        lower far from the training, and at most `UNTRAINED_CONFIDENCE` if a flag doubts the frame
     expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one
-    error_bound_biotac, error_bound_digit : (T,) m, 95 % quantile of the same (measured on the validation presses)
+    error_bound_biotac, error_bound_digit : (T,) m, 95 % quantile of that error (measured on the validation presses)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
         and 0 elsewhere. Displacements are then those of both; ``force`` and ``contact_center`` of the stronger
     explained : (T,), 1 - sum((change - predicted)^2) / sum(change^2), predicted being the electrodes' change that such
-        a unit shows under the translated contact; at most 1, below 0 where zero is nearer, NaN without contact"""
+        a unit shows under the translated contact; at most 1, below 0 if zero is nearer, NaN without contact"""
 
     latent_signal: np.ndarray
     latent_biotac: np.ndarray

@@ -134,7 +134,7 @@ def _moved(readings: np.ndarray, rest: np.ndarray, simulated: Simulated, film: f
 
 
 def _pressure(recording: Recording) -> np.ndarray | None:
-    """PDC (T,) counts, None where it was not recorded."""
+    """Return PDC (T,) counts, None if it was not recorded."""
     return None if recording.pdc is None else in_counts(recording.pdc, 1.0, recording.sensor, [])
 
 

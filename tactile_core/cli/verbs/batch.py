@@ -63,7 +63,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Start a job, go on with it or look at it; returns the exit status."""
+    """Start a job, go on with it or show its state; returns the exit status."""
     from ...jobs.engine import job as jobs
     from ...jobs.engine import run as runs
 

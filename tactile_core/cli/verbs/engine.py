@@ -45,7 +45,7 @@ def parts_arguments(verb: argparse.ArgumentParser) -> None:
 
 
 def check_counts(options: argparse.Namespace, *names: str) -> None:
-    """Raise TactileError for options below 1 (None is allowed); names : of whole-number attributes of options"""
+    """Raise TactileError if an option is below 1 (None is allowed); names : whole-number attributes of options"""
     for name in names:
         value = getattr(options, name)
         if value is not None and value < 1:
@@ -63,7 +63,7 @@ def part(text: str | None) -> tuple[int, int] | None:
 
 
 def place(folder: Path, options: argparse.Namespace) -> Place:
-    """Return where the job in `folder` runs its tasks: on the cluster of the options, or else in local workers."""
+    """Return the executor of the job in `folder`: the cluster of the options, or else local workers."""
     if options.cluster is not None:
         from ...jobs.engine.dask_cluster import Cluster
 
@@ -74,7 +74,7 @@ def place(folder: Path, options: argparse.Namespace) -> Place:
 
 
 def place_of(options: argparse.Namespace) -> Callable[[Path], Place]:
-    """Return a function from a job's folder to where its tasks run by the options: by default, in this process."""
+    """Return a function from a job's folder to the executor that the options ask for, by default this process."""
     if options.cluster is None and (options.workers or 1) == 1:
         from ...jobs.engine.local import InProcess
 

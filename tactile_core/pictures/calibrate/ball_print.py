@@ -53,10 +53,10 @@ def print_on(
 ) -> np.ndarray:
     """Return the heights (H, W) float32, m, of a gel under a ball.
 
-    rest : (H, W) m, heights before; right, down : (H, W) m, image frame; thickness : m, of the gel
+    rest : (H, W) m, heights before; right, down : (H, W) m, image frame; thickness : m, the gel's
     ball : right, down of its centre, depth from first touch, radius, m
-    The dome changes the gap g between ball and gel. The print is that of the flat layer at the radius where the flat
-    gap is g: inside the contact the gel then lies on the sphere exactly."""
+    The dome changes the gap g between ball and gel. A point rises like that of a flat layer at the radius with the same
+    gap g under the ball: inside the contact the gel then lies on the sphere exactly."""
     at_right, at_down, depth, radius = ball
     gap = _profile(np.hypot(right - at_right, down - at_down), radius) + rest
     gap -= gap.min()

@@ -33,8 +33,8 @@ TARGETS = {
 class Evaluation:
     """Result of a calibration on one photograph.
 
-    ball : as fitted, its radius known; picture : (H, W, 3) uint8, rendered
-    metrics, baseline : of the picture and of the background alone, by the names of ``TARGETS``; flags : doubts in words
+    ball : as fitted, its radius known; picture : (H, W, 3) uint8, rendered; flags : doubts in words
+    metrics, baseline : numbers, by ``TARGETS``' names, for the picture and for the background alone
     through : light of the ball through the coating, fitted to this photograph, as a share of the coating's own; metrics
         ``through_*`` take the median of the set's other photographs for it, all others the calibration's"""
 
@@ -156,8 +156,8 @@ GAP, MAGNIFIED = 4, 2  # px between pictures; factor of the difference, round gr
 
 
 def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
-    """Return a report's rows: of all metrics' means over presses; and of each press, with where its ball was found.
-    name : of the set of photographs"""
+    """Return a report's rows: all metrics' means over presses; then each press's, with the place of its ball.
+    name : that of the set of photographs"""
     ours, baseline = mean_metrics(tried)
     means, by_press = [], []
     for metric, (unit, target, better) in TARGETS.items():
@@ -176,7 +176,7 @@ def rows_of(tried: list[Evaluation], name: str) -> tuple[list[Row], list[Row]]:
 
 
 def sheet(tried: list[Evaluation]) -> bytes:
-    """Draw photograph, render and difference (doubled, on grey) of the first 20 presses ``tried``; return a PNG."""
+    """Draw photograph, render and twice their difference, on grey, of the first 20 presses ``tried``; return a PNG."""
     from PIL import Image, ImageDraw
 
     shown = tried[:LARGEST_SHEET]

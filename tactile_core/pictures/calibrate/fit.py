@@ -34,7 +34,7 @@ MM_LIMITS = (0.5, 16.0)  # mm, ball diameters that fit on the gel
 
 @dataclasses.dataclass(frozen=True)
 class Calibrated:
-    """Result of `calibrate`. calibration : of the unit; warnings : sentences on what makes it doubtful
+    """Result of `calibrate`: the unit's calibration, and warnings, sentences on what makes it doubtful.
     tried : evaluations of it on the presses it was fitted to"""
 
     calibration: Calibration

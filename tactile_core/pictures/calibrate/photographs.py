@@ -132,9 +132,9 @@ def chosen(photographs: Photographs, names: list[str]) -> Photographs:
 
 
 def estimated_background(pictures: np.ndarray) -> np.ndarray:
-    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) of which presses cover less than half. At
-    each pixel it is the median of the values within 18 levels of the median of all: presses in a third of the pictures
-    pull that first median by up to 18 levels."""
+    """Estimate the untouched gel (H, W, 3) float32 from pictures (n, H, W, 3) in which each pixel is mostly untouched.
+    At each pixel it is the median of the values within 18 levels of the median of all: presses in a third of the
+    pictures pull that first median by up to 18 levels."""
     first = np.median(pictures, axis=0).astype(np.float32)
     touched = np.abs(pictures - first).max(-1, keepdims=True) > CHANGE
     rest = np.where(touched, np.nan, pictures.astype(np.float32))

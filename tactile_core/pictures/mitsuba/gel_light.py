@@ -172,7 +172,7 @@ class GelLight:
 
     def _mirrored(self, mi: Any, hit: Any, lobe: tuple[Any, Any]) -> np.ndarray:
         """Return the light (H, W, 3) that narrow highlights throw onto other gel, on cells half as wide as the
-        bounce's. hit : of the coarse rays; lobe : GGX's alpha, and the cosine at the lobe's end"""
+        bounce's. hit : the coarse rays' intersections; lobe : GGX's alpha, and the cosine at the lobe's end"""
         camera, step = self.unit.camera, self.preset.bounce_step
         cell = max(step // 2, 1)
         right, down = self._per_mm

@@ -27,7 +27,7 @@ def window_height(camera: Camera) -> float:
 
 def air_over_window(camera: Camera, index: float) -> float:
     """Return the thickness, m, of air between window and pinhole with which Snell's law shows the pinhole at the
-    camera's apparent height, along the axis. index : of refraction, of gel and window"""
+    camera's apparent height, along the axis. index : refractive index of gel and window"""
     return (camera.apparent_height - window_height(camera)) / index
 
 
