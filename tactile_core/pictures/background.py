@@ -135,6 +135,8 @@ def read_photograph(path: str | os.PathLike, camera: Camera | None = None) -> np
                 raise ValueError("more than 8 bits a pixel")
             if image.mode in ("1", "L", "LA"):
                 raise ValueError("it has no colours")
+            if image.format in ("PNG", "TIFF") and getattr(image, "n_frames", 1) > 1:  # the others would be lost
+                raise ValueError("several pictures in one file")
             picture = np.asarray(image.convert("RGB"))
     except TactileError:
         raise

@@ -83,8 +83,8 @@ def read_photographs(
 
     radii : m, of each folder's ball; None if one ball, given elsewhere, made all presses
     only : names of the presses to keep, in that order; None for all
-    Raises TactileError for a folder without pictures or without a press, pictures of different sizes, or too few
-    pictures to estimate the background; ModuleNotFoundError for a video without OpenCV."""
+    Raises TactileError for a folder without pictures or without a press, pictures of different sizes, a press that is
+    there twice or grey, or too few to estimate the background; ModuleNotFoundError for a video without OpenCV."""
     paths = [Path(each) for each in ([folders] if isinstance(folders, str | os.PathLike) else folders)]
     folder = paths[0] if len(paths) == 1 else Path(os.path.commonpath([path.absolute() for path in paths]))
     pictures, ball = {}, {}
@@ -118,7 +118,21 @@ def read_photographs(
         raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
     untouched = tuple(name for name, press in tried.items() if press is None)
     every = Photographs(folder, presses, rest, background is None, untouched, measured_noise(presses, rest))
-    return every if only is None else chosen(every, only)
+    found = every if only is None else chosen(every, only)
+    _check_pictures(found)
+    return found
+
+
+def _check_pictures(photographs: Photographs) -> None:
+    """Raise TactileError for a press without colours, and for one that is there twice: held out, it would be known."""
+    first: dict[bytes, str] = {}
+    for press in photographs.presses:
+        where, same = photographs.folder / press.name, first.setdefault(press.picture.tobytes(), press.name)
+        if same != press.name:
+            raise TactileError(where, f"the same picture as {same}", "a photograph of another press", "Take one away")
+        if (press.picture == press.picture[..., :1]).all():
+            found = "no colours: red, green and blue are the same everywhere"
+            raise TactileError(where, found, "a photograph in colours", "Save them as the camera gives them")
 
 
 def chosen(photographs: Photographs, names: list[str]) -> Photographs:

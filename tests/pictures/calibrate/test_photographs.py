@@ -66,6 +66,29 @@ def test_what_is_no_photograph_of_8_bits_is_named(folder: Path, tmp_path: Path) 
             read_photographs(mixed)
 
 
+def test_a_press_that_is_there_twice_or_grey_and_files_of_several_pictures_are_named(
+    folder: Path, tmp_path: Path
+) -> None:
+    files = sorted(folder.iterdir())
+    pictures = [Image.open(file).convert("RGB") for file in files]
+    for name, said in (
+        ("twice.png", "same picture as press_1"),
+        ("grey.png", "no colours"),
+        ("all.tif", "several pictures"),
+    ):
+        mixed = tmp_path / name
+        shutil.copytree(folder, mixed)
+        if name == "twice.png":
+            shutil.copy(files[1], mixed / name)
+        elif name == "grey.png":
+            pictures[0].convert("L").convert("RGB").save(mixed / name)
+        else:
+            pictures[0].save(mixed / name, save_all=True, append_images=pictures[1:])
+        with pytest.raises(TactileError, match=rf"{name}: .*{said}"):
+            read_photographs(mixed)
+    assert len(read_photographs(tmp_path / "twice.png", only=["press_1.png", "press_2.png"]).presses) == 2
+
+
 @pytest.mark.filterwarnings("error")
 def test_a_spot_that_every_press_covers_is_estimated_in_silence() -> None:
     """In two halves of two kinds of light no photograph is near the median of all."""
