@@ -1,8 +1,9 @@
-"""The fingertips as data: surfaces, materials, electrodes. Each constant is in its sensor's descriptor.
+"""Fingertips as data: surfaces, materials, electrodes. Each constant is in its sensor's descriptor.
 
-Frame shared by all sensors, that of the public meshes, metres: x along the finger, tip toward -x; y normal to the pad,
-contact side -y; z lateral. ``descriptor`` documents ``<name>/sensor.toml``; a DIGIT unit's camera and lights are in its
-calibration, see ``calibration_file``."""
+All sensors share one frame, that of the public meshes, in metres: x along the finger, tip toward -x; y normal to the
+pad, contact side -y; z lateral. ``descriptor`` documents ``<name>/sensor.toml``; a DIGIT unit's camera and lights are
+in its calibration, which ``calibration_file`` documents.
+"""
 
 from __future__ import annotations
 
@@ -49,14 +50,14 @@ def electrode_count(sensor: str) -> int:
 
 
 def electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Return electrodes' places (19, 3) m, E1 first, shared frame; BioTac SP (24, 3). TactileError: no or bad table."""
+    """Return places (e, 3) m, shared frame, of electrodes that are read, E1 first. TactileError: no or bad table."""
     places = from_maker(1e-3 * places_of(sensor).sensing, sensor)
     skin_of(sensor).check_inside(places)
     return places
 
 
 def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Positions (4, 3) m of the excitation electrodes X1..X4; the BioTac's are from a drawing (docs/sources.md)."""
+    """Return places (4, 3) m of the excitation electrodes X1..X4; the BioTac's are from a drawing (docs/sources.md)."""
     return from_maker(1e-3 * places_of(sensor).excitation, sensor)
 
 
@@ -68,17 +69,17 @@ def from_maker(points: np.ndarray, sensor: str) -> np.ndarray:
 
 
 def biotac_surface() -> Lattice:
-    """The BioTac's outer skin at rest, 3,650 nodes; see ``SkinShape.skin_surface``."""
+    """Return the BioTac's outer skin at rest, 3,650 nodes, ordered as in ``SkinShape.skin_surface``."""
     return skin_of(SOURCE).skin_surface("outer")
 
 
 def digit_surface() -> Lattice:
-    """The DIGIT's coated gel surface at rest, 2,867 nodes; see ``GelShape.surface``."""
+    """Return the DIGIT's coated gel surface at rest, 2,867 nodes, ordered as in ``GelShape.surface``."""
     return shape_of(TARGET).surface()
 
 
 def sensor_surface(sensor: str) -> Lattice:
-    """The resting surface of a sensor by its name, such as ``"biotac"`` or ``"digit"``."""
+    """Return the resting surface of a sensor, by its name, such as ``"biotac"`` or ``"digit"``."""
     return shape_of(sensor).surface() if is_gel(sensor) else skin_of(sensor).skin_surface("outer")
 
 
@@ -92,15 +93,16 @@ def rest_normals(sensor: str) -> np.ndarray:
 
 
 def surface_point(sensor: str, x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return a resting surface's point (3,) m and outward unit normal (3,) at ``x``, ``z``, m, of the plane that a gel
-    covers and a pad unrolls onto."""
+    """Return the point (3,) m of a resting surface, and its outward unit normal (3,), at ``x``, ``z``, m, of the plane
+    that a gel covers and a pad unrolls onto."""
     return shape_of(sensor).dome_point(x, z) if is_gel(sensor) else roll_up(np.array([x, z]), sensor)
 
 
 @functools.cache
 def thickness_at(sensor: str, node: int) -> float:
-    """Rest distance, m, from a node of the outer surface to the rigid support along the inward normal: to the flat back
-    of a gel; through skin and fluid to the core, or to the finger's axis where the normal misses the core. Cached."""
+    """Return the distance at rest, m, from a node of the outer surface to the rigid support along the inward normal: to
+    the flat back of a gel; through skin and fluid to the core, or to the finger's axis if the normal misses the core.
+    """
     point = sensor_surface(sensor).rest[node]
     if is_gel(sensor):
         return shape_of(sensor).thickness_below(point)
@@ -113,10 +115,10 @@ def is_gel(sensor: str) -> bool:
 
 
 def thickness(sensor: str) -> float:
-    """Thickness, m, of a gel at its apex, or of the skin."""
+    """Return the thickness, m, of a gel at its apex, or of the skin."""
     return shape_of(sensor).thickness if is_gel(sensor) else skin_of(sensor).thickness
 
 
 def title(sensor: str) -> str:
-    """A sensor's name in words."""
+    """Return a sensor's name in words."""
     return describe(sensor).title

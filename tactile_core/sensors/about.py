@@ -13,7 +13,7 @@ from .gel_sensor import GelSensor
 
 
 def about(name: str) -> str:
-    """Return lines on kind, size, material, surface, sources. TactileError for an unknown sensor or bad descriptor."""
+    """Return lines on a sensor's kind, size, material, surface, sources. TactileError for an unknown or bad sensor."""
     found, surface = describe(name), sensor_surface(name)
     gel = isinstance(found, GelSensor)
     apart = f"; {1e3 * shape_of(name).spacing:.2g} mm apart where the camera looks" if gel else ""

@@ -1,8 +1,9 @@
 """Parameters of a DIGIT unit's pictures: camera, lights, colours, gel and background, in frozen dataclasses.
 
-A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance of each
-LED's light reflected by the coating. Each LED's light is a spectral band of its own, measured in grey levels of that
-colour's channel in the picture's middle. The fast picture and Mitsuba use the same parameters."""
+A picture is ``response(right, down) L + ambient(right, down)`` in raw 8-bit values, where L is the radiance that the
+coating reflects of each LED's light. Each LED's light is a spectral band of its own, measured in grey levels of that
+colour's channel in the picture's middle. The fast picture and Mitsuba use the same parameters.
+"""
 
 from __future__ import annotations
 
@@ -22,10 +23,10 @@ MOST_LENGTH = 20e-3  # m of pitch or diameter: the gel itself is 18 x 25 mm
 
 @dataclasses.dataclass(frozen=True)
 class Markers:
-    """A square grid of round dots on the coating, in the middle of the picture. Raises TactileError out of range.
-    rows, columns : down the picture and to its right
+    """A square grid of round dots on the coating, in the middle of the picture. Raises TactileError for bad numbers.
+    rows, columns : numbers of dots down the picture and to its right
     pitch, diameter : m, between neighbours' middles, and of a dot
-    albedo : light that a dot scatters back over the coating's, 0 black to 1 invisible"""
+    albedo : light that a dot scatters back, over the coating's: 0 black to 1 invisible"""
 
     rows: int = number()
     columns: int = number()
@@ -49,7 +50,7 @@ class Markers:
 
     @property
     def count(self) -> int:
-        """Count the dots."""
+        """Number of dots."""
         return self.rows * self.columns
 
 
@@ -63,12 +64,12 @@ class Coating:
 
     bsdf : "diffuse" (Lambert), "roughplastic" (Lambert under a rough clear coat) or "principled" (Burley 2012)
     albedo : 0..1 share of each LED's light that it scatters back
-    roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; not of diffuse
-    gloss : 0..1, size of highlights; not of diffuse
+    roughness : 0.02..1, width of highlights: GGX's alpha of roughplastic, Burley's roughness; unused by diffuse
+    gloss : 0..1, size of highlights; unused by diffuse
     metallic : 0..1, of principled alone; 1 reflects like metal of that albedo
     spread : m, standard deviation of light's sideways spread, at most 2 mm; applied to the picture, in every preset
     transmission : 0..1, light that returns through it from a white object in contact, as a share of what the coating
-        itself reflects where it faces the LED at the picture's middle"""
+        itself reflects if it faces the LED at the picture's middle"""
 
     bsdf: str = DIFFUSE
     albedo: tuple[float, float, float] = number(default=(0.5, 0.5, 0.5))
@@ -111,9 +112,9 @@ LARGEST_LEVEL = 255.0  # of 8 bits
 
 @dataclasses.dataclass(frozen=True)
 class Response:
-    """Matrix (channel, led) from radiance to the camera's grey levels, linear over the picture.
+    """Matrix from the radiance of each LED's light to the camera's grey levels, varying linearly over the picture.
     centre : (3, 3) levels per level in the picture's middle; rows are channels of the picture, columns LEDs' colours
-    along_right, along_down : (3, 3) levels per level and metre of the plane of height zero"""
+    along_right, along_down : (3, 3) 1/m, its change per metre on the plane of height zero"""
 
     centre: tuple[tuple[float, ...], ...] = number(length=3)
     along_right: tuple[tuple[float, ...], ...] = number("per_mm", length=3)
@@ -135,7 +136,7 @@ class Response:
         return centre + camera.right[None, :, None, None] * right + camera.down[:, None, None, None] * down
 
     def times(self, led: np.ndarray) -> Response:
-        """Return the response with each LED's column, in centre and slopes, multiplied by led (3,), no unit."""
+        """Return the response with each LED's column, in centre and slopes, times its entry of led (3,), no unit."""
         parts = (np.asarray(getattr(self, field.name)) * led for field in dataclasses.fields(self))
         return Response(*(tuple(map(tuple, part.tolist())) for part in parts))
 
@@ -144,10 +145,10 @@ class Response:
 class Fit:
     """Data and errors of a calibration's fit.
 
-    note : how it was fitted, free text; photographs : names of the files; the folder is the user's
+    note : how it was fitted, free text; photographs : names of the files, without the user's folder
     ball_diameter : m, of the ball that they show
     errors : mean on those photographs, by metric: _l1 in grey levels, _psnr in dB, _ssim, lobe_iou, ball_radius_error
-    standard_errors : by parameter, in its unit of measurement in the file
+    standard_errors : by parameter, in its unit in the file
     not_identified : parameters that the photographs do not determine, held near the start by units' assumed spread"""
 
     note: str
@@ -168,8 +169,8 @@ class Calibration:
     ambient : (3, 21) or (3, 36), a row per LED: its light scattered in gel and acrylic, in units of its radiance on a
         coating that faces it at ``AMBIENT_DISTANCE``: a polynomial of right^i down^j / (10 mm)^(i + j), ordered by i +
         j, then by j
-    object_reflectance : 0 black to 1 white, of what touches the gel
-    ambient_rise : of each LED, relative growth of the ambient light's unit of measurement per metre of the gel's height
+    object_reflectance : 0 black to 1 white, of the object that touches the gel
+    ambient_rise : (3,) 1/m, by what share each LED's ambient light grows per metre of the gel's height
     coating : the paint on the gel
     gel_index : refractive index of gel and acrylic, assumed equal
     dome_scale : heights of the resting gel over its lowest point, as a multiple of the public mesh's
@@ -222,23 +223,22 @@ class Calibration:
 
     @property
     def pixel_response(self) -> np.ndarray:
-        """Response (H, W, 3, 3) at each pixel of the camera, channel by LED: levels shown per level of an LED."""
+        """Response (H, W, 3, 3) at each pixel of the camera, channel by LED: levels shown per level of LED light."""
         return self.response.matrices(self.camera)
 
     @property
     def facing(self) -> np.ndarray:
-        """Radiance (3,) of each LED's light on a coating that faces it, levels, at the distance from the LED to the
-        picture's centre: a matte coating of albedo a shows a r^2 / d^2 of the radiance of an even sphere (Lambert's
-        law)."""
+        """Radiance (3,) of each LED's light, levels, on a coating that faces it from as far as the picture's centre is:
+        a matte coating of albedo a shows a r^2 / d^2 of the radiance of an even sphere (Lambert's law)."""
         return self._lit([float(np.square(led.position).sum()) for led in self.leds])
 
     @property
     def through(self) -> float:
-        """Light from the object through the coating that it touches, as a share of ``facing``."""
+        """Light from an object through the coating that it touches, as a share of ``facing``."""
         return self.coating.transmission * self.object_reflectance
 
     def with_through(self, through: float) -> Calibration:
-        """Return the unit with another ``through``, 0 to 1: by the object's reflectance and, where even a white object
+        """Return the unit with another ``through``, 0 to 1: by the object's reflectance and, if even a white object
         gives less, by a larger transmission of the coating."""
         most = max(self.coating.transmission, through)
         coating = dataclasses.replace(self.coating, transmission=most)
@@ -271,7 +271,7 @@ class Calibration:
         return dataclasses.replace(self, leds=(red, green, blue), response=gain.times(1 / own))
 
     def at_size(self, width: int, height: int) -> Calibration:
-        """Return the unit with the same view at another width and height in pixels, see ``Camera.at_size``."""
+        """Return the unit with the same view at another width and height in pixels, as ``Camera.at_size`` allows."""
         return dataclasses.replace(self, camera=self.camera.at_size(width, height))
 
 

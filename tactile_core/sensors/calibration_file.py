@@ -1,5 +1,6 @@
-"""Calibrations as readable TOML: one file per unit, lengths in mm, each number explained beside it. Unknown and missing
-fields are refused."""
+"""Read and write calibrations as TOML: one file per unit, lengths in mm, each number explained beside it. Fields that
+are unknown or missing are refused.
+"""
 
 from __future__ import annotations
 
@@ -30,11 +31,11 @@ def load_calibration(
 ) -> Calibration:
     """Load the calibration in a TOML file.
 
-    path : by ``tactile calibrate`` or by hand, lengths in mm (the result's in m); None for the one shipped for sensor
+    path : of a file by ``tactile calibrate`` or by hand, lengths in mm (the result's in m); None for the one that ships
     sensor : name of the sensor whose calibration it must be; None for any, and without a path for the DIGIT
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the file's
-    A background's photograph is searched beside the file. Raises TactileError naming file and field for an unreadable
-    file, a field that is unknown, missing or out of range, and for a file of another sensor.
+    The photograph of a background is sought beside the file. Raises TactileError naming file and field for an
+    unreadable file, a field that is unknown, missing or out of range, and for a file of another sensor.
 
     >>> renderer = tactile.Renderer(tactile.load_calibration("unit.toml"))"""
     if object_reflectance is not None:
@@ -50,8 +51,8 @@ def load_calibration(
 
 
 def calibration_of(given: Calibration | str | os.PathLike | None, where: str) -> Calibration:
-    """Return ``given`` if it is a calibration, that of the file it names, or for None the DIGIT's that ships. Raises
-    TactileError, which names ``where``, for anything else, and as ``load_calibration`` does."""
+    """Return ``given`` if it is a calibration; load it if it is a file's path; return the DIGIT's that ships for None.
+    Raises TactileError, which names ``where``, for anything else, and what ``load_calibration`` raises."""
     if isinstance(given, str | os.PathLike | None):
         return load_calibration(given)
     if not isinstance(given, Calibration):
@@ -60,7 +61,7 @@ def calibration_of(given: Calibration | str | os.PathLike | None, where: str) ->
 
 
 def calibration_path(sensor: str) -> Path:
-    """Return the file of the calibration that a gel's descriptor names. Raises TactileError where it names none."""
+    """Return the file of the calibration that a gel's descriptor names. Raises TactileError if it names none."""
     gel = of_kind(sensor, GelSensor)
     if not gel.camera.calibration:
         advice = "Make one: `tactile calibrate --start FILE`, as docs/extend.md says"
@@ -159,12 +160,12 @@ def _calibration(content: dict[str, Any], folder: Path) -> Calibration:
 
 
 def write_calibration(path: str | os.PathLike, calibration: Calibration) -> None:
-    """Write a calibration file, whole or not at all, numbers with six digits; equal ones give equal bytes."""
+    """Write a calibration file, whole or not at all. Equal calibrations give equal bytes: numbers have six digits."""
     atomic.write_bytes(path, to_toml(calibration).encode())
 
 
 def to_toml(unit: Calibration) -> str:
-    """Format a calibration, numbers with six digits; a photograph is named without its folder, beside the file."""
+    """Format a calibration as TOML, numbers with six digits; its photograph is named without a folder."""
     camera, coating, response = unit.camera, unit.coating, unit.response
     sensor = "" if camera.sensor == Camera.sensor else f"sensor = {toml_value(camera.sensor)}\n"
     ambient = "\n".join(f"{colour} = {toml_value(row)}" for colour, row in zip(COLOURS, unit.ambient, strict=True))

@@ -1,8 +1,8 @@
 """Data of a camera and lights: one camera model, used for every step between pixels and gel.
 
-Image frame, used by camera and lights: right and down along the picture, toward the camera as third axis, metres,
-origin in the picture's centre at height zero (``Camera.height_zero_y``). A unit's own camera and lights are in its
-calibration, see ``calibration_file``.
+Image frame, for camera and lights: right and down along the picture, third axis toward the camera, metres, origin in
+the picture's centre at height zero (``Camera.height_zero_y``). A unit's own camera and lights are in its calibration,
+which ``calibration_file`` documents.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LOWEST_CAMERA = 5e-3  # m; the gel alone is 4 mm thick, and no press reaches a c
 
 @dataclasses.dataclass(frozen=True)
 class Camera:
-    """A pinhole camera that looks at the coating along -y, from inside the gel, over the picture's middle.
+    """A pinhole camera in the middle over the picture that looks at the coating along -y, from inside the gel.
 
     Its position is the apparent one, after refraction by gel and acrylic. A gel point appears at its central projection
     onto the plane of height zero: (right, down, h) at (right, down) / (1 - h / apparent_height).
@@ -72,7 +72,7 @@ class Camera:
 
     @property
     def height_zero_y(self) -> float:
-        """The plane of height zero, y m. Heights grow with y, toward the camera: an indentation raises them."""
+        """Coordinate y, m, of the plane of height zero. Heights grow with y, toward the camera: a dent raises them."""
         return of_kind(self.sensor, GelSensor).camera.height_zero_y
 
     @property
@@ -86,8 +86,8 @@ class Camera:
         return self.height, self.width
 
     def at_size(self, width: int, height: int) -> Camera:
-        """Return the same view at another width and height in pixels; raises TactileError for another aspect ratio or
-        fewer than 3. They may differ from an exact share by part of a pixel, which cuts the view."""
+        """Return the same view at another width and height in pixels. They may differ from an exact share of this one's
+        by part of a pixel, which cuts the view. Raises TactileError for another aspect ratio or fewer than 3 pixels."""
         if not -self.height < width * self.height - height * self.width < self.width:
             expected = f"the aspect ratio of {self.width} x {self.height}"
             raise TactileError("camera, size", f"{width} x {height} pixels", expected)
@@ -99,17 +99,17 @@ class Camera:
 
     @property
     def pixel_size(self) -> tuple[float, float]:
-        """Size (right, down) of a pixel, m of gel at height zero."""
+        """Size (right, down) of a pixel, m on the gel at height zero."""
         return 1e-3 / self.px_per_mm_x, 1e-3 / self.px_per_mm_y
 
     @property
     def right(self) -> np.ndarray:
-        """Places (width,) m of a row's pixel centres at height zero, to the right from the picture's middle."""
+        """Places (width,) m, to the right of the picture's middle, of the pixel centres in a row, at height zero."""
         return (np.arange(self.width) + 0.5 - self.width / 2) * self.pixel_size[0]
 
     @property
     def down(self) -> np.ndarray:
-        """Places (height,) m of a column's pixel centres at height zero, down from the picture's middle."""
+        """Places (height,) m, down from the picture's middle, of the pixel centres in a column, at height zero."""
         return (np.arange(self.height) + 0.5 - self.height / 2) * self.pixel_size[1]
 
     @property
@@ -123,7 +123,8 @@ class Camera:
         return self.centre_z + self.right_z * self.right
 
     def to_pixel(self, x: np.ndarray, z: np.ndarray, height: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Project x, z, height (...) m, toward the camera, to row and column (...) px, whole at pixel centres."""
+        """Project points x, z, height (...) m, toward the camera, to row and column (...) px, whole at pixel
+        centres."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         row = self.down_x * (np.asarray(x) - self.centre_x) * nearer / down + self.height / 2 - 0.5
@@ -131,14 +132,14 @@ class Camera:
         return row, column
 
     def sees(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return true where places x, z (n,) m of the gel at height zero lie in the picture; false for NaN."""
+        """Return which places x, z (n,) m of the gel at height zero lie in the picture, (n,) bool; false for NaN."""
         row, column = self.to_pixel(x, z)
         return (row > -0.5) & (row < self.height - 0.5) & (column > -0.5) & (column < self.width - 0.5)
 
     def to_gel(
         self, row: np.ndarray, column: np.ndarray, height: np.ndarray | float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return x, z (...) m of points at height (...) m that row, column (...) px see; inverts ``to_pixel``."""
+        """Return x, z (...) m of points at height (...) m that row, column (...) px show: inverts ``to_pixel``."""
         right, down = self.pixel_size
         nearer = 1 / (1 - np.asarray(height) / self.apparent_height)
         x = self.centre_x + self.down_x * (np.asarray(row) + 0.5 - self.height / 2) * down / nearer

@@ -23,21 +23,21 @@ KINDS: dict[str, type[Fluid] | type[GelSensor]] = {"fluid": Fluid, "gel": GelSen
 
 
 def _folders() -> dict[str, Path]:
-    """Find folders with a descriptor, by their names: those that ship, and those in ``$TACTILE_SENSORS``."""
+    """Return the folders that hold a descriptor, by their names: those that ship, and those in ``$TACTILE_SENSORS``."""
     own = os.environ.get(OWN)
     places = [Path(own), FOLDER] if own else [FOLDER]
     return {path.parent.name: path.parent for place in places for path in sorted(place.glob(f"*/{FILE}"))}
 
 
 def passed_over(name: str) -> tuple[Path, ...]:
-    """Return the user's folder of a sensor, one or none, that is ignored as a shipped sensor has the same ``name``."""
+    """Return the user's folder of a sensor, one or none, that is ignored: a sensor that ships has the same name."""
     own, ships = os.environ.get(OWN), FOLDER / name
     folder = Path(own or FOLDER) / name
     return (folder,) if (folder / FILE).is_file() and (ships / FILE).is_file() and not folder.samefile(ships) else ()
 
 
 def _advice() -> str:
-    """Advise how to make a sensor known, and what is wrong with the folder meant for the user's own."""
+    """Return advice on how to make a sensor known, and on what is wrong with the folder meant for the user's own."""
     own = os.environ.get(OWN)
     if own and (Path(own) / FILE).is_file():
         return f"${OWN} is {own}, a sensor's own folder: name the folder that holds it"
@@ -47,15 +47,15 @@ def _advice() -> str:
 
 
 def names() -> tuple[str, ...]:
-    """List the known sensors by name, sorted: those that ship, and the user's own folders in ``$TACTILE_SENSORS``."""
+    """Return the names of the known sensors, sorted: those that ship, and the user's own in ``$TACTILE_SENSORS``."""
     return tuple(sorted(_folders()))
 
 
 def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: str) -> tuple[str, str] | None:
-    """Return (the sensor of skin and fluid, the gel) whose nodes a file's keys name; None where they do not name two
-    sensors.
-    keys : the file's attributes, ``<name>_nodes_sha256`` for each sensor; where, what, advice : for errors, the file,
-    its content in words, what to do. Raises TactileError for an unknown sensor, and for two of the same kind."""
+    """Return the names of a file's sensor of skin and fluid and of its gel; None if its keys do not name two sensors.
+    keys : the file's attributes, of which ``<name>_nodes_sha256`` name sensors
+    where, what, advice : for errors: the file, its content in words, what to do
+    Raises TactileError for an unknown sensor, and for two of the same kind."""
     of = sorted(key.removesuffix(NODES) for key in keys if key.endswith(NODES))
     if len(of) != 2:
         return None
@@ -70,7 +70,7 @@ def pair_of(keys: Iterable[str], where: str | os.PathLike, what: str, advice: st
 
 
 def describe(name: str) -> Fluid | GelSensor:
-    """Read the descriptor of a known sensor. Raises TactileError for an unknown name."""
+    """Return the descriptor of a known sensor. Raises TactileError for an unknown name or a bad descriptor."""
     return _described(name if isinstance(name, str) else f"{name!r:.80}")
 
 
@@ -83,8 +83,8 @@ def _described(name: str) -> Fluid | GelSensor:
 
 
 def of_kind(name: str, form: type[_S]) -> _S:
-    """Read the descriptor of the sensor ``name``; ``form`` is its class, ``Fluid`` or ``GelSensor``. Raises
-    TactileError for a sensor of the other."""
+    """Return the descriptor of the sensor ``name``, of the class ``form``, ``Fluid`` or ``GelSensor``. Raises
+    TactileError for a sensor of the other kind."""
     found = describe(name)
     if not isinstance(found, form):
         kinds = {form: kind for kind, form in KINDS.items()}
@@ -93,7 +93,7 @@ def of_kind(name: str, form: type[_S]) -> _S:
 
 
 def read(folder: Path) -> Fluid | GelSensor:
-    """Read a folder's descriptor. Raises TactileError naming file and field for a missing, unknown or wrong one."""
+    """Read the descriptor in a folder. Raises TactileError naming file and field for one missing, unknown or wrong."""
     return read_toml(folder / FILE, lambda content: _sensor(content, folder), "a sensor's descriptor")
 
 

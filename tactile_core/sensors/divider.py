@@ -1,9 +1,10 @@
 """Convert between an electrode's impedance and counts, and between the changes of units with different rest counts.
 
 Each electrode forms a voltage divider with a load across which counts are read, so that they fall as its film thins
-(SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). Where the impedance Z grows by a factor g from rest, E =
+(SynTouch, BioTac SP manual): E = COUNT_MAX / (1 + Z / load). If the impedance Z grows by a factor g from rest, E =
 COUNT_MAX / (1 + (COUNT_MAX / E_rest - 1) g): neither load nor conductivity matters, only the counts at rest. Only the
-film's part of Z grows as the film thins; the contact resistance in series stays, equal for all units."""
+film's part of Z grows as the film thins; the contact resistance in series stays, equal for all units.
+"""
 
 from __future__ import annotations
 
@@ -23,19 +24,19 @@ RESTS = 500.0, 3750.0
 
 
 def reading(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return counts (..., 19), not rounded, at growth (..., 19) times the impedances that read rest (19,) counts."""
+    """Return counts (..., 19), not rounded, at growth (..., 19) times the impedance that reads rest (19,) counts."""
     return COUNT_MAX / (1 + (COUNT_MAX / np.asarray(rest, float) - 1) * growth)
 
 
 def of_films(growth: np.ndarray | float, rest: np.ndarray | float) -> np.ndarray:
-    """Return the counts (..., 19), not rounded, where the films' impedances alone are ``growth`` (..., 19) times those
-    that read ``rest`` (19,) counts; contacts' resistances stay."""
+    """Return the counts (..., 19), not rounded, if the films' impedances are ``growth`` (..., 19) times those at
+    ``rest`` (19,) counts; the contacts' resistances stay."""
     return COUNT_MAX / (1 + np.maximum(_SERIES + _film(rest) * growth, 0))
 
 
 def typical(change: np.ndarray, rest: np.ndarray, to: np.ndarray = REST_COUNTS) -> np.ndarray:
-    """Convert change (..., 19) counts of a unit at counts rest (..., 19) to that of one at counts ``to`` (19,). A unit
-    at 3,500 counts responds to a contact with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5 times."""
+    """Convert change (..., 19) counts of a unit that rests at rest (..., 19) counts to that of one that rests at ``to``
+    (19,). A unit at 3,500 counts responds with 0.7 times the change of one at 3,300, a unit at 2,800 with 1.5 times."""
     return _converted(change, rest, to)
 
 
@@ -46,14 +47,14 @@ def of_unit(change: np.ndarray, rest: np.ndarray, of: np.ndarray = REST_COUNTS) 
 
 
 def _converted(change: np.ndarray, rest: np.ndarray, to: np.ndarray) -> np.ndarray:
-    """Convert change of a unit at counts rest to that at counts to, with equal growth of the film's impedance."""
+    """Convert change of a unit that rests at rest counts to that of one at ``to``; the films' impedances grow alike."""
     rest, to = np.clip(rest, *RESTS), np.clip(to, *RESTS)
     return of_films(_film(rest + change) / _film(rest), to) - to
 
 
 def _film(counts: np.ndarray | float) -> np.ndarray:
-    """Return the film's impedance (...) at counts (...), over the load's; below 0 for more counts than a film
-    allows."""
+    """Return the film's impedance (...) at counts (...), over the load's; below 0 for more counts than any film
+    gives."""
     return COUNT_MAX / np.clip(counts, *_ENDS) - 1 - _SERIES
 
 
@@ -65,13 +66,13 @@ def film_impedance(counts: np.ndarray) -> np.ndarray:
 def of_typical_film(
     change: np.ndarray, rest: np.ndarray, thickness: float, conductivity: np.ndarray | float = 1.0
 ) -> np.ndarray:
-    """Convert change (..., 19) counts of a unit at counts rest (..., 19) to that of one with typical films.
+    """Convert change (..., 19) counts of a unit at rest (..., 19) counts to that of a unit with typical films.
 
-    thickness : of its films at rest, divided by a typical unit's; conductivity : its fluid's, divided by that at rest
-    A movement u of the skin over a film h makes the impedance grow by g = h / (h - u); over a typical film of h /
-    thickness the same u makes it grow by 1 / (1 - thickness (1 - 1 / g)), for each electrode by itself. Compared with
-    the conducting sheet (111 simulated contacts), 7, 9, 12 and 14 % of the change remain as error at .8, .6, .45 and
-    .33, and 28, 72, 136 and 246 % without the conversion."""
+    thickness : of this unit's films at rest, over a typical unit's; conductivity : its fluid's, over that at rest
+    If the skin moves by u over a film h, the impedance grows by g = h / (h - u); over a typical film of h / thickness
+    the same u makes it grow by 1 / (1 - thickness (1 - 1 / g)), for each electrode by itself. Compared with the
+    conducting sheet (111 simulated contacts), 7, 9, 12 and 14 % of the change remain as error at .8, .6, .45 and .33,
+    and 28, 72, 136 and 246 % without the conversion."""
     rest = np.clip(rest, *RESTS)
     still = film_impedance(rest)
     thinned = 1 - still / (film_impedance(rest + change) * conductivity)

@@ -23,9 +23,9 @@ SP_COLUMNS = ("id", "core_x", "core_y", "core_z", "skin_x", "skin_y", "skin_z", 
 @dataclasses.dataclass(frozen=True)
 class Places:
     """Electrodes of a sensor, mm in its maker's frame.
-    sensing : (n, 3), electrodes that are read
-    rest_counts : (n,), of a typical unit without contact; NaN where unknown
-    excitation : (m, 3), those that feed the current"""
+    sensing : (n, 3), places of those that are read
+    rest_counts : (n,), of a typical unit without contact; NaN if unknown
+    excitation : (m, 3), places of those that feed the current"""
 
     sensing: np.ndarray
     rest_counts: np.ndarray
@@ -34,7 +34,7 @@ class Places:
 
 @functools.cache
 def places_of(name: str) -> Places:
-    """Read the electrodes of a sensor, from the table of its descriptor, beside it or in ``$TACTILE_SENSORS/<name>/``.
+    """Read the electrodes of a sensor from their table, beside its descriptor or in ``$TACTILE_SENSORS/<name>/``.
     Raises TactileError for a sensor without electrodes, and for a table that is missing or bad."""
     found, path = of_kind(name, Fluid), table_of(name)
     table = found.electrodes.places
@@ -58,7 +58,7 @@ def table_of(name: str) -> Path:
 
 
 def typical_rest(name: str) -> np.ndarray | None:
-    """Return the counts (e,) of a sensor's typical unit at rest; None where they, or the table, are not there. Raises
+    """Return the counts (e,) of a sensor's typical unit at rest; None if they, or their table, are missing. Raises
     TactileError for a bad table."""
     rest = places_of(name).rest_counts if table_of(name).is_file() else np.array([np.nan])
     return rest if np.isfinite(rest).all() else None
@@ -66,14 +66,14 @@ def typical_rest(name: str) -> np.ndarray | None:
 
 @functools.cache
 def contacts_of(name: str) -> np.ndarray | None:
-    """Load changes (contacts, electrodes) float64 counts of simulated contacts, to judge recordings by; None without
-    such a table. Raises TactileError for a sensor without electrodes, or a bad table."""
+    """Load the counts, float64 (contacts, electrodes), by which simulated contacts change readings, to judge recordings
+    by; None without such a table. Raises TactileError for a sensor without electrodes, or a bad table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contacts)
 
 
 def contact_pressures_of(name: str) -> np.ndarray | None:
-    """Load the fluid's pressure rise (contacts,) float64 Pa, of each row of ``contacts_of``; None without a table."""
+    """Load the fluid's pressure rise (contacts,) float64 Pa in each row of ``contacts_of``; None without a table."""
     found = of_kind(name, Fluid)
     return _table(found, found.electrodes.contact_pressures)
 
@@ -87,9 +87,9 @@ def _table(sensor: Fluid, file: str) -> np.ndarray | None:
 
 
 def read_places(path: Path) -> Places:
-    """Read places, mm, in a CSV of name, x_mm, y_mm, z_mm, rest_counts; electrodes without counts are the
-    excitation's. Or bsadr/biotac's own table of a BioTac SP, whose ids below zero are the excitation's. Raises
-    TactileError naming file and row."""
+    """Read the electrodes in a CSV of name, x_mm, y_mm, z_mm, rest_counts, those without counts as the excitation's; or
+    in bsadr/biotac's table of a BioTac SP, where ids below zero are the excitation's. Raises TactileError naming file
+    and row."""
     rows = list(csv.reader(table_text(path).splitlines()))
     if rows and tuple(rows[0]) == SP_COLUMNS:
         return _read_sp(path, rows[1:])
@@ -111,7 +111,7 @@ def read_places(path: Path) -> Places:
 
 
 def _read_sp(path: Path, rows: list[list[str]]) -> Places:
-    """Sort electrodes, rows of cells of the file, by their numbers; those of the excitation have -1, -2, ..."""
+    """Return the electrodes in rows of the table's cells, sorted by id; the excitation's ids are -1, -2, ..."""
     places: dict[int, tuple[float, ...]] = {}
     for at, row in enumerate(rows, start=2):
         try:

@@ -1,4 +1,4 @@
-"""Descriptor of a finger of skin, fluid and core, such as the BioTac: ``Fluid`` and its tables."""
+"""Descriptor of a finger of skin, fluid and core, such as the BioTac: ``Fluid``, and a class for each of its tables."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Frame:
 
 @dataclasses.dataclass(frozen=True)
 class Skin:
-    """A skin around an axis along x, from a table of its radii. Lengths in m, angles in rad; thickness : of the skin
-    profile : table of stations x and angles, with the radii of outer skin, inner skin and core
-    axis_y : of the axis (y, z) = (axis_y, 0); tip_x, base_x : between them the skin is a cylinder
-    outer_poles, inner_poles : x where the meridians meet the axis, tip and base
-    pad_half_angle : of the part that unrolls, to either side of the lowest line"""
+    """A skin around an axis along x, from a table of its radii. Lengths in m, angles in rad.
+    profile : file of the table: stations x and angles, and there the radii of outer skin, inner skin and core
+    axis_y : y of the axis, whose z is 0; tip_x, base_x : ends of the part that is a cylinder
+    outer_poles, inner_poles : x at which the meridians meet the axis, at tip and base
+    pad_half_angle : of the part that unrolls, to either side of the lowest line; thickness : of the skin"""
 
     profile: str = file_beside()
     axis_y: float = number("mm")
@@ -59,7 +59,7 @@ class Skin:
 class Core:
     """The rigid core, to which the skin is bonded in places.
     attached : m, inner nodes this close to the core are bonded to it
-    tip_cap_x, base_cap_x : m, beyond which all are bonded
+    tip_cap_x, base_cap_x : m, x beyond which all inner nodes are bonded
     contact_x, contact_half_angle : m and rad, part of the surface for which the distance to the core is tabulated
     facing_half_angle : rad, of the part of the skin that may touch the core"""
 
@@ -73,8 +73,8 @@ class Core:
 
 @dataclasses.dataclass(frozen=True)
 class SkinLattice:
-    """Numbers of node intervals of the skin's surface: along a meridian over tip, trunk and base (``*_rows``), round
-    the axis over pad and back (``*_intervals``)."""
+    """Numbers of intervals between the skin's surface nodes: along a meridian in tip, trunk and base (``*_rows``), and
+    round the axis in pad and back (``*_intervals``)."""
 
     tip_rows: int = number(above=1, below=MOST_NODES)
     trunk_rows: int = number(above=1, below=MOST_NODES)
@@ -94,11 +94,11 @@ class FluidFilm:
 
 @dataclasses.dataclass(frozen=True)
 class Electrodes:
-    """The electrodes on the core.
-    places : table of names, places and counts at rest, see ``electrodes``; radius : m; count : number that are read
-    contacts : table of counts that simulated contacts change, which show a recording's polarity and faults; empty where
-        only the networks bring such
-    contact_pressures : table of the fluid's pressure rise, Pa, in the same contacts; empty where unknown"""
+    """The electrodes on the core. count : number that are read; radius : m, of each
+    places : file of the table of their names, places and counts at rest, which ``electrodes`` reads
+    contacts : file of counts by which simulated contacts change readings, which show a recording's polarity and faults;
+        empty if only weights bring such
+    contact_pressures : file of the fluid's pressure rise, Pa, in the same contacts; empty if unknown"""
 
     places: str = file_beside()
     count: int = number(above=0, below=MOST_ELECTRODES)
@@ -109,8 +109,8 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """Voltage dividers and a converter. bits : of a count; rate : Hz; load : ohm, of a divider; pressure : Pa per count
-    polarity : "falls" or "rises", what raw counts do as a film thins"""
+    """Voltage dividers and a converter. bits : of a count; rate : Hz, of frames; load : ohm, of a divider
+    polarity : "falls" or "rises", what raw counts do as a film thins; pressure : Pa per count"""
 
     bits: int = number(above=0, below=32)
     rate: float = number("hz", above=0)
@@ -121,8 +121,8 @@ class Readout:
 
 @dataclasses.dataclass(frozen=True)
 class Unrolling:
-    """Rolling of the pad onto the common plane. radius : m, of the pad's cross-section
-    origin_x : m, the x of the pad that keeps its x when unrolled"""
+    """Unrolling of the pad onto the common plane. radius : m, of the pad's cross-section
+    origin_x : m, the x of the pad that stays the same when it is unrolled"""
 
     radius: float = number("mm", above=0)
     origin_x: float = number("mm")
@@ -130,8 +130,8 @@ class Unrolling:
 
 @dataclasses.dataclass(frozen=True)
 class Fluid:
-    """A finger of skin, fluid and core with electrodes, as the BioTac. title : its name in words
-    sources : where its numbers are from, in words; folder : its descriptor's"""
+    """A finger of skin, fluid and core with electrodes, such as the BioTac. title : its name in words
+    sources : where its numbers are from, in words; folder : that of its descriptor"""
 
     title: str
     sources: tuple[str, ...]

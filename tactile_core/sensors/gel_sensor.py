@@ -1,4 +1,4 @@
-"""Descriptor of a gel on a window, such as the DIGIT's: ``GelSensor`` and its tables."""
+"""Descriptor of a gel on a window, such as the DIGIT's: ``GelSensor``, and a class for each of its tables."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ZERO_WITHIN = 0.2e-3  # m: a dome, fitted to a table, may be lower at its apex t
 
 @dataclasses.dataclass(frozen=True)
 class Outline:
-    """The gel's outline on the plane, m, from x = tip_x to base_x and |z| up to half_width.
+    """The gel's outline on the plane, m: from x = tip_x to base_x, and |z| up to half_width.
     tip : "round", a half circle, or "square"; corner_radius : of the base's corners, and of a square tip's"""
 
     half_width: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
@@ -27,8 +27,8 @@ class Outline:
 
 @dataclasses.dataclass(frozen=True)
 class Body:
-    """A gel between its surface and a flat back at y = back_y, bonded; m. thickness : at the apex
-    edge_drop, edge_width : how far its surface falls toward the outline, and over what width"""
+    """A gel between its surface and a flat bonded back at y = back_y; all m. thickness : at the apex
+    edge_drop, edge_width : by how much its surface falls toward the outline, and over what width"""
 
     back_y: float = number("mm")
     thickness: float = number("mm", above=LEAST_MM, below=LARGEST_MM)
@@ -38,9 +38,9 @@ class Body:
 
 @dataclasses.dataclass(frozen=True)
 class Dome:
-    """The height of a gel over its back. profile : table of heights
+    """The height of a domed gel over its back. profile : file of a table of heights
     degree_along, degree_across : of the fitted polynomials, in x, and in the square of z
-    margin : m, outer edge of the table that is left out"""
+    margin : m, width along the outline in which the table's heights are left out"""
 
     profile: str = file_beside()
     degree_along: int = number(above=-1, below=30)
@@ -50,8 +50,9 @@ class Dome:
 
 @dataclasses.dataclass(frozen=True)
 class GelLattice:
-    """Nodes of a gel's surface. window_x, window_z : m, ends of the part with even steps; window_nodes : along x and z
-    rim_tip, rim_base, rim_side : number of nodes from the window's edges to the outline"""
+    """Nodes of a gel's surface. window_x, window_z : m, ends of the window, the part with even steps
+    window_nodes : numbers of nodes along x and z in it
+    rim_tip, rim_base, rim_side : numbers of nodes from the window's edges to the outline"""
 
     window_x: tuple[float, float] = number("mm")
     window_z: tuple[float, float] = number("mm")
@@ -72,7 +73,7 @@ class GelLattice:
 @dataclasses.dataclass(frozen=True)
 class CameraMount:
     """Place of the camera. height_zero_y : m, y of the plane from which pictures' heights count
-    calibration : name of a unit's file beside the descriptor, empty where there is none"""
+    calibration : name of a unit's calibration file beside the descriptor, empty if there is none"""
 
     height_zero_y: float = number("mm")
     calibration: str = file_beside(or_none=True)
@@ -80,8 +81,8 @@ class CameraMount:
 
 @dataclasses.dataclass(frozen=True)
 class GelSensor:
-    """A gel on a window that a camera looks through, as the DIGIT. title : its name in words; dome : None for flat
-    sources : where its numbers are from, in words; folder : its descriptor's"""
+    """A gel on a window that a camera looks through, such as the DIGIT. title : its name in words; dome : None for flat
+    sources : where its numbers are from, in words; folder : that of its descriptor"""
 
     title: str
     sources: tuple[str, ...]
@@ -94,7 +95,7 @@ class GelSensor:
     dome: Dome | None = dataclasses.field(default=None, metadata=MAY_MISS)
 
     def __post_init__(self) -> None:
-        """Raise TactileError for a window that does not lie inside the outline, whose mesh would fold."""
+        """Raise TactileError for tables that contradict each other, such as a window outside the outline."""
         outline, (low, high) = self.outline, self.lattice.window_z
         if outline.corner_radius >= outline.half_width:
             found, expected = (f"{1e3 * each:g}" for each in (outline.corner_radius, outline.half_width))

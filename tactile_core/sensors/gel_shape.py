@@ -1,4 +1,4 @@
-"""A gel's shape from its descriptor: outline, dome and the lattice of its surface, on which its mesh is built."""
+"""A gel's shape from its descriptor: outline, dome, and the lattice of its surface, on which its mesh is built."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def shape_of(name: str) -> GelShape:
 
 class GelShape:
     """The resting gel of a descriptor: lengths in m, places (x, z) on its plane, outward is -y.
-    half_width, tip_x, base_x : of the outline; arc_x : centre of a round tip
-    back_y : of the flat back; thickness : at the apex; spacing : of the lattice's window along x"""
+    half_width, tip_x, base_x : of the outline; arc_x : x of a round tip's centre
+    back_y : y of the flat back; thickness : at the apex; spacing : of the lattice's window along x"""
 
     def __init__(self, descriptor: GelSensor) -> None:
         self.descriptor = descriptor
@@ -43,9 +43,9 @@ class GelShape:
         return np.clip(np.minimum(side, self.base_x - x), 0, None)
 
     def dome_height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the resting gel's height (...) m above its flat back at x, z (...) m: the thickness, or with a [dome]
-        a smooth fit to its profile (of a faceted mesh; least squares by Chebyshev polynomials in x, even powers of z),
-        less the edge's drop near the outline."""
+        """Return the resting gel's height (...) m above its flat back at x, z (...) m: the thickness or, with a [dome],
+        a smooth fit to its profile (least squares by Chebyshev polynomials in x, even powers of z), less the edge's
+        drop near the outline."""
         x, z = np.broadcast_arrays(np.asarray(x, float), np.asarray(z, float))
         edge = np.clip(1 - self.outline_distance(x, z) / self._body.edge_width, 0, 1)
         dome = self.descriptor.dome
@@ -104,7 +104,7 @@ class GelShape:
         return np.full(np.shape(z), self.tip_x)
 
     def _corner_block(self, steps_x: np.ndarray, steps_z: np.ndarray) -> np.ndarray:
-        """Return points (rows, columns, 2) = (x, z) m from the window's tip corner (z > 0) to the arc.
+        """Return points (rows, columns, 2) = (x, z) m from the window's corner at the tip (z > 0) to a round tip.
         steps_x, steps_z : (rows,), (columns,), fractions 0 to 1 of the way along either axis"""
         corner = np.array([self._lattice.window_x[0], self._lattice.window_z[1]])
         # where the row of the corner meets the arc, and where its column does

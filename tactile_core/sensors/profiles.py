@@ -1,4 +1,4 @@
-"""Read the profile tables of sensors' descriptors: shapes of resting surfaces, sampled."""
+"""Read the tables of sensors' descriptors that hold shapes of resting surfaces, sampled."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _AROUND = 72  # angles of a station, every 5 degrees
 
 def read_radii(path: Path) -> np.ndarray:
     """Read a skin's stations (n, 72, 5): x, angle and radii of outer skin, inner skin and core, mm and degrees; NaN
-    where a ray missed. Raises TactileError for stations that do not have every 5 degrees from -180 to 175, for fewer
-    than two with the outer skin all round, and for gaps in it between the first and the last of these."""
+    where a ray missed. Raises TactileError unless each station has every 5 degrees from -180 to 175, at least two have
+    the outer skin all round, and it has no gaps between the first and the last of these."""
     rows = _table(path, _RADII)
     angles = -180 + 360 / _AROUND * np.arange(_AROUND)
     if len(rows) % _AROUND or not (rows[:, 1].reshape(-1, _AROUND) == angles).all():

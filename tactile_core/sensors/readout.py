@@ -20,9 +20,9 @@ def readings(change: np.ndarray, time: np.ndarray, seed: int, *, noise: float, d
     seed : of rest, drift and noise
     noise : counts, standard deviation in each frame (0.7 to ``NOISE`` in real recordings: docs/sources.md)
     drift : counts/s; each electrode drifts evenly, up or down, by this at most (88 counts in an hour: docs/sources.md)
-    Changes are those of a unit that rests at ``REST_COUNTS``. This unit's rest is drawn, and they are converted to it
-    (``divider``), rounded and clipped to 0..4095. Rest, drift and noise have random streams of their own: a longer
-    recording begins with the same values, and changing one of the three leaves the others."""
+    The change is that of a unit that rests at ``REST_COUNTS``. It is converted (``divider``) to a unit whose rest is
+    drawn at random; the readings are rounded and clipped to 0..4095. Rest, drift and noise have random streams of their
+    own: a longer recording begins with the same values, and changing one of the three leaves the others."""
     streams = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(4)]  # the second: unused
     electrodes = change.shape[1]
     rest = REST_COUNTS + np.round(streams[0].uniform(-REST_SPREAD, REST_SPREAD, electrodes))

@@ -1,4 +1,4 @@
-"""A fluid sensor's shape from its descriptor: skin and core as structured surfaces, from the table of their radii."""
+"""Shape of a fluid sensor from its descriptor: skin and core as structured surfaces, from the table of their radii."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SkinShape:
 
     @functools.cached_property
     def angles(self) -> np.ndarray:
-        """Angles (columns,) rad about the axis, 0 at the pad's lowest line, growing toward +z, rising from -pi."""
+        """Angles (columns,) rad about the axis, rising from -pi: 0 at the pad's lowest line, positive toward +z."""
         pad = np.linspace(-self.pad_angle, self.pad_angle, self._lattice.pad_intervals + 1)
         back = np.linspace(self.pad_angle, 2 * np.pi - self.pad_angle, self._lattice.back_intervals + 1)[1:-1]
         back = np.where(back > np.pi - 1e-9, back - 2 * np.pi, back)
@@ -45,7 +45,7 @@ class SkinShape:
 
     @functools.cached_property
     def table(self) -> dict[str, np.ndarray]:
-        """By name: x (n,) m, theta (72,) rad; radii (n, 72) m outer, inner (of the skin), core. Symmetric in z."""
+        """Arrays by name: x (n,) m, theta (72,) rad; radii (n, 72) m outer, inner (of the skin), core, even in z."""
         rows = read_radii(self.descriptor.folder / self._skin.profile)
         mirror = (-np.arange(72)) % 72  # the table starts at -180 degrees in 5 degree steps
         radii = _mean_of_known(rows[..., 2:], rows[:, mirror, 2:]) * 1e-3
@@ -58,8 +58,7 @@ class SkinShape:
         }
 
     def _meridian(self, layer: str, column: int) -> np.ndarray:
-        """Return points (rows, 2) = (x, r) m along one meridian of a layer's table, from the tip pole to the base
-        pole."""
+        """Return points (rows, 2) = (x, r) m along one meridian of a layer, from the tip pole to the base pole."""
         table = self.table
         known = np.isfinite(table[layer][:, column])
         x, r = table["x"][known], table[layer][known, column]
@@ -77,29 +76,29 @@ class SkinShape:
 
     @functools.cache  # noqa: B019
     def _meridians(self, layer: str) -> np.ndarray:
-        """All meridians (stations, 2, 72) of a layer."""
+        """Return all meridians (stations, 2, 72), (x, r) m, of a layer."""
         return np.stack([self._meridian(layer, column) for column in range(72)], -1)
 
     @functools.cache  # noqa: B019 - shapes are few and kept by ``skin_of`` anyway
     def skin_grid(self, layer: str) -> np.ndarray:
-        """Return nodes (stations, columns, 3) m, sensor frame, of a layer of skin, ``"outer"`` or ``"inner"``. Stations
-        run from the tip pole to the base pole, each pole one point repeated over the columns; columns lie at
+        """Return nodes (stations, columns, 3) m, sensor frame, of a layer of the skin, ``"outer"`` or ``"inner"``.
+        Stations run from the tip pole to the base pole, each pole one point repeated over the columns; columns lie at
         ``angles``. Outer and inner points of one station and column face each other."""
         return self.skin_points(layer, self.angles)
 
     def skin_points(self, layer: str, theta: np.ndarray) -> np.ndarray:
-        """Return nodes (stations, columns, 3) m of ``skin_grid``'s layer at any angles theta (columns,) rad."""
+        """Return nodes (stations, columns, 3) m as ``skin_grid``, for columns at any angles theta (columns,) rad."""
         x, r = np.moveaxis(_around(self._meridians(layer), theta), 1, 0)
         x[[0, -1]] = x[[0, -1]].mean(axis=1, keepdims=True)
         r[[0, -1]] = 0
         return np.stack([x, self.axis_y - r * np.cos(theta), r * np.sin(theta)], -1)
 
     def core_radius(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Radius of the rigid core, m, at stations x (n,) m and angles theta (n,) rad; NaN off the core."""
+        """Return the core's radius (n,) m at stations x (n,) m and angles theta (n,) rad; NaN off the core."""
         return self._radius("core", x, theta)
 
     def thickness_below(self, point: np.ndarray, outward: np.ndarray) -> float:
-        """Return the distance, m, from point (3,) m of the skin against its normal outward (3,) to core or axis."""
+        """Return the distance, m, from point (3,) m of the skin against its normal outward (3,) to core, or axis."""
         distance = np.arange(0, _FARTHEST, _STEP)
         x, y, z = (point - distance[:, None] * outward).T
         radius = np.hypot(y - self.axis_y, z)
@@ -121,7 +120,7 @@ class SkinShape:
         return lower * (1 - t) + upper * t
 
     def check_inside(self, points: np.ndarray) -> None:
-        """Raise TactileError where one of the electrodes at points (n, 3) m does not lie inside the inner skin."""
+        """Raise TactileError unless all electrodes, at points (n, 3) m, lie inside the inner skin."""
         x, y, z = points.T
         inside = np.hypot(y - self.axis_y, z) < self._radius("inner", x, np.arctan2(z, self.axis_y - y))
         if not inside.all():
@@ -156,7 +155,7 @@ def _mean_of_known(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.ndarray) -> np.ndarray:
-    """Return points (n, 2) at fractions (n,) of the arc length of the polyline (x, r) m between x = low and high."""
+    """Return points (n, 2) m at fractions (n,) of the arc length of a polyline, x, r m, between x = low and high m."""
     keep = (x > low) & (x < high)
     ends = np.interp([low, high], x, r)
     line = np.column_stack([np.r_[low, x[keep], high], np.r_[ends[0], r[keep], ends[1]]])
@@ -166,12 +165,12 @@ def _piece(x: np.ndarray, r: np.ndarray, low: float, high: float, fractions: np.
 
 
 def _around(values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Periodic cubic (Catmull-Rom) interpolation of values (..., 72) on the table's angles, at angles (n,)."""
+    """Interpolate values (..., 72) at the table's angles, by periodic cubics (Catmull-Rom), to angles ``at`` (n,)."""
     return sum(weight * values[..., column] for column, weight in zip(*_columns(at), strict=True))
 
 
 def _columns(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the table's columns (4, n) next to angles `at` (n,) rad, and their weights (4, n)."""
+    """Return the table's four columns (4, n) nearest to angles `at` (n,) rad, and their Catmull-Rom weights (4, n)."""
     position = (at + np.pi) / (2 * np.pi) * 72
     cell = np.floor(position + 1e-9).astype(int)
     return (cell + np.arange(-1, 3)[:, None]) % 72, catmull_rom(position - cell)

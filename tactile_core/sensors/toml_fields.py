@@ -1,7 +1,8 @@
 """Fields of a sensor's files: units, ranges, and conversion from TOML to dataclasses; for Blender, with numpy alone.
 
-A field's name ends in its unit; in Python it has the name without it, in SI units. Decimals are shifted to SI units
-before they are rounded to floats, so that 20.06 mm is the number 20.06e-3 exactly."""
+A field's name ends in its unit; in Python it has the name without the unit, and its value is in SI units. Decimals are
+shifted to SI units before they are rounded to floats, so that 20.06 mm is the number 20.06e-3 exactly.
+"""
 
 from __future__ import annotations
 
@@ -50,15 +51,16 @@ def number(
     may_miss: bool = False,
     length: int | None = None,
 ) -> Any:
-    """Declare a dataclass's field, a number or a list of numbers: its unit in the file (a name's ending, "" without),
-    and its open interval (above, below) in that unit.
-    default : in Python, SI; may_miss : true if a file may leave it out; length : of lists whose type has none"""
+    """Declare a dataclass's field that is a number or a list of numbers.
+    unit : in the file, the ending of the field's name there; "" for none
+    above, below : ends of the open interval in that unit; default : in Python's SI units
+    may_miss : true if a file may leave it out; length : of lists, if their type has none"""
     meta = {"unit": unit, "above": above, "below": below, "may_miss": may_miss, "length": length}
     return dataclasses.field(default=default, metadata=meta)
 
 
 def file_beside(*, or_none: bool = False) -> Any:
-    """Declare a field with the name of a file beside the one that is read.
+    """Declare a field that names a file beside the one that is read.
     or_none : true if it may be left out, and then is empty"""
     meta = {"beside": True, "may_miss": or_none}
     return dataclasses.field(metadata=meta, default="" if or_none else dataclasses.MISSING)
@@ -71,15 +73,15 @@ def one_of(words: tuple[str, ...]) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class Material:
-    """An isotropic elastic solid at small strain. youngs : Pa; poisson : below 0.5."""
+    """An isotropic elastic solid at small strain. youngs : Pa, Young's modulus; poisson : Poisson's ratio, below 0.5"""
 
     youngs: float = number("mpa", above=1e-4, below=100)  # gels and rubbers; outside, another unit is meant (assumed)
     poisson: float = number(above=0, below=0.5)
 
 
 def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, advice: str = "") -> _T:
-    """Return ``made(content)`` for a file's content, a dict with decimals as written (``Decimal``).
-    expected, advice : what the file should be and what to do, for errors. Raises TactileError naming file and field."""
+    """Return ``made(content)``, where content is a file's as a dict, decimals as written (``Decimal``).
+    expected, advice : for errors: what the file should be, what to do. Raises TactileError naming file and field."""
     try:
         content = tomllib.loads(read_toml_text(file), parse_float=Decimal)
     except OSError as error:
@@ -94,7 +96,7 @@ def read_toml(file: Path, made: Callable[[dict[str, Any]], _T], expected: str, a
 
 def read_table(form: type[_T], content: Any, where: str = "", **others: Any) -> _T:
     """Convert ``content``, a table of a file, to the dataclass ``form`` in SI units.
-    where : the table's name, for errors, "" for the whole file; others : values of fields that are not in the file
+    where : the table's name, for errors, "" for the whole file; others : values of fields that no file has
     Raises TactileError for a field that is unknown, missing or out of range."""
     if not isinstance(content, dict):
         raise TactileError(where, repr(content), "a table")
@@ -119,8 +121,8 @@ def _key(each: dataclasses.Field) -> str:
 
 
 def check_names(where: str, content: dict[str, Any], names: tuple[str, ...]) -> None:
-    """Raise TactileError unless the fields of ``content``, a table of a file, are ``names``: for one that is missing,
-    unknown or in another unit. where : the table's name, for the message"""
+    """Raise TactileError unless the fields of ``content``, a table of a file, are exactly ``names``: for one that is
+    missing, unknown or in another unit. where : the table's name, for the message"""
     fields = f"the fields {', '.join(names)}"
     for name in sorted(set(content) - set(names)):
         for right in names:
@@ -140,8 +142,8 @@ def _without_unit(name: str) -> str:
 
 
 def read_value(kind: Any, value: Any, where: str, meta: Mapping[str, Any]) -> Any:
-    """Convert a ``value`` of the file to a field's type ``kind``, in SI units. where : the field's name, for errors
-    meta : metadata of its declaration. Raises TactileError for a value of another type or out of range."""
+    """Convert ``value``, from a file, to a field's type ``kind``, in SI units. where : the field's name, for errors
+    meta : metadata of the field's declaration. Raises TactileError for a value of another type or out of range."""
     kind = next((each for each in typing.get_args(kind) if dataclasses.is_dataclass(each)), kind)  # of Dome | None
     if dataclasses.is_dataclass(kind):
         return read_table(typing.cast(type, kind), value, where, **meta.get("given", {}))

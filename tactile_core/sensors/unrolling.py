@@ -14,7 +14,7 @@ _STENCIL = 1e-3 * np.array([[0, 1, -1, 0, 0], [0, 0, 0, 1, -1]])  # of (row, col
 
 
 def node_normals(nodes: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return unit outward normals (n, 3) at nodes (n, 3) m: the area-weighted mean of the triangles around.
+    """Return unit outward normals (n, 3) at nodes (n, 3) m: the area-weighted mean of the triangles round each.
     faces : (f, 3) nodes of each triangle, counter-clockwise from outside"""
     corners = nodes[faces]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6
@@ -29,8 +29,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def rolled_x(sensor: str) -> np.ndarray:
-    """Unrolled x (stations,) m of a skin's stations: ``origin_x``, plus the arc length from there to the station along
-    the lowest line, negative toward the tip."""
+    """Return the unrolled x (stations,) m of a skin's stations: ``origin_x`` plus the arc length from there to the
+    station along the lowest line, negative toward the tip."""
     skin = skin_of(sensor)
     origin = skin.descriptor.unrolling.origin_x
     line = skin.skin_grid("outer")[:, np.argmin(np.abs(skin.angles))]
@@ -39,15 +39,16 @@ def rolled_x(sensor: str) -> np.ndarray:
 
 
 def rolled_grid(sensor: str) -> np.ndarray:
-    """Unrolled places (rows, columns, 2) = (x, z) m of the skin's lattice, its back included."""
+    """Return unrolled places (rows, columns, 2) = (x, z) m of the skin's grid of nodes, its back included."""
     skin = skin_of(sensor)
     across = skin.descriptor.unrolling.radius * skin.angles
     return np.stack(np.broadcast_arrays(rolled_x(sensor)[1:-1, None], across), -1)
 
 
 def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
-    """Places (n_nodes, 2) = (x, z) m of a fluid sensor's nodes, unrolled onto the DIGIT's plane: z = R theta across,
-    arc length of the lowest line along (docs/sources.md). NaN on the back, beyond 90 degrees, and at the poles."""
+    """Return places (n_nodes, 2) = (x, z) m of a fluid sensor's nodes, unrolled onto the DIGIT's plane: z = R theta
+    across the finger, x by arc length of the lowest line (docs/sources.md). NaN on the back, beyond 90 degrees, and at
+    the poles."""
     skin = skin_of(sensor)
     on_pad = np.abs(skin.angles)[None, :, None] <= skin.pad_angle + 1e-9
     rolled = np.where(on_pad, rolled_grid(sensor), np.nan)
@@ -56,13 +57,13 @@ def unrolled_nodes(sensor: str = "biotac") -> np.ndarray:
 
 @functools.cache
 def _skin_axes(sensor: str) -> np.ndarray:
-    """Coordinates of the outer skin's stations axis by axis, (3, stations, columns) m."""
+    """Return the coordinates x, y, z (3, stations, columns) m of the outer skin's stations."""
     return np.ascontiguousarray(np.moveaxis(skin_of(sensor).skin_grid("outer"), 2, 0))
 
 
 def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.ndarray]:
-    """Find the place (3,) m and outward unit normal (3,) of a fluid sensor's resting skin at point (2,) = (x, z) m of
-    the unrolled plane, clamped to the pad: x between the poles, angle within 90 degrees."""
+    """Return the place (3,) m on a fluid sensor's resting skin that unrolls onto point (2,) = (x, z) m, and its outward
+    unit normal (3,). The point is clamped to the skin: x between the poles, z within the columns' angles."""
     skin = skin_of(sensor)
     stations, angles, radius = rolled_x(sensor), skin.angles, skin.descriptor.unrolling.radius
     row = np.interp(point[0], stations, np.arange(len(stations)))
@@ -74,8 +75,8 @@ def roll_up(point: np.ndarray, sensor: str = "biotac") -> tuple[np.ndarray, np.n
 
 
 def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the nearest places on a surface to points (n, 3) m: index of the face (n,), barycentric weights (n, 3) and
-    places (n, 3) m. Ericson, Real-Time Collision Detection, 5.1.5, by projection onto the plane and the three edges."""
+    """Find the place on a surface nearest to each of points (n, 3) m: face (n,) by index, barycentric weights (n, 3),
+    place (n, 3) m. Ericson, Real-Time Collision Detection, 5.1.5, by projection onto plane and edges."""
     faces, weights, places = [], [], []
     a, b, c = np.moveaxis(surface.rest[surface.faces], 1, 0)
     for point in points:
@@ -89,8 +90,8 @@ def closest_on_triangles(surface: Lattice, points: np.ndarray) -> tuple[np.ndarr
 
 
 def _closest_weights(point: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-    """Barycentric weights (f, 3) of the place on each triangle a, b, c (f, 3) nearest to its point (f, 3): the
-    projection onto the plane where that lies inside, else the nearest place on an edge."""
+    """Return barycentric weights (f, 3) of the place on each triangle a, b, c (f, 3) nearest to point (3,): its
+    projection onto the plane if that lies inside, else the nearest place on an edge."""
     ab, ac, ap = b - a, c - a, point - a
     d = np.einsum
     g11, g12, g22 = d("fd,fd->f", ab, ab), d("fd,fd->f", ab, ac), d("fd,fd->f", ac, ac)

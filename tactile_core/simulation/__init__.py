@@ -1,1 +1,1 @@
-"""Scenes to recordings and to paired contacts of both sensors."""
+"""Make simulated recordings, and paired contacts of both sensors, from scenes."""

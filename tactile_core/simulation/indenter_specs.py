@@ -1,5 +1,6 @@
-"""The indenters that a scene can name: one struct per kind, millimetres in, metres out. Those of simple shapes are made
-from the shapes' own files; meshes and groups are defined here."""
+"""The indenters that a scene can name: one struct per kind, millimetres in, metres out. Structs of simple shapes are
+made from the shapes' own files; those of meshes and groups are here.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,7 @@ NotNegative = Annotated[float, Meta(ge=0)]
 
 
 class SizedSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A shape given by its sizes, mm, to which the struct of each kind of shape adds fields. name : the user's"""
+    """A shape given by its sizes, mm; the struct of each kind adds these as fields. name : the user's name for it"""
 
     name: str
 
@@ -51,9 +52,9 @@ def _spec_of(form: SceneForm) -> type[SizedSpec]:
 
 
 class MeshSpec(msgspec.Struct, tag="mesh", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """A closed triangle mesh (STL, PLY, OBJ, OFF) in the scene's folder or below it.
-    unit_mm : mm per unit of the file; up : the file's axis that points out of the sensor
-    spacing_mm : of the grid that holds its distance; file : path from that folder, by /; name : the user's"""
+    """A closed triangle mesh (STL, PLY, OBJ, OFF) in the scene's folder or below it. name : the user's name for it
+    file : its path from that folder, by /; unit_mm : mm per unit of the file
+    up : the file's axis that points out of the sensor; spacing_mm : of the grid that holds the distance to the mesh"""
 
     name: str
     file: str
@@ -74,7 +75,7 @@ else:
 
 class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Part of a group: a ``body`` moved by x_mm, y_mm along the group's axes and turned by turn_deg about z, from x
-    toward y; its lower end is z_mm above the plane of contact."""
+    toward y; its lower end is z_mm above the plane in which the group first touches."""
 
     body: Single
     x_mm: float = 0.0
@@ -90,7 +91,7 @@ class PartSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class SeveralSpec(msgspec.Struct, tag="several", tag_field="kind", forbid_unknown_fields=True, frozen=True):
-    """Several bodies, ``parts``, pressed as one; the lowest has z_mm = 0. name : the user's"""
+    """Several bodies, ``parts``, pressed as one; the lowest has z_mm = 0. name : the user's name for the group"""
 
     name: str
     parts: Annotated[list[PartSpec], Meta(min_length=1, max_length=64)]
@@ -105,7 +106,7 @@ IndenterSpec = Single | SeveralSpec
 
 def with_files_of(folder: pathlib.Path, spec: IndenterSpec) -> IndenterSpec:
     """Return the spec with its mesh files, named within the scene's ``folder``, as full paths. Raises TactileError for
-    one that is missing or outside of the folder."""
+    a file that is missing or outside of the folder."""
     if isinstance(spec, SeveralSpec):
         parts = [msgspec.structs.replace(part, body=with_files_of(folder, part.body)) for part in spec.parts]
         return msgspec.structs.replace(spec, parts=parts)

@@ -1,4 +1,4 @@
-"""The contacts of one press on both sensors, as rows of a file of pairs."""
+"""Solve the contacts of one press on both sensors, as rows of a file of pairs."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ _SLIDE_STEPS = 3  # contacts of a slide: sticking, partly slipping, wholly slipp
 def press_rows(
     scene: Scene, seed: int, press: int, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> list[dict[str, np.ndarray]]:
-    """Return the contacts of a press, each as ``pair_row`` has it, with the press's number, place, slide and indenter:
-    force grows by the scene's ratio until a sensor reaches its greatest depth, or no contact is found.
-    The first force is log-uniform within one ratio, so that forces are log-uniform over many presses. A press that
-    slides ends with the slide, at constant force along the same path on both sensors. A scene with ``depth_steps``
-    pairs contacts of equal depth instead of equal force.
+    """Return the contacts of a press, each a ``pair_row`` with the press's number, place, slide and indenter added.
+    Force grows by the scene's ratio until a sensor reaches its greatest depth, or no contact is found. The first force
+    is log-uniform within one ratio, so that forces are log-uniform over many presses. A press that slides ends with the
+    slide, at constant force along the same path on both sensors. In a scene with ``depth_steps`` contacts have equal
+    depth on both sensors instead of equal force.
     seed, press : numbers that decide the draw; pair : the sensors, source and target
-    keep : ``("traction",)`` adds that of both surfaces, (n, 3) Pa"""
+    keep : ``("traction",)`` adds the tractions (n, 3) Pa on both surfaces"""
     spec = paired(scene)
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(press,)))
     which, indenter = _draw_body(random, scene, spec)
@@ -55,7 +55,7 @@ def press_rows(
 
 
 def _draw_body(random: np.random.Generator, scene: Scene, spec: PairSpec) -> tuple[int, Indenter]:
-    """Draw a press's body and its index: one of the scene's, or (the index after them) a random one."""
+    """Draw a press's body; return its index and it: one of the scene's, or (the index after them) a random one."""
     which = int(random.integers(len(scene.indenters)))
     if spec.random_bodies and random.uniform() < spec.random_bodies:
         return len(scene.indenters), random_body(random)
@@ -117,8 +117,8 @@ def paired(scene: Scene) -> PairSpec:
 
 
 def draw_place(random: np.random.Generator, spec: PairSpec, target: str = TARGET) -> Placement:
-    """Draw the place and tilt of a press: uniform over the target's gel inside its rim, tilt uniform in the cone of
-    ``spec`` round the normal, in a uniform direction."""
+    """Draw the place and tilt of a press: uniform over the target's gel without its rim, the tilt uniform in the cone
+    of ``spec`` round the normal."""
     shape = sensors.shape_of(target)
     while True:
         x = random.uniform(shape.tip_x, shape.base_x)
@@ -133,7 +133,7 @@ def pair_row(
     biotac: Solution, digit: Solution, pair: tuple[str, str] = PAIR, keep: Sequence[str] = ()
 ) -> dict[str, np.ndarray]:
     """Return what a file stores of one contact on both sensors of ``pair``, by the names of ``pairs_writer.units``.
-    biotac, digit : solutions of source and target; keep : ``("traction",)`` adds that of both surfaces"""
+    biotac, digit : solutions on source and target; keep : ``("traction",)`` adds the tractions on both surfaces"""
     source, target = pair
     both = (source, biotac), (target, digit)
     return {
@@ -155,6 +155,6 @@ def pair_row(
 
 
 def beyond_gel(touched: np.ndarray, target: str = TARGET, source: str = SOURCE) -> np.bool_:
-    """Return true if the contact, source nodes touched (n,) bool, extends beyond what unrolls onto the target's gel."""
+    """Return true if a contact, source nodes touched (n,) bool, reaches beyond what unrolls onto the target's gel."""
     x, z = unrolling.unrolled_nodes(source)[touched].T
     return (sensors.shape_of(target).outline_distance(x, z) <= 0).any()  # it is 0 everywhere outside

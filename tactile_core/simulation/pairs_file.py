@@ -1,4 +1,4 @@
-"""The file of paired contacts: HDF5 of compressed blocks, the same bytes whoever made them; read with checks."""
+"""The file of paired contacts: HDF5 of compressed blocks, the same bytes whoever made them; it is checked when read."""
 
 from __future__ import annotations
 
@@ -55,14 +55,14 @@ class Pairs:
     Fields are named after the pair that ships; for another ``pair`` they hold its source and target, and signals have
     as many columns as the source has electrodes.
     displacement_biotac : (C, N, 3) int16            displacement_digit : (C, M, 3) int16
-    scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change against rest
-    force : (C, 3) float32 N                         contact_center : (C, 2) float32 m, (x, z) on the DIGIT
+    scale_biotac, scale_digit : m per unit           signal : (C, 19) float32 counts, noise-free change from rest
+    force : (C, 3) float32 N, on the source          contact_center : (C, 2) float32 m, (x, z) on the DIGIT
     pressure : (C,) float32 Pa, rise of the fluid's
-    depth_biotac, depth_digit : (C,) float32 m       press : (C,) int32
+    depth_biotac, depth_digit : (C,) float32 m, from first touch
     contact_patch_digit : (C, M) bool                place : (C, 4) float32, (x, z) m, tilt and heading rad
-    slide : (C, 2) float32 m, as a ``Step``'s; force is on the source, depth from first touch, press the press's number
-    indenter : (C,) int16, in ``indenter_names``      attributes : of the file, as text
-    sha256 : of the content, whatever the HDF5 layout"""
+    slide : (C, 2) float32 m, along the indenter's own axes, as of ``Step``
+    press : (C,) int32, number of the press          indenter : (C,) int16, index in ``indenter_names``
+    attributes : of the file, as text                sha256 : of the content, whatever the HDF5 layout"""
 
     displacement_biotac: np.ndarray
     displacement_digit: np.ndarray
@@ -84,7 +84,7 @@ class Pairs:
     pair: tuple[str, str] = PAIR
 
     def select_rows(self, rows: np.ndarray) -> Pairs:
-        """Select the contacts with indices rows (n,) alone."""
+        """Return the contacts with indices rows (n,) alone."""
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in DATASETS})
 
     @property
@@ -95,7 +95,7 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Split:
-    """Indices (int), ascending, of the contacts to train on, to validate on and to test on; no press is in two."""
+    """Indices (int), ascending, of the contacts to train on, validate on and test on; no press is in two of these."""
 
     train: np.ndarray
     validation: np.ndarray
@@ -103,7 +103,7 @@ class Split:
 
 
 def read_pairs(path: str | os.PathLike) -> Pairs:
-    """Read and check a pairs file. Raises TactileError for one that is missing, truncated, or of other contents."""
+    """Read and check a pairs file. Raises TactileError for one that is missing, truncated, or holds something else."""
     try:
         with open_checked(path) as file:
             found = str(file.attrs.get("format", ""))
@@ -147,7 +147,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
 
 
 def _named(pair: tuple[str, str]) -> dict[str, str]:
-    """Return the names in the file of ``DATASETS``, which are named after both sensors of the pair."""
+    """Return the file's name of each of ``DATASETS``; some are named after the pair's sensors."""
     of = dict(zip(PAIR, pair, strict=True))
     parts = {name: name.rpartition("_") for name in DATASETS}
     return {name: f"{stem}_{of[role]}" if role in of else name for name, (stem, _, role) in parts.items()}
@@ -156,7 +156,8 @@ def _named(pair: tuple[str, str]) -> dict[str, str]:
 def _dataset(
     file: h5py.File, form: tuple[tuple[int | None, ...], str], names: dict[str, str], name: str, path: str | os.PathLike
 ) -> np.ndarray:
-    """Read the dataset `name`, check its kind and trailing shape. form : of ``DATASETS``; names : of all in the file"""
+    """Read the dataset `name`, checked for the kind and trailing shape of ``form``, from ``DATASETS``. names : all in
+    the file"""
     place = f"{os.fspath(path)}, {name}"
     if name not in file:
         raise TactileError(place, "no such dataset", f"the datasets {', '.join(names.values())}", ADVICE)
@@ -184,7 +185,7 @@ def _scale(data: h5py.Dataset, place: str) -> float:
 
 
 def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> None:
-    """Check that all arrays have equally many rows, and only finite numbers."""
+    """Raise TactileError unless all arrays have equally many rows, and only finite numbers."""
     count = len(arrays["press"])
     for name, array in arrays.items():
         if len(array) != count:
@@ -195,7 +196,7 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
 
 
 def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:
-    """Check that the attribute `names` is a JSON list of texts, with one for each number of `indenter` (C,)."""
+    """Raise TactileError unless attribute `names` is a JSON list of texts, one for each number in `indenter` (C,)."""
     place = f"{os.fspath(path)}, attribute indenters"
     try:
         found = json.loads(names)
@@ -219,8 +220,8 @@ def _content_hash(arrays: dict[str, np.ndarray], scales: dict[str, float], attri
 
 
 def split_presses(press: np.ndarray, seed: int, where: str | os.PathLike) -> Split:
-    """Split contacts into 80 % training, 10 % validation, 10 % test by press (C,), the number of each one's press, as
-    contacts of a press are alike; seed : of the draw. Raises TactileError, naming ``where``, for under five presses."""
+    """Split contacts into 80 % training, 10 % validation, 10 % test by whole presses, as contacts of one are alike.
+    press : (C,), each one's press, by number; seed : of the draw. Raises TactileError, naming where, for under five."""
     presses = np.unique(press)
     if len(presses) < MIN_PRESSES:
         advice = "Make more contacts with `tactile pairs --count`"

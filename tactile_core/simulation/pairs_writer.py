@@ -1,5 +1,6 @@
-"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks, and its card: counts,
-hash and histograms, small enough to keep beside the code."""
+"""Write the file of paired contacts, compressed HDF5, the same bytes whoever made its blocks; and its card: counts,
+hash and histograms, small enough to keep beside the code.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +69,7 @@ _READ = ("force", "place", "slide", "press", "indenter")
 
 
 def _histogram(values: np.ndarray, edges: tuple[float, ...]) -> dict[str, list]:
-    """Return counts of values (n,) between edges; the first and the last include what lies beyond."""
+    """Return the numbers of values (n,) between edges; the first and the last number include what lies beyond."""
     counts, _ = np.histogram(np.clip(values, edges[0], edges[-1]), edges)
     return {"edges": list(edges), "counts": counts.tolist()}
 
@@ -78,8 +79,8 @@ def _plain(value: object) -> object:
 
 
 def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) -> dict[str, str]:
-    """Return the unit of each dataset of a file, by name; the leading axis counts contacts. Some are named after the
-    two sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : ``("traction",)`` adds tractions"""
+    """Return the unit of each dataset of a file, by name; its first axis counts contacts. Some are named after the two
+    sensors. A place is (x, z) on the gel's plane, tilt and heading. keep : ``("traction",)`` adds tractions"""
     fields = {f"{word}_{sensor}": KEEPABLE[word] for word in keep for sensor in (source, target)}
     return fields | {
         f"displacement_{source}": "m", f"displacement_{target}": "m", "signal": "counts", "gap": "m", "force": "N",
@@ -90,8 +91,8 @@ def units(source: str = SOURCE, target: str = TARGET, keep: Sequence[str] = ()) 
 
 
 class Made(NamedTuple):
-    """Origin of contacts. scene : its text; indenters : their names; pair : source and target
-    keep : ``("traction",)`` where the file holds the surfaces' tractions"""
+    """Origin of a file's contacts. scene : its text; indenters : their names; pair : source and target
+    keep : ``("traction",)`` if the file holds the surfaces' tractions"""
 
     scene: str
     indenters: list[str]
@@ -101,8 +102,8 @@ class Made(NamedTuple):
 
 
 def merge(files: list[pathlib.Path], count: int, out: pathlib.Path, made: Made) -> None:
-    """Join blocks, shards ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts, which
-    states where they were ``made``. Raises TactileError where it cannot be written."""
+    """Join blocks, shards ``files`` in order, into the HDF5 file ``out`` of their first ``count`` contacts; it states
+    their origin, ``made``. Raises TactileError if it cannot be written."""
     about = {
         "format": FORMAT, "scene": made.scene, "seed": made.seed, "version": __version__,
         "indenters": json.dumps(made.indenters),

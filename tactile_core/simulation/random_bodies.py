@@ -1,6 +1,6 @@
-"""Draw the bodies of presses at random, beyond the indenters that a scene lists. Sizes are log-uniform, so that a small
-ball is as likely as a large one; all ranges are assumed, from bodies that a fingertip takes for a point to those it
-takes for a plane."""
+"""Draw the bodies of presses at random, beyond the indenters that a scene lists. Sizes are log-uniform: a small ball is
+as likely as a large one. Ranges are assumed, from bodies that a fingertip feels as points to those it feels as planes.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def random_body(random: np.random.Generator) -> Indenter:
 
 
 def _between(random: np.random.Generator, least: float, most: float) -> float:
-    """Draw a length, m, between least and most, mm, evenly in its logarithm."""
+    """Draw a length, m, between least and most, both mm, uniform in its logarithm."""
     return float(np.exp(random.uniform(np.log(least), np.log(most)))) * _MM
 
 

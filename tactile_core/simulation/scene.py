@@ -1,4 +1,4 @@
-"""Scenes: TOML files that say what presses where. Units stand in the field names; unknown fields are refused."""
+"""Scenes: TOML files that say what presses where. Units are in the fields' names; unknown fields are refused."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ LARGEST = 1e9  # of any number: none that means something comes near, squares of
 
 
 class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Distribution of paired contacts: places uniform over the gel but for a rim, rim_margin_mm wide, tilts uniform in
-    a cone up to tilt_max_deg off the normal. Force grows from force_min_n, each time by force_ratio, up to
-    depth_max_percent of the thickness; or depth in depth_steps even steps from depth_min_mm to depth_max_mm, if not 0.
+    """Distribution of paired contacts. Places are uniform over the gel without a rim, rim_margin_mm wide; tilts are
+    uniform in a cone up to tilt_max_deg off the normal. Force grows from force_min_n, each time by force_ratio, until
+    depth is depth_max_percent of the thickness. If depth_steps is not 0, depth grows instead, in so many even steps
+    from depth_min_mm to depth_max_mm.
     friction : Coulomb's; slide_share, slide_max_mm : share of presses that end with a slide, and its greatest length
     random_bodies : share of presses by a body drawn at random"""
 
@@ -44,7 +45,7 @@ class PairSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A point of a recorded motion: time_s, the indenter's place x_mm, z_mm on the gel's (unrolled) plane, force_n."""
+    """A point of a recorded motion: time_s; x_mm, z_mm, the indenter's place on the gel's (unrolled) plane; force_n."""
 
     time_s: Annotated[float, Meta(ge=0, le=600)]
     x_mm: float
@@ -53,9 +54,9 @@ class PointSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A simulated recording: which indenter, by name, moves linearly between points, how it leans, its defects.
-    noise_counts : standard deviation; drift_counts : the most, from first to last frame; friction : Coulomb's
-        coefficient
+    """A simulated recording: an indenter, by name, that moves linearly between ``points``, and the electrodes' defects.
+    noise_counts : standard deviation; drift_counts : the most, from first to last frame
+    friction : Coulomb's coefficient
     tilt_deg : between the indenter's axis and the surface normal, its upper end toward +x"""
 
     indenter: str
@@ -67,8 +68,8 @@ class RecordingSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Content of a scene file. format : "tactile-scene-1"; indenters : the bodies, by different names
-    pairs, recording : presses to draw, and a motion to record; None where the file has no such table"""
+    """Content of a scene file. format : "tactile-scene-1"; indenters : the bodies, each with another name
+    pairs, recording : presses to draw, and a motion to record; None if the file has no such table"""
 
     format: str
     name: str
@@ -79,7 +80,7 @@ class Scene(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
-    """Load the scene of a ``scene.toml`` or its folder, meshes named by full paths, and the file's text. Raises
+    """Return the scene of a ``scene.toml`` or its folder, meshes named by full paths, and the file's text. Raises
     TactileError naming file and field."""
     file = pathlib.Path(path)
     file = file / "scene.toml" if file.is_dir() else file
@@ -99,8 +100,8 @@ def load_scene(path: str | os.PathLike) -> tuple[Scene, str]:
 
 
 def check(file: str | os.PathLike, scene: Scene) -> None:
-    """Raise TactileError for what the fields' types do not check: format, finite numbers, different names, depths that
-    grow, an indenter that exists, growing times. file : names the scene in messages"""
+    """Raise TactileError for what the fields' types do not check: format, finite numbers, different names, growing
+    depths and times, an indenter that exists. file : names the scene in messages"""
     if scene.format != FORMAT:
         raise TactileError(f"{file}, format", repr(scene.format), repr(FORMAT))
     numbers = list(_numbers(msgspec.to_builtins(scene)))

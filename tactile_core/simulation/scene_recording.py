@@ -1,4 +1,4 @@
-"""A simulated BioTac recording: a scene's motion solved frame by frame, with the defects of real electrodes."""
+"""Simulate a BioTac recording: a scene's motion solved frame by frame, with the defects of real electrodes."""
 
 from __future__ import annotations
 
@@ -33,17 +33,18 @@ _FIELDS = ("displacement", "traction")  # of a sensor
 
 
 def outputs() -> dict[str, Sensor]:
-    """Return the sensor that each optional output needs: ``electrodes``, ``displacement_SENSOR``, ``traction_SENSOR``;
-    ``keep`` takes these words. Always there are time, force and, where a gel is solved, the contact's centre."""
+    """Return the sensor that each optional output needs, by the output's name: ``electrodes``, ``displacement_SENSOR``,
+    ``traction_SENSOR``, of which ``keep`` chooses. Time, force and, if a gel is solved, the contact's centre are always
+    stored."""
     fields = {f"{field}_{sensor}": sensor for sensor in descriptor.names() for field in _FIELDS}
     return {"electrodes": ELECTRODES_OF, **fields}
 
 
 class _Frame(NamedTuple):
-    """Kept outputs of a frame.
+    """Outputs of a frame that are kept.
     moved, pressed : by sensor, displacement (n, 3) float32 m and traction (n, 3) float32 Pa
     force : (3,) N; pressure : Pa, rise of the fluid's
-    change : (19,) counts of the electrodes; centre : (2,) m, of pressure on the first gel"""
+    change : (19,) counts of the electrodes; centre : (2,) m, centre of pressure on the first gel"""
 
     moved: dict[Sensor, np.ndarray]
     pressed: dict[Sensor, np.ndarray]
@@ -63,17 +64,16 @@ def simulate_recording(
     tiers: Mapping[Sensor, Tier] | None = None,
     loaded: tuple[Scene, str] | None = None,
 ) -> int:
-    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``, with what ``keep`` names; return the
-    number of frames that press.
+    """Simulate the [recording] of a scene at 100 Hz into the HDF5 file ``out``; return the number of frames that press.
     The motion is linear between the scene's points. Each frame is a separate press, straight to its force with the
-    scene's friction: rolling and sliding are equal, as no frame depends on the deformation before it.
+    scene's friction. No frame depends on the deformation before it, so that rolling and sliding are the same.
     scene_path : scene.toml or its folder; seed : of the electrodes' rest, drift and noise
     progress : called with (frames done, frames)
-    keep : words of ``outputs()``; a sensor that none of them needs is not solved
+    keep : names of the ``outputs()`` to store; a sensor that none of them needs is not solved
     tiers : "fast", "full" or "reference" by sensor; "fast" for others
-    loaded : a scene and its text in place of the file's, whose name then only serves messages
-    Raises TactileError for a scene without a recording, forces beyond the linear model's range, and tractions of
-    another tier than the fast one."""
+    loaded : a scene and its text, used instead of the file, whose name then only serves messages
+    Raises TactileError for a scene without a recording, a force that no depth within the tier's limit gives, and
+    tractions of another tier than the fast one."""
     scene, text = loaded or load_scene(scene_path)
     spec = recording_of(scene, scene_path)
     used = sensors_of(keep)
@@ -118,12 +118,12 @@ def simulate_recording(
 
 
 def sensors_of(keep: Collection[str]) -> tuple[Sensor, ...]:
-    """Return the sensors that the outputs ``keep``, words of ``outputs()``, need, the BioTac first."""
+    """Return the sensors that the outputs ``keep``, names of ``outputs()``, need, the BioTac first."""
     return tuple(dict.fromkeys(sensor for word, sensor in outputs().items() if word in keep))
 
 
 def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
-    """Return the scene's [recording]; raises TactileError where it has none, naming the scene's ``path``."""
+    """Return the scene's [recording]. Raises TactileError if it has none, naming the scene's ``path``."""
     if scene.recording is None:
         advice = "See scenes/press_roll_slide/scene.toml"
         raise TactileError(f"{path}, recording", "missing", "a [recording] table", advice)
@@ -131,7 +131,7 @@ def recording_of(scene: Scene, path: str | os.PathLike) -> RecordingSpec:
 
 
 def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
-    """Raise TactileError for tractions where the tier has none on the surface's own nodes."""
+    """Raise TactileError if tractions are kept of a tier other than the fast one, which has none at surface nodes."""
     for sensor, tier in tiers.items():
         if f"traction_{sensor}" in keep and tier != "fast":
             found = f"of the {tier} tier, whose forces act on the nodes of its own mesh"
@@ -139,7 +139,7 @@ def _check_tiers(keep: Collection[str], tiers: Mapping[Sensor, Tier]) -> None:
 
 
 def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Sequence[Sensor] = ()) -> None:
-    """Raise TactileError for a pressing point (force above 0) that lies beside one of the gels; without gels, beside
+    """Raise TactileError for a pressing point (force above 0) that does not lie on each of the gels; without gels, on
     the DIGIT's. scene_path : names the scene in the message"""
     for (number, point), gel in itertools.product(enumerate(spec.points, 1), gels or (TARGET,)):
         if point.force_n > 0 and not on_gel(point.x_mm * 1e-3, point.z_mm * 1e-3, sensor=gel):
@@ -155,8 +155,8 @@ def check_places(scene_path: str | os.PathLike, spec: RecordingSpec, gels: Seque
 
 
 def motion(spec: RecordingSpec) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute a recording's time (T,) s, place (T, 2) = (x, z) m and force (T,) N, to a nanonewton, at 100 Hz, linear
-    between the points of ``spec``."""
+    """Return a recording's time (T,) s, place (T, 2) = (x, z) m and force (T,) N, rounded to a nanonewton, at 100 Hz,
+    linear between the points of ``spec``."""
     points = np.array([[p.time_s, p.x_mm, p.z_mm, p.force_n] for p in spec.points])
     time = np.arange(round(points[0, 0] * sensors.SAMPLE_RATE), round(points[-1, 0] * sensors.SAMPLE_RATE) + 1)
     time = time / sensors.SAMPLE_RATE
@@ -168,8 +168,8 @@ def _solve(
     where: str, indenter: Indenter, place: Placement, force: float, friction: float, used: Collection[Sensor],
     tiers: Mapping[Sensor, Tier],
 ) -> dict[Sensor, Solution]:  # fmt: skip
-    """Return the contacts of a frame by sensor under force, N; none where nothing presses.
-    friction : coefficient; used : sensors to solve; where : of the frame, for messages"""
+    """Return the contacts of a frame by sensor under force, N; none if nothing presses.
+    friction : coefficient; used : sensors to solve; where : the frame in words, for messages"""
     found = {}
     for sensor in used if force > 0 else ():
         try:
@@ -184,8 +184,8 @@ def _solve(
 
 
 def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str]) -> _Frame:
-    """Return what is kept of a frame's contacts; keep : words of ``outputs``. The force is the first sensor's: the
-    BioTac's where it is solved."""
+    """Return what is kept of a frame's contacts; keep : names of ``outputs``. The force is that on the first sensor,
+    the BioTac if it is solved."""
     moved, pressed = _field(solved, keep, "displacement"), _field(solved, keep, "traction")
     if not solved:
         return _Frame(moved, pressed, np.zeros(3), 0.0, np.zeros(sensors.ELECTRODES), np.full(2, np.nan))
@@ -196,7 +196,7 @@ def _frame(solved: Mapping[Sensor, Solution], keep: Collection[str]) -> _Frame:
 
 
 def _field(solved: Mapping[Sensor, Solution], keep: Collection[str], name: str) -> dict[Sensor, np.ndarray]:
-    """Return a solution's field (n, 3) float32 by sensor, where it is kept; zero where nothing presses."""
+    """Return the solutions' field ``name`` (n, 3) float32, by sensor, if it is kept; zero if nothing presses."""
     kept = [sensor for sensor in sensors_of(keep) if f"{name}_{sensor}" in keep]
     if not solved:
         return {sensor: np.zeros(sensors.sensor_surface(sensor).rest.shape, np.float32) for sensor in kept}
@@ -204,17 +204,17 @@ def _field(solved: Mapping[Sensor, Solution], keep: Collection[str], name: str) 
 
 
 def _pressure(frames: list[_Frame]) -> np.ndarray:
-    """The fluid's pressure (T,) Pa over the surrounding air."""
+    """Return the fluid's pressure (T,) Pa over the surrounding air."""
     return PRESSURE_AT_REST + np.array([frame.pressure for frame in frames])
 
 
 def pdc_counts(pressure: np.ndarray) -> np.ndarray:
-    """Convert the fluid's pressure (...,), Pa above the air's, to counts (...,) int16, 0..4095, of PDC, its sensor."""
+    """Convert the fluid's pressure (...,), Pa above the air's, to counts (...,) int16, 0..4095, of its sensor, PDC."""
     return np.clip(np.round(pressure / sensors.PRESSURE_PER_COUNT), 0, sensors.COUNT_MAX).astype(np.int16)
 
 
 def _truth(frames: list[_Frame], keep: Collection[str]) -> Truth:
-    """Return what ``keep`` names of the frames, their force and, if a gel is among it, the centre of pressure."""
+    """Return the outputs ``keep`` of all frames, their force and, if a gel is solved, the centre of pressure."""
 
     def stacked(fields: Sequence[dict[Sensor, np.ndarray]]) -> dict[Sensor, np.ndarray]:
         return {sensor: np.stack([field[sensor] for field in fields]) for sensor in fields[0]}

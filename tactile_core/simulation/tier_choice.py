@@ -1,4 +1,4 @@
-"""Choose the tier of contact that is exact enough for a scene, from the measured table and the scene's depth."""
+"""Choose the tier of contact that is exact enough for a scene, by the measured errors and the scene's depth."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from .scene import RecordingSpec, load_scene
 
 
 class TierChoice(NamedTuple):
-    """Tier chosen for a sensor. error : of shape, um rms, that 95 of 100 contacts stay below
+    """Tier chosen for a sensor. error : um rms of shape, which 95 of 100 contacts stay below
     ms : CPU time of a contact; share : greatest depth of the scene's presses, divided by the sensor's thickness"""
 
     tier: Tier
@@ -38,8 +38,8 @@ class TierChoice(NamedTuple):
 
 
 def tier_errors(sensor: str, share: float) -> list[Candidate]:
-    """Return "the fast tier", full and reference, each with its largest error of shape, um, up to ``share`` of the
-    thickness (fast adds full's, against which it was measured), and ms per contact.
+    """Return the tiers, "the fast tier" first, each with its largest error of shape, um, up to a depth of ``share`` of
+    the thickness, and ms per contact. To the fast tier's, measured against the full tier, the full tier's is added.
     Raises TactileError for a sensor without measured errors."""
     if sensor not in measured()["tiers"]["fast"]:
         advice, expected = "Leave --error out: the fast tier is taken", "a sensor whose tiers were measured"
@@ -50,7 +50,7 @@ def tier_errors(sensor: str, share: float) -> list[Candidate]:
 
 
 def _up_to(tier: str, sensor: str, share: float) -> float:
-    """Return a tier's largest error, um, of all depths up to share (of the thickness), which a press passes through."""
+    """Return a tier's largest error, um, at any depth up to share (of the thickness): a press passes through all."""
     below = [each["depth_share_to"] for each in measured()["tiers"][tier][sensor]["bins"]]
     depths = [each for each in below if each < share] + [share]
     return 1e6 * max(expected_error(tier, sensor, depth)[0] for depth in depths)
@@ -58,8 +58,8 @@ def _up_to(tier: str, sensor: str, share: float) -> float:
 
 def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
     """Choose the cheapest tier whose error of shape is within ``bound``, um, for presses up to a depth that is
-    ``share`` of the thickness; None for the bound: the fast tier.
-    Raises TactileError where none is within it."""
+    ``share`` of the thickness; without a bound, None, the fast tier.
+    Raises TactileError if none is within it."""
     rows = tier_errors(sensor, share)
     what = f"shape, {title(sensor)} to {share:.0%} of its thickness"
     found = rows[0] if bound is None else cheapest(rows, bound, "um", what)
@@ -67,7 +67,7 @@ def choose(sensor: str, share: float, bound: float | None) -> TierChoice:
 
 
 def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: float | None) -> Mapping[str, TierChoice]:
-    """Choose a tier within ``bound``, um, by ``choose``, for each of the sensors ``used`` in a scene's [recording]."""
+    """Choose by ``choose``, for each of the sensors ``used`` in a scene's [recording], a tier within ``bound``, um."""
     from .scene_recording import check_places, recording_of
 
     scene, _ = load_scene(path)
@@ -78,8 +78,8 @@ def choose_for_scene(path: str | os.PathLike, used: Collection[str], bound: floa
 
 
 def depth_share(sensor: str, indenter, spec: RecordingSpec) -> float:  # noqa: ANN001
-    """Return the greatest depth of a recording over the thickness, by the fast tier; 0.6, the most that contacts reach,
-    where a force is beyond the tier or its matrices are not built."""
+    """Return the greatest depth of a recording over the thickness, found by the fast tier; if a force is beyond it or
+    its matrices are not built yet, 0.6, the most that contacts reach."""
     if not stored(sensor).bytes:
         return DEPTH_LIMIT
     share = 0.0
