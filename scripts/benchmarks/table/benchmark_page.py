@@ -24,7 +24,7 @@ def write_report(
     folder: Path, methods: Sequence[Method], rows: Sequence[Row], missing: dict[str, str], more: dict[str, list[str]]
 ) -> None:
     """Write ``benchmark.json``, the tables of ``benchmark.md``, and ``benchmark.png``, all in ``folder``.
-    missing : method -> why it could not run; more : other tables of the page, as of ``renew_tables``"""
+    missing : method -> why it could not run; more : other tables of the page, text before one -> its lines"""
     about = {"machine": provenance.machine(), "missing": missing, "rows": list(rows)}
     atomic.write_json(folder / "benchmark.json", about)
     lines = {title: [as_line(each) for each in methods if each.stage == stage] for stage, title in TITLES.items()}
@@ -41,7 +41,7 @@ def as_line(method: Method) -> str:
 
 
 def short(value: float | None) -> str:
-    """Format a value with three digits, of the four that a row keeps, from 100 on without decimals; "" for None."""
+    """Return a value as text with three of the four digits that a row keeps, from 100 on whole; "" for None."""
     if value is None:
         return ""
     kept = float(f"{value:.4g}")
@@ -49,7 +49,7 @@ def short(value: float | None) -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """Draw a PNG, a panel per stage: error over time, logarithmic; the Pareto front, and doing nothing, as lines."""
+    """Return a PNG with a panel per stage: error over time, logarithmic; lines show the Pareto front, doing nothing."""
     from matplotlib.figure import Figure
 
     panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]
@@ -63,7 +63,7 @@ def plot(methods: Sequence[Method]) -> bytes:
 
 
 def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
-    """Return by panel the methods of a stage that have time and error; mechanics has a panel per sensor."""
+    """Return a list for each panel of a stage's methods that have time and error; mechanics has a panel per sensor."""
     found = [each for each in methods if each.stage == stage and each.ms and each.error]
     if stage != "mechanics":
         return [found]
@@ -93,13 +93,13 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
 
 
 def label(method: Method) -> str:
-    """Return a method's label in the plot: its name without what all methods of a panel share."""
+    """Return a method's label in the plot: its name without the parts that all methods of a panel share."""
     name = method.name.split("_", 1)[1] if method.stage == "mechanics" else method.name
     return name.removesuffix("_llvm_ad_rgb").removesuffix("_scalar_rgb").replace("_", " ")
 
 
 def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return those of the points (time, error) that no other beats in both, by growing time."""
+    """Return the points (time, error) that no other point beats in both, by growing time."""
     front: list[tuple[float, float]] = []
     for point in sorted(points):
         if not front or point[1] < front[-1][1]:
@@ -108,7 +108,7 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 def steps(front: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the front's (time, error) with corners between, a staircase, as no method lies between two others."""
+    """Return the points (time, error) of a Pareto front with a corner between each two, so that it is a staircase."""
     corners = [front[0]]
     for point in front[1:]:
         corners += [(point[0], corners[-1][1]), point]

@@ -1,4 +1,4 @@
-"""The whole chain, from signals to pictures: against the reference picture of the true deformation."""
+"""Measure the whole chain, from signals to pictures, against reference pictures of the true deformation."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ SEED_OF_CONTACTS = 5
 
 
 def measure(name: str, quick: bool, truth: str) -> Method | None:
-    """Draw test contacts by the preset ``name``, against the pictures in the file ``truth``; quick : fewer contacts
+    """Measure the chain that ends in the preset ``name``, against pictures in the file ``truth``.
 
-    The method "truth" writes that file, and returns None. Needs mitsuba."""
+    quick : on fewer contacts. The method named "truth" writes that file, and returns None. Needs mitsuba."""
     unit, pairs = load_calibration(), _contacts(QUICK_CONTACTS if quick else CONTACTS)
     mapper = gel_mapper(unit.camera)
     if name == "truth":
@@ -56,7 +56,7 @@ def measure(name: str, quick: bool, truth: str) -> Method | None:
 
 
 def _contacts(count: int) -> Pairs:
-    """Select test contacts in the picture, the same in every run."""
+    """Return ``count`` test contacts in the camera's view, the same ones in every run."""
     pairs, camera = read_pairs(TEST_SET), load_calibration().camera
     deep = np.abs(pairs.displacement_digit[..., 1]).max(axis=1) * pairs.scale_digit > LEAST
     row, column = camera.to_pixel(pairs.contact_center[:, 0], pairs.contact_center[:, 1])

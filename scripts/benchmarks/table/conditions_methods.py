@@ -1,7 +1,7 @@
-"""Translation where it is hard: units given, found or taken as typical, thin films, flat bodies, two contacts at once.
+"""Measure translation where it is hard: unusual fingers (given, found or taken as typical), flat bodies, two contacts.
 
-Error: what is left of the gel's displacement where that is above a tenth of its peak, mean over contacts. The forces'
-median error stands in a row of its own.
+The error is that of the gel's displacement divided by that of no displacement, rms over nodes that move by more than a
+tenth of the largest, mean over contacts. The forces' median error stands in a row of its own.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ NAMES = (*UNITS, "flat_bodies", *TWO_BALLS)
 
 @dataclass(frozen=True)
 class Condition:
-    """Contacts with their truth; gel : (C, M, 3) m; force : (C,) N, all contacts of a frame together.
-    translated : translates them, to compare and to time; of : the contacts in words"""
+    """Contacts with their truth. gel : (C, M, 3) m, displacement; force : (C,) N, of all contacts of a frame together
+    translated : function that translates them, to compare and to time; of : names the contacts, a text"""
 
     translated: Callable[[], Translation]
     gel: np.ndarray
@@ -52,8 +52,8 @@ class Condition:
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one condition, as "unit_found": CPU time of a translated frame, preparing included, and errors;
-    quick : of fewer contacts"""
+    """Measure one condition, such as "unit_found": CPU time to prepare and translate a frame, and errors.
+    quick : on fewer contacts"""
     condition = _units(name, quick) if name in UNITS else _flat(quick) if name == "flat_bodies" else _two(name)
     found = condition.translated()
     ms = best_ms(condition.translated, len(condition.force), most=3)

@@ -1,4 +1,4 @@
-"""Contact mechanics: each tier against the reference tier, on random contacts that it solved once."""
+"""Measure each tier of contact mechanics against the reference tier, on random contacts that this solved once."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ REPEATS = {"fast": 3, "full": 1}
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure one tier on one sensor, ``name`` as "digit_fast": median time of random contacts, and their error.
-    quick : of fewer contacts"""
+    """Measure one tier on one sensor, named like "digit_fast": median time of random contacts, and their error.
+    quick : on fewer contacts"""
     sensor, tier = name.split("_")
     if tier == "reference":
         return _reference(sensor, quick)
@@ -61,7 +61,8 @@ def _solved(sensor, contact, tier):  # noqa: ANN001, ANN202 (as `solved`)
 
 
 def _reference(sensor: str, quick: bool) -> Method:
-    """Return `measure_tiers.py`'s results: a contact takes a minute or more, so a whole run solves the quickest."""
+    """Return the reference tier's results from `measure_tiers.py`: a contact takes a minute or more. A whole run
+    solves the quickest one again, for its memory."""
     truths = read_truth(TRUTH, sensor)
     if not quick:
         _solved(sensor, min(truths, key=lambda truth: truth.seconds).contact, "reference")
@@ -84,7 +85,7 @@ def _in_the_loop(sensor: str, quick: bool) -> list[Row]:
 
 
 def _on_test_contacts(sensor: str, quick: bool) -> list[Row]:
-    """The fast tier against the full tier, with friction."""
+    """Return rows of the fast tier's errors against the full tier, with friction. quick : on fewer contacts"""
     pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))

@@ -1,4 +1,4 @@
-"""Rows of a benchmarked method: CPU time, peak memory, error beside that of doing nothing."""
+"""Define the results of a benchmarked method: CPU time, peak memory, error beside that of doing nothing."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ TEST_SET = TRAINING / "test_contacts.h5"
 
 @dataclass(frozen=True)
 class Method:
-    """Results of a method of a stage; name : the method's
+    """Results of the method ``name`` of a stage.
 
-    ms : CPU per frame on one core; mb : peak memory of a process that does this alone, without what measures the error
-    error, baseline : in ``unit``, of this method and of doing nothing; of : on what set the error was measured
+    ms : CPU ms per frame on one core; mb : MB, peak memory of a process that does this alone
+    error, baseline : errors of this method and of doing nothing, in ``unit``; of : on what they were measured, a text
     more : further rows"""
 
     stage: str
@@ -41,8 +41,8 @@ class Method:
 
 
 def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 0.5, most: int = 50) -> float:
-    """Return the least CPU ms per frame over repeated calls of ``work``, after a first that may compile.
-    frames : in a call; calls repeat for ``least_seconds`` of CPU, at least 3 and at most ``most`` times"""
+    """Return the least CPU ms per frame over repeated calls of ``work``, after a first that may compile. frames :
+    number in a call. Calls are repeated for ``least_seconds`` of CPU, at least 3 and at most ``most`` times."""
     work()
     took, began = [], time.process_time()
     while len(took) < 3 or (time.process_time() - began < least_seconds and len(took) < most):
@@ -53,7 +53,7 @@ def best_ms(work: Callable[[], object], frames: int = 1, least_seconds: float = 
 
 
 def peak_mb() -> float:
-    """Return the peak memory of this process, MB; on Linux its own high-water mark, as getrusage adds the parent's."""
+    """Return this process's peak memory, MB; on Linux by its own high-water mark: getrusage counts the parent's too."""
     if sys.platform == "linux":
         for text in Path("/proc/self/status").read_text().splitlines():
             if text.startswith("VmHWM:"):

@@ -1,9 +1,9 @@
-"""Pictures of a pressed ball by programs of the package index beside ours: time and memory, at 480 x 640.
+"""Measure time and memory of a pressed ball's picture, at 480 x 640, by others' programs on PyPI and by ours.
 
     pip install "taxim[jax-cpu]"
     python scripts/benchmark.py --only peers --json FILE
 
-Each draws a GelSight Mini by a calibration of its own, of another unit, so that no error can stand beside.
+Each draws a GelSight Mini by a calibration of its own, of another unit, so that errors cannot be compared.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ RADIUS, DEPTH, PITCH = 4.0, 0.5, 0.0295  # mm, mm, mm per pixel
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure the picture's time and memory by a program, "ours", "taxim", "taxim_shadows"; quick is unused. Raises
-    ModuleNotFoundError where it is not installed."""
+    """Measure time and memory of the program "ours", "taxim" or "taxim_shadows". quick : not used. Raises
+    ModuleNotFoundError if the program is not installed."""
     draw = _ours() if name == "ours" else _taxim(name == "taxim_shadows")
     ms, mb = best_ms(draw), peak_mb()
     return Method("peers", name, ms, mb, None, "levels", None, "a ball of 4 mm, 0.5 mm deep, 480 x 640")
 
 
 def _print() -> np.ndarray:
-    """Height (480, 640) mm of the ball over the gel's highest point, below 0 where it is pressed in."""
+    """Return the height (480, 640) mm of the ball's surface over the untouched gel; below 0 it is pressed in."""
     v, u = (PITCH * (np.arange(count) - count / 2) for count in SIZE)
     away = np.minimum(np.hypot(*np.meshgrid(u, v)), RADIUS)
     return RADIUS - np.sqrt(RADIUS**2 - away**2) - DEPTH

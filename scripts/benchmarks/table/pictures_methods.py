@@ -1,4 +1,4 @@
-"""Pictures of known deformations: each preset against the reference preset, on random contact fields."""
+"""Measure each preset's pictures of known deformations against the reference preset, on random contacts."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ OF_FIELDS = 7  # seed of the contacts: others than the presets' table was made f
 def measure(name: str, quick: bool, truth: str) -> Method:
     """Measure the preset ``name``'s time, memory and error at 240 x 320.
 
-    quick : on fewer fields; truth : file in which the reference leaves its pictures, changes in grey levels, for others
-    Raises ModuleNotFoundError where mitsuba is missing."""
+    quick : on fewer height maps; truth : file to which "reference", the first, writes its pictures, changes in levels
+    Raises ModuleNotFoundError if mitsuba is missing."""
     unit = load_calibration()
     heights = fields(unit, QUICK_FIELDS if quick else FIELDS, OF_FIELDS)
     if name == REFERENCE.name:
@@ -47,8 +47,8 @@ def measure(name: str, quick: bool, truth: str) -> Method:
 
 
 def _reference(unit: Calibration, heights: list[np.ndarray], quick: bool, truth: str) -> Method:
-    """Measure the reference, whose error is its noise: half of the squared difference between two seeds. Each seed's
-    first time includes the picture at rest. heights : (H, W) m of each field; truth : file for its pictures"""
+    """Measure the reference preset. Its error is its noise: by the difference of two seeds, over sqrt(2). Each seed's
+    first time includes the picture at rest. heights : each (H, W) m; truth : file to write its pictures to"""
     preset = dataclasses.replace(preset_named(REFERENCE.name), passes=QUICK_PASSES) if quick else REFERENCE
     variant = choose_variant().name
     one_thread(variant)

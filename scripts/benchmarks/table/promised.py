@@ -1,4 +1,4 @@
-"""Stated bounds against measured errors of mechanics and translation, all held out."""
+"""Compare the bounds that mechanics and translation state for their errors with measured errors, all held out."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ FOLDS = 5
 
 @dataclass(frozen=True)
 class Promise:
-    """Stated 95 % bounds ``bound`` and measured errors ``found`` of C contacts, both (C,) in ``unit``.
-    name : of the bounded error; groups : (C,), each contact's group; of : the contacts, in words"""
+    """A stated bound that 95 % of errors should keep, on C contacts. bound, found : (C,) in ``unit``, bounds and errors
+    name : of the error; groups : (C,), each contact's group in the table; of : names the contacts, a text"""
 
     name: str
     unit: str
@@ -62,14 +62,14 @@ class Promise:
 
 
 def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
-    """Return the rows of all promises' coverage, and the page's table of it, its lines by heading; quick : on less"""
+    """Return rows of all bounds' coverage, and heading -> lines of the page's table of it; quick : fewer contacts"""
     promises = [*of_mechanics(quick), *of_translation(quick)]
     lines = [line for promise in promises for line in promise.lines()]
     return [promise.row() for promise in promises], {TABLE[0]: [*TABLE, *lines]}
 
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
-    """Yield the promises on the fast tier's shape and force."""
+    """Yield a ``Promise`` for the fast tier's shape and one for its force, of each sensor. quick : fewer contacts"""
     pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
@@ -95,7 +95,7 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
 
 
 def of_translation(quick: bool) -> Iterator[Promise]:
-    """Yield the promises on the largest node error of translations."""
+    """Yield a ``Promise`` for the largest node error of translations, of each surface. quick : fewer contacts"""
     pairs, translator = read_pairs(TEST_SET), load_translator()
     if quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))

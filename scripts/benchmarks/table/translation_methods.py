@@ -1,4 +1,4 @@
-"""Translation from signals to both displacements: our networks in numpy."""
+"""Measure translation from signals to the displacements of both sensors, by our networks in numpy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
 
 
 def measure(name: str, quick: bool) -> Method:
-    """Measure a translation, ``name`` as "numpy_solved_1": a key of KINDS, and the frames in a call; quick : on less"""
+    """Measure a translation named like "numpy_solved_1": a key of KINDS, and the frames per call. quick : on fewer"""
     kind, batch = name.rsplit("_", 1)
     pairs = read_pairs(TEST_SET)
     if quick:
@@ -59,7 +59,7 @@ def _numpy() -> Surfaces:
 
 
 def _numpy_solved() -> Surfaces:
-    """Translate, and solve the found contact on the DIGIT: ``tactile convert --gel solved``."""
+    """Return a function that translates and then solves the found contact on the DIGIT, as ``convert --gel solved``."""
     translator = load_translator()
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
@@ -71,7 +71,7 @@ def _numpy_solved() -> Surfaces:
 
 
 def _numpy_confidence() -> Surfaces:
-    """Translate with force, place, expected errors, confidence and flags: everything that `tactile convert` uses."""
+    """Return a function that translates with all that `tactile convert` computes: force, errors, confidence, flags."""
     translator = load_translator()
 
     def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +82,7 @@ def _numpy_confidence() -> Surfaces:
 
 
 def plain_signals(change: Change) -> Any:
-    """Return changes (T, 19) counts as signals of a tared recording without flags or warnings."""
+    """Return signals with the changes (T, 19) counts, as of a tared recording without flags or warnings."""
     from tactile_core.recordings import Signals
 
     count = len(change)

@@ -1,1 +1,1 @@
-"""Measure the quality of a translation: against recordings of real sensors, beside the baseline."""
+"""Measure the quality of a translation, on simulated contacts and on recordings of real sensors, beside baselines."""

@@ -1,7 +1,6 @@
-"""Measure the translation by what is pressed: the training's bodies, random ones and large ones that no training had.
-
-Contacts are the training's but for the seed and the bodies, by the fast tier on both sensors. Baseline: the nearest
-example among the test contacts that ship, of the training's bodies; of the gel no displacement, which leaves 1.
+"""Measure the translation by the body that presses: the training's, random ones, large ones that are in no training.
+Contacts are drawn as in training, but with another seed and these bodies, and solved by the fast tier on both sensors.
+Baseline: the nearest example among the shipped test contacts, of the training's bodies; for the gel no displacement.
 """
 
 from __future__ import annotations
@@ -43,9 +42,9 @@ indenters = [
 
 
 def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) -> list[Row]:
-    """Return rows of each set's ``count`` contacts: median errors of place, force (of firm contacts, too) and depth,
-    the median overlap, and the mean of the gel's error, divided by that of no displacement; and ``known_rows``.
-    known : contacts among which the nearest example is sought; bodies : surfaces of gel and skin"""
+    """Return rows of contacts of ``count`` presses of each set, and ``known_rows``: median errors of place, force (also
+    of firm contacts alone), depth, median overlap, and mean error of the gel, divided by that of no displacement.
+    known : contacts that the nearest example is taken from; bodies : surfaces of gel and skin"""
     text = SCENE.read_text(encoding="utf-8")
     scenes = {
         "the training's bodies": text, "random bodies": f"{text}random_bodies = 1.0\n", "large bodies": flat_scene(),
@@ -56,13 +55,13 @@ def rows(network: Translator, known: Pairs, bodies: Bodies, count: int = COUNT) 
 
 
 def flat_scene() -> str:
-    """Return the text of a scene that presses what a fingertip meets as flat, as the training presses its bodies."""
+    """Return the text of a scene with bodies so large that a fingertip meets them as flat, drawn as in training."""
     text = SCENE.read_text(encoding="utf-8")
     return FLAT + text[text.index("[pairs]") :]
 
 
 def pairs_of(scene: str, count: int) -> Pairs:
-    """Draw contacts of ``count`` presses of a scene, its text, by the fast tier on both sensors."""
+    """Draw and solve contacts of ``count`` presses by the fast tier on both sensors; scene : a scene file's text"""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "scene.toml").write_text(scene, encoding="utf-8")
@@ -91,8 +90,8 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
 
 
 def known_rows(network: Translator, pairs: Pairs) -> list[Row]:
-    """Return rows of depth and gel under the flat scene's balls, contacts of ``pairs``, solved as ``--gel ball:MM``
-    does; baseline: as translated."""
+    """Return rows of the gel's depth and error under the flat scene's balls, if the body is known to be that ball and
+    solved for (``--gel ball:MM``); baseline: the translation. pairs : of the flat scene"""
     answer, made = vars(network(plain_signals(as_read(pairs.signal, SEED)))), []
     for name, diameter in BALLS.items():
         at = np.flatnonzero(pairs.indenter == pairs.indenter_names.index(name))

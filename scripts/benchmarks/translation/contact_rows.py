@@ -37,8 +37,8 @@ DRAWS = 200  # of each posterior: a share is known to .035 per contact, to .002 
 
 
 def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Measure medians over contacts that press without sliding, of three answers to signals read as ``change``
-    (C, 19) counts, beside the nearest example. bodies : holds the gel's surface, for place and patch"""
+    """Return rows of median errors of the three answers, beside the nearest example, on contacts that do not slide.
+    change : (C, 19) counts, the pairs' signals as read; bodies : holds the gel's surface, for place and patch"""
     answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
     found, still = [], ~pairs.slide.any(-1)
     answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, slice(None), bodies)
@@ -60,9 +60,10 @@ def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies
 
 
 def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
-    """Measure the gel's depth, place and silence for signals read as ``change`` (C, 19) counts that lost their sign.
+    """Return rows for signals that lost their sign: median depth of the gel and error of place, share of lost contacts.
 
-    Over contacts that press without sliding; baseline of the depth: the true one, which a translation should reach."""
+    Contacts that slide are left out. Baseline of the depth: the true one, which a translation should reach.
+    change : (C, 19) counts, the pairs' signals as read, before they lose their sign"""
     folded, unsigned = recovered(np.abs(change), np.ones(len(change), bool))
     columns: dict[str, list[np.ndarray]] = {"peak": [], "true": [], "place": [], "silent": []}
     for part in parts(len(change)):
@@ -89,8 +90,8 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
 
 
 def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """Measure the shares of true places in the regions of posteriors for ``change`` (C, 19) counts, and the posteriors'
-    energy score beside that of single answers."""
+    """Return rows of how many true places lie in the posterior's regions of 50 and 90 % probability, and of its energy
+    score beside that of a single answer. change : (C, 19) counts, the pairs' signals as read"""
     true = np.concatenate([_true_place(nets, pairs, part) for part in parts(len(change))])
     posterior = nets.posterior(nets.encode_signal(change))
     drawn = draw_places(posterior, DRAWS, np.random.default_rng(0))
@@ -116,7 +117,7 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
 
 
 def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Draw ``count`` places (count, T, 2) of T contacts from a posterior, in its units (see ``Posterior``)."""
+    """Draw ``count`` places of each of T contacts from a posterior: (count, T, 2), in the posterior's units."""
     edges = np.cumsum(posterior.weight, -1)
     which = (rng.random((count, len(edges), 1)) > edges / edges[:, -1:]).sum(-1)
     frames = np.arange(len(edges))
@@ -125,7 +126,7 @@ def draw_places(posterior: Posterior, count: int, rng: np.random.Generator) -> n
 
 
 def _density(posterior: Posterior, places: np.ndarray) -> np.ndarray:
-    """Density (D, T) of places (D, T, PLACE), up to a factor."""
+    """Return the posterior's density (D, T) at D places (D, T, PLACE) for each of T contacts, up to a factor."""
     mean, spread = (each[..., :PLACE].astype(float) for each in (posterior.mean, posterior.spread))
     away = (places[:, :, None] - mean) / spread
     return (posterior.weight / spread.prod(-1) * np.exp(-0.5 * np.square(away).sum(-1))).sum(-1)
@@ -136,7 +137,8 @@ def _true_place(nets: Networks, pairs: Pairs, part: slice) -> np.ndarray:
 
 
 def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return ``metrics`` of the likely, the mean and the solved answer to change (C, 19) counts of a part of pairs."""
+    """Return ``metrics`` of the likely, the mean and the solved answer to ``change`` (B, 19) counts, read from the
+    ``part`` of the pairs."""
     read = nets.encode_signal(change)
     posterior = nets.posterior(read)
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
@@ -151,7 +153,8 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
 
 
 def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return gels (B, M, 3) m of the contacts that translated ones, ``gel``, show, solved under force (B, 3) N."""
+    """Return displacements (B, M, 3) m of contacts solved on the DIGIT as found in translated ones.
+    gel : (B, M, 3) m, translated displacements; force : (B, 3) N, of each contact"""
     arrays = {
         "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
         "force": force, "flags": np.zeros(len(gel), np.uint16),
@@ -160,8 +163,9 @@ def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
-    """Return errors (B,) by name of gel (B, M, 3) m and force (B,) N, its size, on a part of the pairs; ``name`` begins
-    their names: place_mm, iou, force_size_percent, peak_percent. bodies : holds the gel's surface"""
+    """Return errors (B,) of answers to a ``part`` of the pairs: "NAME_place_mm", "NAME_iou" (an overlap),
+    "NAME_force_size_percent", "NAME_peak_percent".
+    gel : (B, M, 3) m; force : (B,) N, its size; bodies : holds the gel's surface"""
     true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
     patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
     return {
@@ -173,8 +177,8 @@ def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: s
 
 
 def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Return the error (C,) of gels ``gel`` from true ones, both (C, M, 3) m, divided by that of no displacement, rms
-    over nodes above a tenth of the peak."""
+    """Return the error (C,) of displacements ``gel`` against ``true``, both (C, M, 3) m, divided by that of no
+    displacement: rms over nodes that truly move by more than a tenth of the largest."""
     size = accuracy.lengths(true)
     felt = size > FELT * size.max(1, keepdims=True)
     left, all_of_it = ((np.square(each) * felt).sum(1) for each in (accuracy.lengths(gel - true), size))
@@ -182,9 +186,10 @@ def left_of_nothing(gel: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 
 def nearest_example(pairs: Pairs, change: np.ndarray, press: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return gel (C, M, 3) m and force (C,) N of the contact whose signal is most like each, scaled to its size.
+    """Return gel (C, M, 3) m and force (C,) N of the pair with the most similar signal, scaled by the signals' sizes.
 
-    change : (C, e) counts; press : (C,), of each, whose own contacts are no examples; None where all are of others
+    change : (C, e) counts, signals to find examples for
+    press : (C,), number of each signal's press, whose contacts are no examples; None if no pair is of these presses
     """
     length = np.sqrt(np.square(change).sum(-1))
     known = np.sqrt(np.square(pairs.signal).sum(-1))

@@ -1,7 +1,7 @@
-"""Grips of real fingers, the PHAC set: where a flat object is felt, against the electrodes that it squeezes.
+"""Judge grips of real fingers, the PHAC set: is a flat object felt over the electrodes that it squeezes?
 
-Two fingers of a robot's gripper hold hard and soft objects; the hand never opens, so rest is found in the soft objects'
-trials 01 to 03, and the hard objects' trials 04 and 05 are judged: nothing was chosen by these.
+Two fingers of a robot's gripper hold hard and soft objects. The hand never opens, so the electrodes' rest is found in
+trials 01 to 03 of soft objects; judged are trials 04 and 05 of hard objects, by which nothing was chosen.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EVERY = 20  # frames between two that are judged: a grip hardly changes
 
 
 def find(folder: Path) -> list[Path]:
-    """List the files of the set in a folder, by name; none where it holds others."""
+    """List the set's files in a folder, sorted; empty if the folder has none."""
     return sorted(folder.glob(PATTERN))
 
 
@@ -58,8 +58,8 @@ def hard_to_report(files: list[Path]) -> list[Path]:
 
 
 def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
-    """Return rows of a folder's grips, and of the place in ``simulated`` contacts. Raises TactileError without the
-    trials that rest is found in, or those that are judged."""
+    """Return rows of the grips in a folder, and of the place of ``simulated`` contacts. Raises TactileError if the
+    trials that rest is found in, or those that are judged, are missing."""
     files = find(folder)
     soft = soft_to_choose_by(files)
     hard = hard_to_report(files)
@@ -75,22 +75,22 @@ def rows(folder: Path, network: Translator, simulated: Pairs) -> list[Row]:
 
 
 def _unexplained_row(held: list[tuple[str, int]], known: list[Signals]) -> Row:
-    """Measure the unexplained changes of grips ``held``, (file, trial), with rest taken in the grip; baseline: of
-    ``known`` signals, with the unit's own rest, none."""
+    """Return a row of the share of frames called unexplained in the grips ``held``, (file, finger), if rest is wrongly
+    taken during the grip; baseline: in ``known``, the same grips' signals with the unit's own rest."""
     loaded = [Preparer()(recordings.read(one)) for one, _ in held]
     of = f"{len(held)} grips of hard flat objects, rest taken during the grip; baseline: with the unit's rest"
     return row("grip_unexplained", unexplained(loaded), "1", 0.9, baseline=unexplained(known), of=of, at_least=True)
 
 
 def unexplained(several: list[Signals]) -> float:
-    """Return the share, of all recordings' frames whose change is a touch's, that are called unexplained."""
+    """Return the share of frames that are called unexplained, among all recordings' frames with a touch."""
     change = np.concatenate([each.typical for each in several])
     shares = residual_shares(change, np.zeros(len(change), bool))
     return float(unlike(shares, change)[lengths(change) >= TOUCHING].mean())
 
 
 def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> list[Row]:
-    """Judge every finger in the grips' files ``hard``, as it is and with its electrodes in a random order."""
+    """Return rows on every finger in the grips' files ``hard``; baseline: with its electrodes in a random order."""
     shuffle = np.random.default_rng(0).permutation(len(electrodes()))
     results, baseline = [], []
     for path in hard:
@@ -109,7 +109,7 @@ def _place_rows(hard: list[Path], network: Translator, sensor: SensorFile) -> li
 
 
 def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
-    """Locate simulated contacts, read with the noise of real ones; baseline: always their middle place."""
+    """Return a row of the error of place on simulated contacts, read with noise; baseline: their middle place."""
     nets = network.nets
     deep = (pairs.depth_biotac > DEEP) & ~pairs.slide.any(axis=1) & (pairs.place[:, 0] > shape_of("digit").tip_x)
     gel = nets.decode_target(nets.likely_latents(nets.encode_signal(as_read(pairs.signal[deep], SEED)))[1])
@@ -126,8 +126,8 @@ def _simulated_place_row(network: Translator, pairs: Pairs) -> Row:
 def _judged(
     recording: Recording, unit: ElectrodeGains, network: Translator, order: np.ndarray | slice = slice(None)
 ) -> tuple[float, float, float]:
-    """Return whether the median place lies in the box; shares of frames with a place, and of those out of range.
-    order : in which the electrodes are read, 19 indices or a slice"""
+    """Return 1 if the median place of a grip lies in the box, else 0; the share of frames with a place; and that of
+    frames flagged out of range. order : in which the electrodes are read, 19 indices or a slice"""
     signals = Preparer(None, unit)(recording)
     signals = dataclasses.replace(signals, change=signals.change[:, order], rest=signals.rest[order])
     found = pass_over(network, signals, recording.time)(np.arange(0, len(recording), EVERY)).translation
@@ -137,7 +137,7 @@ def _judged(
 
 
 def in_box(place: np.ndarray) -> bool:
-    """Return true if a place (2,) m = (x, z) lies over the electrodes that a flat object squeezes."""
+    """Return true if a place (2,) m, (x, z), lies over the electrodes that a flat object squeezes."""
     x = electrodes()[SQUEEZED, 0]
     return bool(x.min() - MARGIN <= place[0] <= x.max() + MARGIN and abs(place[1]) <= LARGEST_Z)
 

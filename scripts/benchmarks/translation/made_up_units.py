@@ -1,8 +1,8 @@
-"""Rows of made-up units: what a film, a fluid and a skin unlike the typical unit's cost, known, found or not known.
+"""Measure what a finger unlike the typical one costs in error: its film, fluid and skin given, found, or not known.
 
-Presses by the training's indenters, each contact solved by the fast tier with the core as near as the unit's film is
-thin, and read by the conducting sheet itself, not its reduced one; gains 10 % apart, 1.5 counts of noise, gains never
-given. Truth is the fast tier's, the gel under the unit's own force.
+The training's indenters press made-up units. The fast tier solves each contact with the core as close as the unit's
+film is thin, and the whole conducting sheet (not the reduced one) reads it, with gains 10 % apart, which are never
+given, and 1.5 counts of noise. Truth is the gel under the unit's own force, by the fast tier.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ OTHERS, CHECKED, EDGES, FEWEST = 64, 24, (0.0, 0.5, 0.8, 0.9, 0.95, 0.98, 0.99, 
 
 @dataclasses.dataclass(frozen=True)
 class Unit:
-    """A finger: its film's thickness, fluid's conductivity, skin's stiffness, each divided by a typical unit's."""
+    """A finger: thickness of its film, conductivity of its fluid, stiffness of its skin, each over a typical unit's."""
 
     film: float = 1.0
     conductivity: float = 1.0
@@ -62,7 +62,7 @@ class Unit:
 
     @property
     def skin(self) -> Compliance:
-        """Compliance of the skin, over a core whose distance is the film's thickness."""
+        """Compliance of the skin with the core as far below it as the unit's film is thick."""
         return _skin(self.film)
 
     @property
@@ -71,7 +71,7 @@ class Unit:
         return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
 
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
-        """Return the press of an indenter at a place on this finger; its forces leave the unit's stiffness out.
+        """Return the press of an indenter at a place on this finger. Its forces must be multiplied by the stiffness.
         friction : Coulomb's coefficient"""
         pose = pose_at(SOURCE, indenter, place)
         limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
@@ -82,21 +82,21 @@ class Unit:
         return self._counts(np.full(len(REST_COUNTS), 1 / self.film))
 
     def readings(self, contacts: Sequence[Contact]) -> np.ndarray:
-        """Return the counts (T, 19), not rounded, in T contacts of ``press``."""
+        """Return the counts (T, 19), not rounded, that this finger reads in T contacts of ``press``."""
         skin, sheet, typical = self.skin, self.sheet, biotac_sheet()
         moved = ((each.sensing_gaps - skin.watch_gap)[skin.feet :] for each in contacts)
         found = np.stack([sheet.resistances(sheet.films_of(each)) for each in moved])
         return self._counts(found / typical.resistances(typical.film))
 
     def _counts(self, resistance: np.ndarray) -> np.ndarray:
-        """Return counts (..., 19) for a film's resistance (..., 19) over a typical unit's at rest, but for the
-        fluid."""
+        """Return counts (..., 19). resistance : (..., 19), of the film if its fluid were typical, over a typical unit's
+        at rest"""
         film = divider.film_impedance(REST_COUNTS)
         series = COUNT_MAX / REST_COUNTS - 1 - film
         return COUNT_MAX / (1 + series + film * resistance / self.conductivity)
 
     def file(self) -> ElectrodeGains:
-        """Return the unit as `tactile adapt` writes one, with gains of 1."""
+        """Return the unit as a file of `tactile adapt` has it, with gains of 1."""
         ones, rest = [1.0] * len(REST_COUNTS), self.rest().tolist()
         return ElectrodeGains("given", ones, [0.0] * len(ones), rest, film=self.film, stiffness=self.stiffness)
 
@@ -109,7 +109,7 @@ def _skin(film: float) -> Compliance:
 
 @dataclasses.dataclass(frozen=True)
 class Played:
-    """A recording of a unit; frames : (C,) of its contacts; force : (C,) N; gel : (C, M, 3) m, the truth there."""
+    """A recording of a unit. frames : (C,), indices of its contacts; force : (C,) N, gel : (C, M, 3) m, their truth"""
 
     unit: Unit
     recording: Recording
@@ -119,7 +119,7 @@ class Played:
 
 
 def played(number: int, unit: Unit, presses: int = PRESSES) -> Played:
-    """Press a unit ``presses`` times, with rest in between, and record it; number : of the recording, the only seed"""
+    """Press a unit ``presses`` times, with rest in between, and record it. number : the recording's own seed"""
     random, (scene, _) = np.random.default_rng([SEED, number, 1]), load_scene(SCENE)
     counts, frames, force, gel = [np.tile(unit.rest(), (AT_FIRST, 1))], [], [], []
     for _ in range(presses):
@@ -139,7 +139,8 @@ def played(number: int, unit: Unit, presses: int = PRESSES) -> Played:
 
 
 def _one_press(unit: Unit, scene: Scene, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Counts (C, 19), force (C,) N and gels (C, M, 3) m of contacts that deepen; drawn again where none is found."""
+    """Draw a press; return counts (C, 19), force (C,) N and gels (C, M, 3) m of its contacts, deeper and deeper. It is
+    drawn again if one is not found."""
     spec = paired(scene)
     while True:
         indenter = scene.indenters[int(random.integers(len(scene.indenters)))].build()
@@ -167,10 +168,9 @@ TAKEN: dict[str, Callable[[Unit], tuple[PrepareOptions | None, ElectrodeGains | 
 
 
 def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> list[Row]:
-    """Measure median errors of contacts on random units, translated with the unit given, found or taken as typical;
-    baseline: contacts on typical units.
-    units, presses : number of units, and on each. Found means from the recording, as `tactile convert` does: not the
-        stiffness"""
+    """Return rows of median errors on random units that are given, found or taken as typical; baseline: the errors on
+    typical units. units : their number; presses : number on each. "Found" is found in the recording, as `tactile
+    convert` does, which does not find the stiffness."""
     drawn = [unit_of(number) for number in range(units)]
     made, typical = ([played(*each, presses) for each in enumerate(every)] for every in (drawn, [Unit()] * units))
     beside = _errors(network, typical, "unknown")
@@ -189,8 +189,8 @@ def unit_of(number: int) -> Unit:
 
 
 def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSES) -> list[Row]:
-    """Return rows of the share of contacts whose largest node error is below its bound, one per bin of confidence: the
-    share should equal the confidence."""
+    """Return a row per bin of confidence: the share of contacts whose largest node error is below its bound, which
+    should equal the confidence. units : their number; presses : number on each"""
     made = [played(OTHERS + each, unit_of(OTHERS + each), presses) for each in range(units)]
     gel, rows = np.concatenate([each.gel for each in made]), []
     found = [translated_contacts(network, made, taken) for taken in TAKEN]
@@ -211,7 +211,7 @@ def reliability(network: Translator, units: int = CHECKED, presses: int = PRESSE
 
 
 def translated_contacts(network: Translator, made: Sequence[Played], taken: str) -> Translation:
-    """Translate the contacts of recordings, joined; taken : their units, "given", "found" or "unknown" (typical)"""
+    """Return the joined translation of the recordings' contacts. taken : how units are treated, a key of TAKEN"""
     answers = []
     for each in made:
         options, unit = TAKEN[taken](each.unit)
@@ -221,8 +221,8 @@ def translated_contacts(network: Translator, made: Sequence[Played], taken: str)
 
 
 def _errors(network: Translator, made: list[Played], taken: str) -> dict[str, float]:
-    """Median errors of force % and place mm, the gel's rms over that of no dent, and CPU ms per contact.
-    made : recordings; taken : how their units are treated, a key of TAKEN"""
+    """Return median errors of force, %, and place, mm, the gel's error over that of no dent, and CPU ms per contact.
+    made : recordings; taken : how units are treated, a key of TAKEN"""
     began = time.process_time()
     found = translated_contacts(network, made, taken)
     spent = time.process_time() - began

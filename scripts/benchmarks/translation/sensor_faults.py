@@ -1,11 +1,11 @@
-"""Break recordings as sensors, cables and drivers do, and count the frames that are translated wrongly and confidently.
+"""Break recordings as sensors, cables and drivers do; count the frames that are translated wrongly, yet confidently.
 
     python scripts/benchmarks/translation/sensor_faults.py [--phac FOLDER] [--sensor REST.toml] --json FILE
 
-Each fault is put into the shipped recording, into an idle finger with that recording's rest, and into grips of
-``--phac`` (trials 01 to 03), whose rest ``tactile adapt`` found (``--sensor``). A frame is wrong where its force is not
-that of the unbroken recording, by half of it or, where there is none, by `NOTHING`; it counts where it is confident and
-unflagged all the same. The rows ``clean_..._guesses`` are the shares of unbroken frames that are called guesses.
+Each fault is put into the shipped recording, into an idle finger with that recording's rest, and into grips of the PHAC
+set (``--phac``, trials 01 to 03), whose rest ``tactile adapt`` found (``--sensor``). A frame is wrong if its force
+differs from that of the unbroken recording by more than half of it, and by more than `NOTHING`; it counts if it is
+confident and not flagged all the same. Rows ``clean_..._guesses`` are the shares of unbroken frames called guesses.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Fault = Callable[[np.ndarray, np.ndarray, Rng], np.ndarray]  # electrodes (T, 19
 
 @dataclass(frozen=True)
 class Base:
-    """A recording to break; name : in rows; rest : (19,) counts; sensor : file of its unit, None without one
+    """A recording to break. name : what rows call it; rest : (19,) counts; sensor : file of its unit, None for none
     every : step from one judged frame to the next"""
 
     name: str
@@ -51,7 +51,7 @@ class Base:
     every: int
 
     def translated(self, electrodes: np.ndarray) -> Translation | None:
-        """Translate the recording with other electrodes (T, 19) counts; None where it is refused."""
+        """Return the translation of the recording with other electrodes (T, 19) counts; None if it is refused."""
         broken = replace(self.recording, electrodes=electrodes)
         try:
             return translate(broken, sensor=self.sensor, frames=slice(None, None, self.every))
@@ -68,21 +68,21 @@ def _drawn(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
 
 
 def stuck(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one of the electrodes (T, 19) counts keep its reading from some frame on. rest : (19,) counts, unused here"""
+    """Let one of the electrodes (T, 19) counts keep its reading after 30 % of the frames. rest : (19,), not used"""
     (one,), rows = _drawn(electrodes, random, 1), _from(electrodes)
     electrodes[rows, one] = electrodes[rows, one][0]
     return electrodes
 
 
 def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Let one of the electrodes (T, 19) read the same throughout, one of its counts at random. rest : unused"""
+    """Let one of the electrodes (T, 19) read one of its counts, drawn at random, throughout. rest : not used"""
     (one,) = _drawn(electrodes, random, 1)
     electrodes[:, one] = random.choice(electrodes[:, one])
     return electrodes
 
 
 def stepped(count: int, by: float) -> Fault:
-    """Return a fault, called as ``stuck`` is: some electrodes, ``count``, move by ``by`` counts from some frame on."""
+    """Return a fault, called as ``stuck`` is: ``count`` electrodes jump by ``by`` counts after 30 % of the frames."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by
@@ -92,7 +92,7 @@ def stepped(count: int, by: float) -> Fault:
 
 
 def drifting(count: int, by: float) -> Fault:
-    """Return a fault: ``count`` electrodes drift evenly by ``by`` counts to the end."""
+    """Return a fault: ``count`` electrodes drift evenly, from 0 to ``by`` counts at the end."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[:, _drawn(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
@@ -102,7 +102,7 @@ def drifting(count: int, by: float) -> Fault:
 
 
 def noisy(count: int, counts: float) -> Fault:
-    """Return a fault: ``count`` electrodes get normal noise; counts : its standard deviation, counts"""
+    """Return a fault: ``count`` electrodes get Gaussian noise with a standard deviation of ``counts`` counts."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         electrodes[:, _drawn(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
@@ -146,7 +146,7 @@ def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
 
 
 def held(share: float) -> Fault:
-    """Return a fault: the last row is repeated in place of lost ones, a ``share`` of all, in bursts of up to eight."""
+    """Return a fault: a ``share`` of the rows, in bursts of one to eight, are lost: the row before is repeated."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         lost = np.zeros(len(electrodes), bool)
@@ -160,7 +160,7 @@ def held(share: float) -> Fault:
 
 
 def frozen(frames: int) -> Fault:
-    """Return a fault: the row of the largest change is repeated for ``frames`` frames."""
+    """Return a fault: the row of the largest change is held for ``frames`` frames."""
 
     def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
         first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
@@ -176,13 +176,13 @@ def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndar
 
 
 def bits(by: float) -> Fault:
-    """Return a fault: readings are ``by`` times as large, whole and clipped, as of another number of bits."""
+    """Return a fault: readings are ``by`` times as large, whole and clipped, like those of an ADC of other bits."""
     return lambda electrodes, rest, random: np.clip(np.floor(electrodes * by), 0, COUNT_MAX)
 
 
 def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Put the strongest contact's frame, with noise, in the first and last QUIET frames of electrodes (T, 19) counts;
-    no frame where none differs from rest (19,) by LEAST_LOAD."""
+    """Put the row of the strongest contact, with noise, into the first and last QUIET rows of electrodes (T, 19)
+    counts; do nothing if no reading differs from rest (19,) by LEAST_LOAD."""
     change = np.abs(electrodes - rest)
     if change.max() < LEAST_LOAD:
         return electrodes
@@ -208,8 +208,8 @@ FAULTS: dict[str, Fault] = {
 
 
 def bases(phac: Path | None, sensor: str | None) -> list[Base]:
-    """Return the recordings that faults are put into: the shipped one, an idle finger, and grips in the folder phac.
-    sensor : file of the grips' rest"""
+    """Return the recordings that faults are put into: an idle finger, the shipped one, and grips in the folder
+    ``phac``. sensor : file with the grips' rest"""
     shipped, random = read(SHIPPED), np.random.default_rng(0)
     at_rest = np.asarray(shipped.electrodes[:QUIET], float).mean(axis=0)
     idle = replace(
@@ -226,19 +226,19 @@ def bases(phac: Path | None, sensor: str | None) -> list[Base]:
 
 
 def confident(found: Translation) -> np.ndarray:
-    """Mark (T,) bool the frames that neither flags nor confidence call a guess."""
+    """Return a mask (T,) bool of the frames that neither flags nor confidence call a guess."""
     return ~np.array([is_guess(*each) for each in zip(found.confidence, found.flags, strict=True)])
 
 
 def wrong(found: Translation, true: Translation) -> np.ndarray:
-    """Mark (T,) bool the frames whose force is off by more than half of the true one, and by more than `NOTHING`."""
+    """Return a mask (T,) bool of the frames whose force is off by more than half of the true one and than `NOTHING`."""
     seen, force = accuracy.lengths(found.force), accuracy.lengths(true.force)
     return np.abs(seen - force) > np.maximum(NOTHING, HALF * force)
 
 
 def measured(recordings: list[Base]) -> list[Row]:
-    """Return rows of % of frames: of each unbroken recording the guesses; of each fault, mean over recordings, the
-    frames that are wrong and confident."""
+    """Return rows of shares of frames, %: for each unbroken recording of guesses; for each fault of frames that are
+    wrong and confident, mean over recordings."""
     true = [base.translated(np.asarray(base.recording.electrodes, float)) for base in recordings]
     kept = [(base, found) for base, found in zip(recordings, true, strict=True) if found is not None]
     rows = []
@@ -252,8 +252,8 @@ def measured(recordings: list[Base]) -> list[Row]:
 
 
 def share(base: Base, true: Translation, fault: Fault) -> float:
-    """Return the share of frames, %, wrong and confident where a fault breaks a recording; 0 where that is refused.
-    true : the unbroken recording's translation"""
+    """Return the share of frames, %, that are wrong and confident once a fault has broken a recording; 0 if the broken
+    one is refused. true : translation of the unbroken recording"""
     electrodes = fault(np.array(base.recording.electrodes, float), base.rest, np.random.default_rng(1))
     found = base.translated(np.rint(electrodes))
     return 0.0 if found is None else 100 * float((wrong(found, true) & confident(found)).mean())

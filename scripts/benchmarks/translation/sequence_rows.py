@@ -1,8 +1,7 @@
-"""Rows of followed contacts on sequences of 0.4 s, each read by a unit of its own.
-
+"""Measure translation that follows a contact through frames, on sequences of 0.4 s, each read by a unit of its own.
 Presses, rolls and slides of the test set, whose truth is the fast tier's (``benchmarks/make/make_sequences.py`` says
-how far that is off), as read right after a tare and with the rest some counts off. The baseline of each row is the same
-networks, each frame alone.
+how far that is off), are read right after a tare, and with the rest some counts off. The baseline of each row is the
+same networks, each frame translated alone.
 """
 
 from __future__ import annotations
@@ -35,8 +34,8 @@ Errors = dict[str, np.ndarray]  # by UNITS, a number per judged frame
 
 
 def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
-    """Measure medians over frames from 0.1 N on, of all sequences and of each motion, then with the rest off.
-    file : the test set; every : judge one sequence in ``every``"""
+    """Return rows of median errors over frames above 0.1 N: of all sequences, of each motion, and with a wrong rest.
+    file : the test set; every : take one sequence in ``every``"""
     truth = {name: values[::every] for name, values in read(file).items()}
     number = len(truth["motion"])
     followed, alone = both = measured(network, truth)
@@ -57,7 +56,8 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
 
 
 def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
-    """Return ``judged``'s errors: contacts followed, then frames alone; rest_off : counts, largest error of the rest"""
+    """Return the errors of all sequences with contacts followed, then with each frame translated alone.
+    rest_off : counts, largest error of the rest"""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
     followed, alone = [], []
     for number, signal in enumerate(truth["signal"]):
@@ -69,13 +69,13 @@ def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[
 
 
 def read(file: Path = FILE) -> Truth:
-    """Read by name signal counts, force N, center, peak m, patch bits, (S, 40, ...); motion (S,), index of MOTIONS."""
+    """Read the test set by name, (S, 40, ...): signal counts, force N, center m, peak m, patch bits; motion (S,)."""
     with np.load(file, allow_pickle=False) as found:
         return {name: found[name] for name in found.files}
 
 
 def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: float = 0.0) -> np.ndarray:
-    """Return the change (T, 19) counts that a unit with random gains, noise and error of rest reads of the true one.
+    """Return the change (T, 19) counts that a unit with random gains, noise and a wrong rest reads.
     signal : (T, 19) counts, the true change; rest_off : counts, largest error of the rest"""
     gain = 1 + GAIN * random.standard_normal(signal.shape[1])
     found = gain * signal + NOISE * random.standard_normal(signal.shape)
@@ -83,8 +83,8 @@ def read_by_a_unit(signal: np.ndarray, random: np.random.Generator, rest_off: fl
 
 
 def judged(found: Translation, truth: Truth) -> Errors:
-    """Return errors of a sequence's frames of over 0.1 N, by name: place mm, infinite for a lost contact, force % and
-    peak %; and iou, the overlap of contact patches, NaN for small true ones."""
+    """Return errors of a sequence's frames above 0.1 N, by name: place, mm, infinite for a lost contact; force and
+    peak, %; iou, the overlap of contact patches, NaN if the true patch is small."""
     on = truth["force"] > TOUCHED
     surface = sensors.digit_surface()
     patch = np.unpackbits(truth["patch"][on], axis=1, count=len(surface.rest)).astype(bool)
@@ -113,6 +113,6 @@ def _row(
 
 
 def quantile(values: np.ndarray, level: int) -> float | None:
-    """Return the ``level`` per cent quantile of values (n,) without NaN; None where it is infinite: a lost contact."""
+    """Return the ``level`` per cent quantile of values (n,) without NaN; None if it is infinite, a lost contact."""
     found = float(np.nanpercentile(values, level, method="higher"))
     return found if np.isfinite(found) else None

@@ -1,8 +1,7 @@
-"""Slides of a real BioTac: does the translated force follow the fluid's pressure, which the translation never sees?
-
-The protocol is that of the notes beside the public set BioTac_slide_20_50: fourth-order Butterworth at 5 Hz forth and
-back, rows within the time that the robot's wrench and pose cover, glitches over 30 counts from the median of 11 samples
-replaced, the part that the arm's pose explains taken off before ranks are compared.
+"""Judge slides of a real BioTac: does translated force follow the fluid's pressure, which the translation never sees?
+The protocol is that of the notes beside the public set BioTac_slide_20_50: a fourth-order Butterworth low-pass at 5 Hz,
+forward and backward; rows within the time that the robot's wrench and pose cover; samples over 30 counts from the
+median of 11 are replaced; and the part that the arm's place explains is subtracted before ranks are compared.
 """
 
 from __future__ import annotations
@@ -41,9 +40,9 @@ ROWS = (
 
 @dataclass(frozen=True, eq=False)
 class Slide:
-    """A recording, and its T rows that wrench and pose cover.
+    """A recording, and the T of its frames that wrench and pose cover.
 
-    time : (T,) unix s; arm : (T,) m, the arm's x; electrodes : (T, 19), pressure : (T,) counts, both below 5 Hz
+    time : (T,) unix s; arm : (T,) m, the arm's x; electrodes : (T, 19), pressure : (T,), counts, low-passed at 5 Hz
     """
 
     recording: Recording
@@ -56,12 +55,11 @@ class Slide:
 def rows(
     folder: str | os.PathLike, translate: Callable[[Recording], Translation], most: int | None = None
 ) -> list[Row]:
-    """Measure a folder's recordings kept for reporting that have wrench and pose beside them, the first ``most`` or
-    all.
+    """Return rows on the ``reporting`` recordings of a folder that have wrench and pose beside them.
 
-    translate : from a recording to its translation
-    Baselines: the electrodes' sum; of places their centroid, weighted by the squares. Raises TactileError for a folder
-    without such recordings, and for one that cannot be read."""
+    translate : function from a recording to its translation; most : use the first so many alone, None for all
+    Baselines: the electrodes' sum; for places their centroid, weighted by squared changes. Raises TactileError for a
+    folder without such recordings, and for a recording that cannot be read."""
     whole = [path for path in reporting(folder)[:most] if all(beside(path, each).exists() for each in (WRENCH, POSE))]
     if not whole:
         raise TactileError(folder, "none with its _cw.csv and _cp.csv", "at least one", "Copy them beside it")
@@ -78,8 +76,8 @@ def rows(
 
 
 def reporting(folder: str | os.PathLike) -> list[Path]:
-    """List the ``*_bio.csv`` in a folder and its folders, by name, without sample 7 of each material, by which
-    parameters were chosen; all if there is nothing else. Raises TactileError where there is none."""
+    """List the ``*_bio.csv`` in a folder and its subfolders, sorted. Sample 7 of each material is left out, since
+    settings were chosen by it, unless there is nothing else. Raises TactileError if there is no such file."""
     folder = Path(folder)
     paths = sorted([*folder.glob(f"*{BIO}"), *folder.glob(f"*/*{BIO}")], key=lambda path: path.name)
     if not paths:
@@ -88,12 +86,13 @@ def reporting(folder: str | os.PathLike) -> list[Path]:
 
 
 def beside(path: Path, topic: str) -> Path:
-    """Return the path of the file of another topic, WRENCH or POSE (endings of names), beside a recording's file."""
+    """Return the path of the file beside a recording's that ends in ``topic``, WRENCH or POSE."""
     return path.with_name(path.name.removesuffix(BIO) + topic)
 
 
 def load(path: Path) -> Slide:
-    """Read a recording with the wrench and pose files beside it. TactileError: no PDC, under 100 common frames."""
+    """Read a recording with the wrench and pose files beside it. Raises TactileError if it has no PDC, or if under 100
+    frames are in the time of all three."""
     recording, wrench, pose = read(path), _table(beside(path, WRENCH), 7), _table(beside(path, POSE), 4)
     time = recording.start_time + recording.time
     even = np.arange(wrench[0, 0], wrench[-1, 0], 1 / WRENCH_RATE)
@@ -110,7 +109,7 @@ def load(path: Path) -> Slide:
 
 
 def _table(path: Path, columns: int) -> np.ndarray:
-    """Read numbers (n, columns) of a comma-separated file with a header; raises TactileError."""
+    """Read numbers (n, columns) of a comma-separated file with a header. Raises TactileError if a cell is no number."""
     try:
         values = np.atleast_2d(np.genfromtxt(path, delimiter=",", skip_header=1, usecols=range(columns)))
     except (OSError, ValueError, UnicodeDecodeError) as error:
@@ -121,21 +120,22 @@ def _table(path: Path, columns: int) -> np.ndarray:
 
 
 def replace_glitches(electrodes: np.ndarray) -> np.ndarray:
-    """Interpolate the samples of electrodes (T, 19) counts that are further than 30 counts from their median of 11."""
+    """Replace samples of electrodes (T, 19) counts that are over 30 counts from the median of 11, by interpolation."""
     padded = np.pad(electrodes, ((HALF_MEDIAN, HALF_MEDIAN), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * HALF_MEDIAN + 1, axis=0)
     return fill(electrodes, np.abs(electrodes - np.median(windows, axis=-1)) > GLITCH)
 
 
 def lowpass(values: np.ndarray) -> np.ndarray:
-    """Keep what lies below 5 Hz of values (T, ...) at 100 Hz, without delay."""
+    """Low-pass values (T, ...), sampled at 100 Hz, at 5 Hz, without delay."""
     from scipy.signal import butter, filtfilt
 
     return filtfilt(*butter(4, CUT / (SAMPLE_RATE / 2)), values, axis=0)
 
 
 def metrics(slide: Slide, found: Translation) -> dict[str, tuple[float, float]]:
-    """Return (translation, electrodes alone) of rank, silence, missed (0 to 1), along, across (spread, mm)."""
+    """Return metrics by name, each as (of the translation, of the electrodes alone): "rank", "silence", "missed", the
+    share of touched time without a contact found, and "along" and "across", the spread of places, mm."""
     frames = slide.recording.start_time + slide.recording.time
     lost = ~np.isfinite(found.contact_center)
     columns = (accuracy.lengths(found.force), lost.any(axis=1), *1e3 * fill(found.contact_center, lost).T)
@@ -153,13 +153,13 @@ def metrics(slide: Slide, found: Translation) -> dict[str, tuple[float, float]]:
 
 
 def rank(strength: np.ndarray, slide: Slide) -> float:
-    """Return the rank correlation of a smooth strength (T,) with the slide's pressure, the part that follows the arm's
-    place taken off both."""
+    """Return the rank correlation of a smooth strength (T,) with the slide's pressure, after the part that follows the
+    arm's place is subtracted from both."""
     return rank_correlation(without_pose(strength, slide.arm), without_pose(slide.pressure, slide.arm))
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Return Spearman's rank correlation of a and b (T,); NaN where one of them does not change."""
+    """Return Spearman's rank correlation of a and b, (T,) each; NaN if one of them does not change."""
     from scipy.stats import rankdata
 
     a, b = rankdata(a), rankdata(b)
@@ -167,19 +167,19 @@ def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def without_pose(values: np.ndarray, arm: np.ndarray) -> np.ndarray:
-    """Subtract from values (T,) the cubic in the arm's place (T,) that fits them best."""
+    """Return values (T,) less the cubic polynomial in the arm's place (T,) that fits them best."""
     powers = np.vander((arm - arm.mean()) / (arm.std() + 1e-12), DEGREE + 1)
     return values - powers @ np.linalg.lstsq(powers, values, rcond=None)[0]
 
 
 def silence(strength: np.ndarray, lost: np.ndarray) -> float:
-    """Return the median of a smooth strength (T,) where contact is lost (T,) bool, over its 95 % quantile; NaN where at
-    most 30 frames are lost."""
+    """Return the median of a smooth strength (T,) while contact is lost (T,) bool, divided by its 95 % quantile; NaN if
+    30 frames or fewer are lost."""
     if lost.sum() <= SILENT_FRAMES:
         return np.nan
     return float(np.median(strength[lost]) / np.percentile(strength, 95))
 
 
 def spread(centre: np.ndarray, touching: np.ndarray) -> np.ndarray:
-    """Return the standard deviation (2,) of centre (T, 2) while touching (T,) bool; NaN where that is too short."""
+    """Return the standard deviation (2,) of centre (T, 2) while touching (T,) bool; NaN if that is too short."""
     return centre[touching].std(axis=0) if touching.sum() > CENTRE_FRAMES else np.full(2, np.nan)

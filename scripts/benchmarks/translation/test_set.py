@@ -1,4 +1,4 @@
-"""Rows of the translation on a test set, contacts paired by the full tier; `bodies` : surfaces, of ``our_bodies``."""
+"""Measure the translation on a test set, contacts solved by the full tier; `bodies` : surfaces, by ``our_bodies``"""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ GAIN = 0.1  # standard deviation per channel (assumed: docs/sources.md, BioTac r
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure all contacts: metrics with their targets, subsets without targets, and how good expected errors are.
-    bodies : the gel's surface and the skin's unrolled places, of ``our_bodies``"""
+    """Return rows on all contacts: metrics with targets, metrics of subsets, and how good expected errors are.
+    bodies : the gel's surface and the skin's unrolled places, by ``our_bodies``"""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
     columns = translation_metrics(translator.nets, pairs, rows, change, bodies)
@@ -62,7 +62,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Measure contacts by indenters and in the region that training left out, as the translator's card names them."""
+    """Return rows on contacts by indenters, and in the region, that the translator's card says training left out."""
     options, names = translator.card["options"], np.array(pairs.indenter_names)
     there = pairs.place[:, 0] < (-np.inf if options["without_below_x"] is None else options["without_below_x"])
     known = ~np.isin(names[pairs.indenter], options["without"])
@@ -84,8 +84,8 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
 def expected_error_rows(
     translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
 ) -> list[Row]:
-    """Measure rank correlation of expected and true largest error, share below the bound, share flagged out of range.
-    rows : (C,) of the pairs; change : (C, 19) counts, their signals as read; name : of the set"""
+    """Return rows of the rank correlation of expected and true largest errors, of the share below the bound, and of the
+    share out of range. rows : (C,), indices of pairs; change : (C, 19) counts, signals as read; name : the set's"""
     nets, silent = translator.nets, translator.silent("digit_m")
     columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))
     flagged = translator.out_of_range(change)
@@ -106,14 +106,14 @@ def expected_error_rows(
 
 
 def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
-    """Return a row of value with the target low or more, high or less, or both, None for no bound. set_name : of
-    data"""
+    """Return a row of a share, ``value``, whose target is ``low`` or more and ``high`` or less, None for no such limit.
+    set_name : what data it is of"""
     found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
     return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
 
 
 def as_read(change: np.ndarray, seed: int) -> np.ndarray:
-    """Return the true change (C, 19) counts with noise and gains drawn by a seed, as a sensor reads it."""
+    """Return the true change (C, 19) counts as sensors read it: with noise, and gains drawn for each contact anew."""
     random = np.random.default_rng(seed)
     gain = 1 + GAIN * random.standard_normal(change.shape)
     return (gain * change + NOISE * random.standard_normal(change.shape)).astype(np.float32)

@@ -1,7 +1,7 @@
-"""Measure how many of two contacts at once are recognised, how many single ones mistaken, and how both are translated.
+"""Measure how often two contacts at once are recognised and single ones mistaken for two, and how both are translated.
 
-A sum of two signals stands for both at once: contacts far apart bend the skin each for itself, but for the fluid that
-both press. Translated are contacts of two balls that were solved at once (``benchmarks/make/make_double_contacts.py``).
+To recognise, two contacts' signals are summed: far apart, each bends the skin by itself, and only the fluid couples
+them. To translate, two balls were solved at once (``benchmarks/make/make_double_contacts.py``).
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ HALF = 0.5  # of a field's peak: nodes that overlap (docs/accuracy.md)
 
 
 def rows(pairs: Pairs) -> list[Row]:
-    """Return rows of the share of two contacts that are marked as two, by their distance; baseline: the share of single
-    contacts that are marked as two."""
+    """Return rows of the share of double contacts that are marked as two, in all and by distance; baseline: the share
+    of single contacts that are."""
     random = np.random.default_rng(SEED)
     felt = np.flatnonzero(lengths(pairs.signal) >= TOUCHING)
     single = _marked(pairs.signal[random.choice(felt, COUNT)])
@@ -51,7 +51,8 @@ def rows(pairs: Pairs) -> list[Row]:
 def pairs_apart(
     pairs: Pairs, felt: np.ndarray, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Draw rows (COUNT,) of a first and a second contact from ``felt`` (k,), rows of pairs, and their distances, m."""
+    """Draw COUNT double contacts: return the first and the second one's row of pairs, and the distance, m, (COUNT,)
+    each. felt : (k,), rows of pairs to draw from"""
     first, second = random.choice(felt, (2, 40 * COUNT))
     size = lengths(pairs.signal)
     apart = lengths(pairs.place[first, :2] - pairs.place[second, :2])
@@ -66,7 +67,7 @@ def _marked(change: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class DoubleContacts:
-    """Contacts of two balls at once; signal : (C, 19) counts; gel : (C, M, 3) m; force : (C,) N of both."""
+    """Contacts of two balls at once. signal : (C, 19) counts; gel : (C, M, 3) m; force : (C,) N, of both balls"""
 
     signal: np.ndarray
     gel: np.ndarray
@@ -85,10 +86,10 @@ def _meters(displacement: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> list[Row]:
-    """Measure double contacts and single ones, two looked for; baseline: the same networks, one looked for.
+    """Return rows on double and on single contacts, with two contacts looked for; baseline: with one looked for.
 
-    split: share that is taken for two; gel: rms error over that of no displacement; overlap of what is deeper than
-    half; force: of both, median error"""
+    split: share taken for two; gel: rms error over that of no displacement; overlap: of the nodes deeper than half the
+    deepest; force: median error of both contacts' together"""
     double = double_contacts(file)
     force = np.concatenate([double.force, lengths(pairs.force)])
     gel = np.concatenate([double.gel, _meters(pairs.displacement_digit, pairs.scale_digit)])
@@ -105,7 +106,8 @@ def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> l
 
 
 def _errors(found: Translation, true: np.ndarray, force: np.ndarray) -> dict[str, np.ndarray]:
-    """Return errors (C,) of translated gels against true (C, M, 3) m, and of both forces' sum against force (C,) N."""
+    """Return name -> (C,): whether taken for two, error and overlap of gels against ``true`` (C, M, 3) m, and error, %,
+    of both forces' sum against force (C,) N."""
     size, moved = lengths(true), lengths(found.displacement_digit)
     deep, deepest = (each > HALF * each.max(1, keepdims=True) for each in (moved, size))
     both = lengths(found.force) + lengths(found.second_force)
