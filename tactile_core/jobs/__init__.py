@@ -1,1 +1,1 @@
-"""Jobs behind the verbs: a recording, scene or folder in, a result folder out."""
+"""Work behind the command's verbs: a recording, scene or folder in, a result folder out."""

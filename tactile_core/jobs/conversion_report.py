@@ -1,4 +1,4 @@
-"""The report of a conversion to its user: warnings, expected errors, and the contact sheet, a few frames as columns."""
+"""Report a conversion to its user: warnings, expected errors, and the contact sheet, a few frames as columns."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ SHEET_ARRAYS = (
 
 
 class ConversionReport:
-    """Collects what is reported of all frames, and what the contact sheet shows; flagged : number of frames by flag"""
+    """Report on all frames of a conversion, and its contact sheet. flagged : flag's name -> number of frames with it"""
 
     def __init__(self, rows: PreparedRows, frames: np.ndarray, tools: Tools, made: FramePass) -> None:
-        """Start a report. rows : the prepared recording; frames : (T,) rising indices of its converted frames
+        """Start a report. rows : the prepared recording; frames : (T,) rising indices of the frames to convert
         tools : networks and drawer; made : the pass that translates and draws these frames"""
         self._rows, self._frames, self._tools, self._made = rows, frames, tools, made
         self.flagged: dict[str, int] = dict.fromkeys(flags.names(), 0)
@@ -52,7 +52,8 @@ class ConversionReport:
         self._shown: dict[int, dict[str, np.ndarray]] = {int(frame): {} for frame in frames[chosen]}
 
     def take(self, frames: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
-        """Add translated frames: frames (n,), ascending indices after those before; arrays : by names of frames.h5"""
+        """Add translated frames to the report. frames : (n,) indices, after those added before
+        arrays : name -> (n, ...), by the names of frames.h5"""
         for name, bit in flags.names().items():
             self.flagged[name] += int(np.count_nonzero(arrays["flags"] & bit))
         self._pressure.append(arrays["pressure"])
@@ -71,14 +72,14 @@ class ConversionReport:
             self._shown[int(frames[row])] = kept
 
     def warnings(self) -> tuple[str, ...]:
-        """Return sentences that warn the user: of weights, recording, options and translated frames."""
+        """Return sentences that warn the user, on weights, recording, options and translated frames."""
         return *self._of_weights(), *self._of_recording()
 
     def _of_weights(self) -> list[str]:
         return [*filter(None, [doubt(self._tools.translator.card)])]
 
     def _of_recording(self) -> list[str]:
-        """Return what was found, in the order of the steps: single samples first, whole frames last."""
+        """Return warnings on recording, gel and frames in the order of the steps: single samples first, frames last."""
         translator, drawer = self._tools.translator, self._tools.drawer
         found = [*self._rows.signals.warnings, *translator.answer.describe_shift(), *drawer.describe_gel()]
         for flag, words in SENTENCES.items():
@@ -95,13 +96,13 @@ class ConversionReport:
 
     @property
     def explained(self) -> float | None:
-        """Share of the electrodes' change that the translation explains, mean in contact; None without contact."""
+        """Return the share of the electrodes' change that is explained, mean in contact; None without contact."""
         share = np.concatenate(self._explained)
         touching = np.isfinite(share)
         return round(float(share[touching].mean(dtype=float)), 4) if touching.any() else None
 
     def describe_traction(self) -> str:
-        """Return a sentence on how far the sum of kept traction is from the force; "" where traction is not kept."""
+        """Return a sentence on how far the sum of traction is from the force; "" if traction is not kept."""
         if not self._forces:
             return ""
         from .solved_gel import describe_miss
@@ -110,7 +111,7 @@ class ConversionReport:
         return describe_miss(total, force, solved=self._tools.drawer.solve is not None)
 
     def draw_sheet(self, path: Path) -> None:
-        """Draw the contact sheet once all frames were added; equal frames make equal bytes."""
+        """Draw the contact sheet to a file, after all frames were added; equal frames make equal bytes."""
         with _plain_matplotlib():
             content = self._sheet().png()
         atomic.write_bytes(path, content)
@@ -154,8 +155,7 @@ STYLE = {"font.size": 9, "axes.linewidth": 0.6, "agg.path.chunksize": 10_000}
 
 
 def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
-    """Choose the frames (k,) to show, in order: the strongest contacts, each at least 1 / (2 count) of the recording
-    apart.
+    """Return the frames (k,) to show, at most `count`, rising: the strongest contacts, each 1 / (2 count) of all apart.
     strength : (T,) any measure of contact, such as the rms change of the electrodes; NaN counts as none"""
     left = np.where(np.isfinite(strength), strength, -1.0)
     count = min(count, len(left))
@@ -169,7 +169,7 @@ def choose_frames(strength: np.ndarray, count: int = FRAMES) -> np.ndarray:
 
 @contextlib.contextmanager
 def _plain_matplotlib() -> Iterator[None]:
-    """Use matplotlib's settings of this package alone: a user's own must not change the bytes."""
+    """Use this package's settings of matplotlib in the block: a user's own must not change the bytes."""
     import matplotlib
 
     with matplotlib.rc_context(), python_warnings.catch_warnings():
@@ -181,8 +181,8 @@ def _plain_matplotlib() -> Iterator[None]:
 
 
 def _sentences(warnings: Sequence[str], confidence: np.ndarray) -> list[str]:
-    """Return warnings as lines that fit the sheet, no more than it has room for.
-    confidence : (k,) of the frames shown; a line of its own comes first where all of it is low"""
+    """Return warnings as lines of text, no more than the sheet has room for; one comes first if all confidence is low.
+    confidence : (k,) 0..1 of the frames shown"""
     lines = [line for text in warnings for line in textwrap.wrap(text, WARNING_WIDTH, subsequent_indent="   ")]
     if len(confidence) and np.nanmax(confidence, initial=0) < LOW_CONFIDENCE:
         lines.insert(0, "Low confidence in every frame shown: take this as a guess.")

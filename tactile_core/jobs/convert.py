@@ -1,5 +1,5 @@
-"""Convert a recording to a gel's pictures and deformations, with a note, in a folder of its own; and the reverse: from
-a gel's deformation to the BioTac's skin, its force, and its electrodes' counts."""
+"""Convert a recording to a gel's deformation and pictures, with a note, in a folder of its own; and in reverse, a gel's
+deformation to the BioTac's skin, force and electrode counts."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ REVERSED = {
 class Options:
     """Options of the conversion of a recording.
 
-    frames : slice of its frames; keep : out of latent, displacement, height, image, traction, marker_motion
-    prepare : options of the preparation; overwrite : replace an older result
+    frames : slice of its frames; keep : arrays to keep: latent, displacement, height, image, traction, marker_motion
+    prepare : options of the preparation; overwrite : true replaces an older result
     sensor : the unit's rest, gains and offsets, from `tactile adapt`; None for a typical unit"""
 
     frames: slice = dataclasses.field(default_factory=lambda: slice(None))
@@ -62,13 +62,14 @@ class Options:
 class ToolOptions:
     """Options of the networks, the gel and its pictures, for all recordings of a command.
 
-    weights : folder of networks, None for those that ship; source : the sensor they must translate, None for any
-    calibration : file of camera and lights, None for those that ship; preset, variant : as ``render.Options``
+    weights : folder of networks, None for those that ship; source : sensor that they must translate, None for any
+    calibration : file of camera and lights, None for those that ship
+    preset : name of the pictures' preset; variant : Mitsuba's, None for the faster
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
-    answer : options of the estimated contact, see ``Answer``
-    gel : "translated" by the networks, or "solved", the found contact on the target, as where no networks lead to it;
-        "ball:28" solves it under a ball of 28 mm, known to have touched
-    target : the gel; weights must translate to it unless it is solved"""
+    answer : options of the estimated contact
+    gel : "translated" by the networks, or "solved": the contact that they find is solved on the target, also if no
+        networks lead to it; "ball:28" solves it under a ball of 28 mm diameter, known to have touched
+    target : name of the gel; unless it is solved, the weights must translate to it"""
 
     weights: str | None = None
     calibration: str | None = None
@@ -81,7 +82,7 @@ class ToolOptions:
     object_reflectance: float | None = None
 
     def load_networks(self) -> tuple[Translator, str]:
-        """Return the networks, and ``gel``, but "solved" where they do not lead to the target."""
+        """Return the networks, and ``gel``, or "solved" if they do not lead to the target; or raise TactileError."""
         ball_radius(self.gel)  # a bad one is refused
         must_lead_to = None if self.gel != TRANSLATED or self.weights is None else self.target
         translator = load_translator(self.weights, self.answer, must_lead_to, self.source)
@@ -92,8 +93,8 @@ class ToolOptions:
 
 
 def load_tools(options: ToolOptions) -> Tools:
-    """Load the weights, and camera and lights of the gel. Raises TactileError for weights that are missing, changed or
-    of another shape, and as `load_drawer` does."""
+    """Return the networks, and camera and lights of the gel. Raises TactileError for weights that are missing, changed
+    or of another shape, and for a bad calibration or preset."""
     translator, gel = options.load_networks()
     unit = options.calibration, options.preset, options.variant, options.target
     drawer = load_drawer(*unit, translator.target, options.object_reflectance, gel)
@@ -102,8 +103,8 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : the result; warnings : sentences
-    remark : sentence on how far kept traction differs from the force; "" without kept traction"""
+    """A finished conversion. folder : of the result; warnings : sentences
+    remark : sentence on how far the sum of kept traction differs from the force; "" if none is kept"""
 
     folder: Path
     warnings: tuple[str, ...]
@@ -155,7 +156,7 @@ def _write_frames(
     folder: Path, made: FramePass, report: ConversionReport, rows: PreparedRows, frames: np.ndarray, options: Options,
     clock: Stopwatch, progress: Callable[[int, int], None] | None,
 ) -> None:  # fmt: skip
-    """Write ``frames.h5`` and the pictures, with progress (frames done, frames in all)."""
+    """Write ``frames.h5`` and pictures. frames : (T,) indices; progress : called with (frames done, in all), or None"""
     pictures, done = _Pictures(folder / results.IMAGES) if "image" in options.keep else None, 0
 
     def take(some: np.ndarray, arrays: dict[str, np.ndarray]) -> None:
@@ -178,7 +179,7 @@ def _write_frames(
 
 
 class _Pictures:
-    """Writer of PNG pictures; one that equals the one before, as without contact, is not compressed again."""
+    """Writer of PNG pictures; a picture equal to the last one, as without contact, is not compressed again."""
 
     def __init__(self, folder: Path) -> None:
         folder.mkdir()
@@ -193,14 +194,14 @@ class _Pictures:
 
 
 def check_order(recording: Recording, answer: Answer) -> None:
-    """Raise TactileError for tracking a contact through snapshots, which have no order."""
+    """Raise TactileError if a contact would be tracked through snapshots, which have no order."""
     if answer.follows and np.isnan(recording.time).all():
         found = "snapshots, which do not follow each other"
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
-    """Return a result's origin for JSON: only what the same input reproduces, so no paths and no time of day.
+    """Return the content of a result's note.json: what the same input reproduces, so no paths and no time of day.
     frames : (T,) int, indices of the converted frames in the recording"""
     recording = rows.recording
     return {
@@ -227,8 +228,8 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
 
 
 def weights_entry(translator: Translator) -> dict:
-    """Return sha256, of the weights' card, and, if it states them, kept_apart_rms_um, the error of the gel on contacts
-    not trained on, and baseline_rms_um, that of no deformation."""
+    """Return sha256, the hash of the weights' card, and, if stated there, rms errors of the gel in um:
+    kept_apart_rms_um on contacts not trained on, baseline_rms_um of no deformation."""
     from ..translation.card import chain_error
 
     found = chain_error(translator.card)
@@ -245,10 +246,11 @@ def reverse(
     *,
     overwrite: bool = False,
 ) -> None:
-    """Translate the gel of frames.h5, or of a simulated recording, back into a new HDF5 file: frame (T,), displacement
-    (T, N, 3) m of skin, force (T, 3) N, electrodes (T, e) counts. translator : leads to that gel; frames : slice of the
-    input's; overwrite : true replaces `out`; progress : called with (frames done, frames in all)
-    Raises TactileError for an input without that gel's displacement, and an output that exists or cannot be written."""
+    """Translate a gel's displacement, in frames.h5 or a simulated recording, back into a new HDF5 file: frame (T,), the
+    skin's displacement (T, N, 3) m, force (T, 3) N, electrodes (T, e) counts.
+    translator : networks that lead to that gel; frames : slice of the input's; overwrite : true replaces `out`
+    progress : called with (frames done, in all). Raises TactileError for an input without that gel's displacement, and
+    an output that exists or cannot be written."""
     if os.path.lexists(out) and not overwrite:
         raise TactileError(out, "exists", "a new file", "Add --overwrite, or another --out")
     held = read_displacement(path, translator.target)

@@ -1,4 +1,4 @@
-"""Draw translated gels: solve them if asked, then heights under the camera, pictures, and printed dots."""
+"""Draw translated gels: solve their contacts if asked, then map heights under the camera, pictures and printed dots."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ Solver = Callable[[dict[str, np.ndarray]], dict[str, np.ndarray]]
 class Drawer:
     """Camera and lights of a gel, ready to draw it; the same for every recording.
 
-    height_map : displacement (T, M, 3) m of the gel's M nodes -> heights (T, H, W) m under the camera
-    shade : heights (H, W) m, and the share (H, W) of light that dots leave, if any -> picture (H, W, 3) uint8
-    preset : name of that of ``shade``; camera : of the gel that is drawn; contacts outside its picture are flagged
-    solve : arrays by the names of frames.h5 -> the same with solved gels; None keeps the networks' gels
-    dots : on the gel that is drawn; None for no dots
-    target : the gel; found_on : the networks' gel, on which contacts are found before they are solved on another
+    height_map : function from displacement (T, M, 3) m of the gel's M nodes to heights (T, H, W) m under the camera
+    shade : function from heights (H, W) m, and the share (H, W) of light that dots leave, to a picture (H, W, 3) uint8
+    preset : name of the preset of ``shade``; camera : of the gel that is drawn; contacts beside its picture are flagged
+    solve : function from arrays by the names of frames.h5 to these with solved gels; None keeps the networks' gels
+    dots : those printed on the gel that is drawn; None for none
+    target : name of that gel; found_on : the networks' gel, on which contacts are found before they are solved
     object_reflectance : 0 black to 1 white, of what touches the gel"""
 
     height_map: Callable[[np.ndarray], np.ndarray]
@@ -44,11 +44,11 @@ class Drawer:
     object_reflectance: float = 0.0
 
     def gel(self, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return arrays, name -> (T, ...) as in frames.h5, with the gel that is drawn: the networks' or the solved."""
+        """Return arrays, name -> (T, ...) as in frames.h5, with the displacement of the gel that is drawn."""
         return arrays if self.solve is None else self.solve(arrays)
 
     def draw(self, height: np.ndarray, displacement: np.ndarray) -> np.ndarray:
-        """Draw the picture (H, W, 3) uint8 of height (H, W) m and of the dots on a gel with displacement (M, 3) m."""
+        """Return the picture (H, W, 3) uint8 of height (H, W) m, with the dots as displacement (M, 3) m moves them."""
         return self.shade(height) if self.dots is None else self.shade(height, self.dots.marks(displacement))
 
     def warm_up(self) -> None:
@@ -57,7 +57,7 @@ class Drawer:
         self.draw(self.height_map(still)[0], still[0])
 
     def needed_dots(self) -> MarkerField:
-        """Return the unit's dots; raises TactileError where it has none."""
+        """Return the gel's dots. Raises TactileError if it has none."""
         if self.dots is None:
             found = "asked of a unit without dots"
             advice = "Give a --calibration with a [markers] table (docs/optics.md)"
@@ -65,12 +65,12 @@ class Drawer:
         return self.dots
 
     def describe_gel(self) -> tuple[str, ...]:
-        """Return a sentence where contacts are solved on another gel than the networks', else nothing."""
+        """Return a tuple of a sentence if contacts are solved on another gel than the networks', else ()."""
         return describe_gel(self.target, self.found_on)
 
 
 def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
-    """Return a sentence where contacts found_on one gel are solved on another, the target, else nothing."""
+    """Return a tuple of a sentence if contacts found_on one gel are solved on another, the target, else ()."""
     if target == found_on:
         return ()
     return (
@@ -87,12 +87,13 @@ def load_drawer(
     object_reflectance: float | None = None,
     gel: str = TRANSLATED,
 ) -> Drawer:
-    """Load camera and lights of a gel: the unit's that ships, or a file's.
+    """Return a gel's camera and lights: those of the unit that ships, or of a calibration file.
 
-    preset, variant : as ``render.Options``; target, found_on : of `Drawer`; gel : as of ``convert.ToolOptions``
-    object_reflectance : of what touches the gel; None for the calibration's
+    preset : name of the pictures' preset; variant : Mitsuba's, None for the faster; target, found_on : see `Drawer`
+    object_reflectance : 0 to 1, of what touches the gel; None for the calibration's; gel : see ``convert.ToolOptions``
     The fast renderer is made when the first picture is drawn: it takes 140 MB, which reading a long recording may need.
-    Raises TactileError for a bad calibration, and as ``renderer.Renderer`` does."""
+    Raises TactileError for a bad calibration, preset or variant, ModuleNotFoundError without Mitsuba if it is
+    needed."""
     from ..pictures import background, height_map, renderer
     from ..sensors.calibration_file import load_calibration
 

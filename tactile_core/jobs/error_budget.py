@@ -1,4 +1,4 @@
-"""Bound on the error that the toolkit itself adds, as ``--error`` takes it."""
+"""Bound on the error that the toolkit itself adds, as the option ``--error`` states it."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ EXPECTED = "a number and its unit, such as 5um or 0.6levels, or both: 5um,0.6lev
 
 @dataclasses.dataclass(frozen=True)
 class Budget:
-    """Largest acceptable error: um rms of a surface, grey levels rms of a picture; None without a bound."""
+    """Largest acceptable error, None without a bound. um : rms of a surface; levels : rms grey levels of a picture"""
 
     um: float | None = None
     levels: float | None = None
 
     def __str__(self) -> str:
-        """Format the bounds as `parse_budget` reads them."""
+        """Return the bounds as text that `parse_budget` reads."""
         given = {"um": self.um, "levels": self.levels}
         return ",".join(f"{value:g}{unit}" for unit, value in given.items() if value is not None)
 
     def only(self, unit: str, advice: str) -> float:
-        """Return the bound in ``unit``, um or levels. TactileError, with advice, for a bound stated in the other."""
+        """Return the bound in ``unit``, "um" or "levels". Raises TactileError, with advice, for one in the other."""
         other = "levels" if unit == "um" else "um"
         if getattr(self, other) is not None:
             raise TactileError("--error", f"{getattr(self, other):g}{other}", f"a bound in {unit}", advice)
@@ -32,7 +32,7 @@ class Budget:
 
 
 def parse_budget(text: str) -> Budget:
-    """Parse ``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for anything else."""
+    """Return the bounds in ``"5um"``, ``"0.6levels"`` or ``"5um,0.6levels"``. Raises TactileError for other texts."""
     found: dict[str, float] = {}
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d*\.?\d+(?:e[+-]?\d+)?)\s*(um|µm|μm|levels?)\s*", part, re.IGNORECASE)

@@ -1,4 +1,4 @@
-"""A data set from beginning to end: units, a job of translations each, then layouts, card and page."""
+"""Build a data set: find its units, translate the recordings of each as a job, then write layouts, card and page."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ Bar = Callable[[str, str], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclass(frozen=True)
 class Asked:
-    """Options of a data set; layouts : names of ``export.layouts``; place : job's folder -> executor of its tasks
-    say : callback for sentences; bar : (name, what it counts) -> context of a callback (done, in all); target : the gel
+    """Options of a data set. layouts : names of ``export.layouts``; place : function from a job's folder to an executor
+    say : called with sentences; bar : (name, what it counts) -> context of a callback (done, in all); target : the gel
     preset : of the pictures, None for fast ones; calibration, weights : file and folder, None for those that ship"""
 
     layouts: Sequence[str]
@@ -58,9 +58,9 @@ class Asked:
 
 
 def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> dict[str, str]:
-    """Make the data set `out` of the recordings in a folder; what is there already is kept. Returns what was set aside,
-    a recording, file or unit -> the reason. named : the recipe, as the user named it. Raises TactileError for another
-    set's folder, for files of others in `out`, where no recording can be translated, and where a disk refuses."""
+    """Make the data set `out` of the recordings in a folder; what is there already is kept. Return what was left out:
+    recording, file or unit -> reason. named : the recipe's name or file. Raises TactileError for the folder of another
+    set, for files of others in `out`, if no recording can be translated, and if the disk refuses."""
     found = collect(recipe, folder, out)
     _check_out(out)
     for line in _counted(recipe, found):
@@ -96,7 +96,7 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
 
 
 def _check_out(out: Path) -> None:
-    """Raise TactileError where the result cannot be written, or would replace a folder that is no data set of ours."""
+    """Raise TactileError if `out` cannot be written, or holds what is no data set of this program."""
     with atomic.writing(out):
         atomic.probe(out)
     if not (out / REPORT).exists() and not (out / JOBS).is_dir():
@@ -106,8 +106,8 @@ def _check_out(out: Path) -> None:
 
 
 def _counted(recipe: Recipe, found: Collected) -> list[str]:
-    """Return sentences on the sizes of train and test, with a warning where nothing is held out, and of labels that
-    differ in case alone."""
+    """Return sentences on the numbers of files to train and test with, and warnings that none is held out for testing,
+    or that labels differ in case alone."""
     splits = Counter(file.split for file in found.files)
     units = len(found.units())
     lines = [f"{len(found.files)} files of {units} units or hands: {splits[TRAIN]} train, {splits[TEST]} test"]
@@ -126,7 +126,8 @@ def _counted(recipe: Recipe, found: Collected) -> list[str]:
 def _translated(
     recipe: Recipe, unit: str, files: list[File], sensor: SensorFile | None, out: Path, asked: Asked
 ) -> Finished:
-    """Translate a unit's recordings as a job, or resume it."""
+    """Translate the recordings of a unit as a job, or resume that job; return the finished job. Raises TactileError for
+    another job there."""
     paths = [file.path for file in files]
     place = out / JOBS / (file_name(unit) or ALL)
     with runs.opened(place, None):
@@ -153,8 +154,8 @@ def _translated(
 def _joined(
     recipe: Recipe, parts: list[tuple[str, list[File], Finished]], aside: dict[str, str], out: Path
 ) -> Finished:
-    """Join the jobs of all units as one, labelled; train comes before test.
-    parts : unit, its files and its job; aside : recording -> why it was set aside, is added to"""
+    """Return the jobs of all units joined as one, with labels, recordings to train with first.
+    parts : (unit, its files, its job); aside : recording -> why it is left out, is extended"""
     recordings: list[Recorded] = []
     warnings: dict[str, list[str]] = {}
     content = hashlib.sha256()
@@ -185,13 +186,14 @@ def _joined(
 
 
 def _labels(path: str, file: File) -> dict[str, str]:
-    """Return a recording's labels, from its file's name, and the finger of a hand."""
+    """Return the labels of a recording, name -> text: those in its file's name, and the finger of a hand."""
     section = chosen(path).section
     return file.labels | ({} if section == "unit" else {"finger": section})
 
 
 def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
-    """Return texts (T,) by name: force, N, beside a recording; columns of its file. path : the file, and the finger."""
+    """Return labels by frame, name -> (T,) texts: the force, N, in a file beside the recording, and columns of its own
+    file, as the recipe names them. path : of the recording, with its finger"""
     found: dict[str, np.ndarray] = {}
     measured = beside(file.path.parent, recipe.force, file) if recipe.force else None
     if measured is not None and measured.is_file():
@@ -207,7 +209,7 @@ def _measured(recipe: Recipe, path: str, file: File) -> dict[str, np.ndarray]:
 
 
 def _export(source: Finished, layout: str, out: Path, asked: Asked) -> None:
-    """Write a layout, unless `out` holds it, made from this job; it replaces only a folder of this layout."""
+    """Write a layout to `out`, unless it is there, made from this job. Only a folder of the same layout is replaced."""
     try:
         held = json.loads(read_small(out / export.NOTE))
         if held["job"] == source.id:
@@ -223,8 +225,8 @@ def _write_words(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[summary.Summary], out: Path,
     asked: Asked,
 ) -> None:  # fmt: skip
-    """Write the card, the page and their numbers; what survives of the labels where scikit-learn is installed.
-    named : the recipe, as the user named it"""
+    """Write card, page and report; how much of the labels survives is measured if scikit-learn is installed.
+    named : the recipe's name or file, as the user gave it"""
     rows: list[survival.Row] | None = None
     if survival.installed():
         with asked.bar("what survives", "step") as shown:

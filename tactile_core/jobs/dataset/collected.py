@@ -18,8 +18,8 @@ HELD_OUT = 5  # one value in so many is for testing where the recipe names none 
 
 @dataclass(frozen=True)
 class File:
-    """File of a data set. labels : name -> value, from the file's name; unit : value of the label that tells units
-    apart, "" where the recipe names none; split : train or test"""
+    """Recording file of a data set. labels : name -> value, from the file's name; split : "train" or "test"
+    unit : value of the label that tells units apart, "" if the recipe names none"""
 
     path: Path
     unit: str
@@ -29,7 +29,7 @@ class File:
 
 @dataclass(frozen=True)
 class Collected:
-    """Files of a data set, sorted by path; others : number that fit no pattern; unfit : path -> why it is left out"""
+    """Files of a data set, sorted by path. others : number that fits no pattern; unfit : path -> why it is left out"""
 
     files: tuple[File, ...]
     others: int
@@ -44,7 +44,7 @@ class Collected:
 
 
 def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
-    """Find a recipe's files in a folder, without linked or hidden folders and `out`. TactileError where none fits."""
+    """Return a recipe's files in a folder, without linked or hidden folders and `out`. Raises TactileError for none."""
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "the folder of the data set")
     patterns = [_compiled(pattern) for pattern in recipe.files]
@@ -76,7 +76,7 @@ def collect(recipe: Recipe, folder: Path, out: Path) -> Collected:
 
 
 def _names(folder: Path) -> list[str]:
-    """Names of all files below a folder, relative to it, sorted; hidden ones are left out."""
+    """Return the paths of all files below a folder, relative to it, sorted, without hidden ones."""
     found = []
     for place, folders, names in os.walk(folder, onerror=inputs.passed_over):
         folders[:] = [name for name in folders if not name.startswith(".")]
@@ -85,7 +85,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:
-    """Compile a pattern of paths, at any depth; a label does not cross a folder."""
+    """Return a recipe's pattern of paths, at any depth of folders, as a regular expression; a {label} matches no /."""
     parts = FIELD.split(pattern)
     text, held = re.escape(parts[0]), set()
     for field, after in zip(parts[1::2], parts[2::2], strict=True):
@@ -95,7 +95,7 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
 
 def _split(recipe: Recipe, labels: dict[str, str]) -> str:
-    """Return the part of a recording with labels; without values named for testing, by a hash of the label's value."""
+    """Return "train" or "test" for a recording's labels, as the recipe says, or by a hash of the label's value."""
     if recipe.split.by not in labels:
         return TRAIN
     value = labels[recipe.split.by]
@@ -105,8 +105,8 @@ def _split(recipe: Recipe, labels: dict[str, str]) -> str:
 
 
 def beside(folder: Path, name: str, file: File) -> Path:
-    """Return the path of a file, existing or not. name : its path from the recording `file`'s folder, with {label}
-    Raises TactileError for one outside the data set's folder, and for a label that the recording lacks."""
+    """Return the path of a file, existing or not. name : its path from the folder of the recording `file`, with {label}
+    Raises TactileError if it is outside the data set's folder, and for a label that the recording lacks."""
     path = file.path.parent / filled(name, file.labels)
     if not path.resolve().is_relative_to(folder.resolve()):
         raise TactileError(path, "outside the data set's folder", "a file inside it")

@@ -1,4 +1,4 @@
-"""The card of a data set (sources, estimates, how much of each label survives, licence), and its page."""
+"""Write the card of a data set (sources, estimates, how much of each label survives, licence), and its page."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def card_of(
     recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[Summary], rows: list[Row] | None,
     layouts: Sequence[str],
 ) -> str:  # fmt: skip
-    """Return the card as Markdown. named : the recipe, as the user named it; found : files of the folder
+    """Return the card as Markdown. named : the recipe's name or file; found : files in the folder
     source : all translated recordings; rows : accuracies of classifiers, None without scikit-learn
-    layouts : names of the exported ones"""
+    layouts : names of the exported layouts"""
     of = recipe.source
     sections = {
         f"# {_plain(of.title)}: as a DIGIT would have seen it": _notes(recipe, summaries, rows or []),
@@ -65,7 +65,7 @@ def card_of(
 
 
 def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterable[str]:
-    """Yield the first lines of the card: what a user must know before all else."""
+    """Return the card's first lines, as quotes: what a user must know before all else."""
     notes = [_plain(note) for note in recipe.notes]
     guesses = _mean(summaries, lambda one: one.guesses, touched=True)
     if guesses > GUESSED:
@@ -76,13 +76,13 @@ def _notes(recipe: Recipe, summaries: list[Summary], rows: list[Row]) -> Iterabl
 
 
 def _plain(text: str) -> str:
-    """Return a text from outside as one line that Markdown does not interpret."""
+    """Return a text from a recipe or file as one line that Markdown does not interpret."""
     return " ".join(text.split()).replace("<", "&lt;").replace("|", "/").replace("`", "'")
 
 
 def _verdict(task: str, by: dict[str, Row]) -> str:
-    """Describe how much of the label `task` survives: no more than chance, less than in the electrodes, or all of it.
-    by : kind of features -> its row"""
+    """Return a sentence on how much of the label `task` survives: none, less than in the electrodes, or as much.
+    by : kind of features -> accuracy"""
     nulls = (RAW, survival.RANDOM, survival.ALWAYS)
     best = max((row for name, row in by.items() if name not in nulls), key=lambda row: row.right)
     source = max(by[RAW], by[survival.RANDOM], key=lambda row: row.right)
@@ -130,7 +130,7 @@ def _labels(summaries: list[Summary]) -> Iterable[str]:
 
 
 def _span(counts: Counter[str]) -> str:
-    """Describe the range of a label whose values are all numbers, from counts, value -> recordings; "" for others."""
+    """Return the range of a label whose values are numbers, in words; "" if not all are. counts : value -> frames"""
     try:
         numbers = [float(text) for text in counts if text != "(none)"]
     except ValueError:
@@ -153,7 +153,7 @@ def _trust(summaries: list[Summary]) -> Iterable[str]:
 
 
 def _warnings(source: Finished) -> Iterable[str]:
-    """Yield one warning of each kind, the commonest first; kinds ignore numbers and file names."""
+    """Yield a line for each kind of warning, the commonest first; kinds ignore numbers and file names."""
     kinds: dict[str, list[str]] = {}
     for texts in source.warnings.values():
         for text in texts:
@@ -181,13 +181,13 @@ def _survives(recipe: Recipe, rows: list[Row] | None) -> Iterable[str]:
 
 
 def _mean(summaries: list[Summary], value: Callable[[Summary], float], *, touched: bool = False) -> float:
-    """Return the mean of a share, value(summary), over all frames, or over those touched."""
+    """Return the mean of value(summary), a share, over all frames, or over frames in contact if `touched` is true."""
     weights = [one.recording.frames * (one.touched if touched else 1.0) for one in summaries]
     return float(np.average([value(one) for one in summaries], weights=weights)) if sum(weights) else 0.0
 
 
 def page_of(recipe: Recipe, summaries: list[Summary], progress: Callable[[int, int], None]) -> str:
-    """Return the page: every recording of summaries as a strip of pictures, in one self-contained HTML file.
+    """Return the page, a self-contained HTML file with a strip of pictures for each recording.
     progress : called with (recordings done, in all)"""
     choices: dict[str, set[str]] = {}
     articles = []
@@ -216,7 +216,7 @@ def _flags(one: Summary) -> list[str]:
 
 
 def _article(one: Summary) -> str:
-    """Write a recording: labels, numbers, and pictures evenly through it."""
+    """Return a recording's part of the page: labels, numbers, and pictures spread evenly over its frames."""
     of = one.recording
     shares = f"{of.split}; {of.frames} frames, {one.touched:.0%} in contact, {one.guesses:.0%} guesses"
     labels = ", ".join(f"{name} {text}" for name, text in one.labels.items() if text)

@@ -1,5 +1,5 @@
-"""Recipe of a data set, a TOML file: which files of a folder are recordings, of which units, with which labels; read,
-or guessed from the names of one's own files, with advice on what to fill in."""
+"""Read the recipe of a data set, a TOML file: which files of a folder are recordings, of which units, with which
+labels; or guess one from the names of a user's files, with advice on what to fill in."""
 
 from __future__ import annotations
 
@@ -70,12 +70,12 @@ by = ""  # label whose values stay together in train or test
 
 
 class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Calibration of the units.
+    """How the units of a data set are calibrated.
 
-    by : label whose values are units; "" where all recordings are of one unit, or of one hand
+    by : name of the label whose values are units; "" if all recordings are of one unit, or one hand
     found : "adapt" estimates rest, gains and film from all recordings of the unit; "rest" reads its rest from the file
         `rest`; "none" treats each recording by itself
-    rest : file of the untouched finger, in which {label} stands for the label's value"""
+    rest : path of a recording of the untouched finger, in which {label} stands for the label's value"""
 
     by: str = ""
     found: Literal["adapt", "rest", "none"] = "none"
@@ -84,8 +84,8 @@ class Unit(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Division into train and test, by a label whose values stay together.
-    by : that label; "" puts all into train; test : its values that are held out, empty for one value in five
-    apart : label of frames by which the card's classifiers hold out, `by` if empty"""
+    by : name of that label, "" if all are for training; test : its values held out, empty for one value in five
+    apart : label of frames whose values the card's classifiers hold out together, `by` if empty"""
 
     by: str = ""
     test: list[str] = []
@@ -93,12 +93,12 @@ class Split(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @property
     def kept(self) -> str:
-        """Return the label whose values are held out together when survival is measured; "" for none."""
+        """Return the name of the label whose values the card's classifiers hold out together; "" for none."""
         return self.apart or self.by
 
 
 class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Origin of the data, in words for the card; licence : as stated, and where."""
+    """Origin of the data, in words for the card. licence : as stated, and where"""
 
     title: str
     url: str = ""
@@ -109,12 +109,12 @@ class Source(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """Recipe of a data set.
 
-    files : patterns of paths below the folder, at any depth; {label} stands for any text, which becomes the label. The
-        first pattern that fits a file counts
-    format : "tactile-dataset-1"; sensor : that made the recordings, biotac or biotac_sp
-    tasks : labels to learn; values : columns of numbers of the recordings' files, which become labels too
-    force : file of newtons beside a recording, with {label} in its name, used where it exists; "" for none
-    every : translate one frame in ``every``; snapshots : true where frames do not follow each other in time
+    files : patterns of paths below the folder, at any depth, of which the first that fits counts; {label} in one stands
+        for any text, which becomes the label's value
+    format : "tactile-dataset-1"; sensor : name of the recorded sensor, "biotac" or "biotac_sp"
+    tasks : names of labels to learn; values : names of columns of numbers in the files, which become labels, too
+    force : path of a file of newtons beside a recording, with {label}, used if it exists; "" for none
+    every : translate one frame in ``every``; snapshots : true if frames do not follow each other in time
     notes : first lines of the card"""
 
     format: str
@@ -133,12 +133,12 @@ class Recipe(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def known() -> dict[str, Path]:
-    """Return the files of the recipes that ship, by the recipes' names."""
+    """Return the recipes that ship, name -> file."""
     return {file.stem: file for file in sorted(shipped(SHIPPED).glob("*.toml"))}
 
 
 def read(named: str) -> Recipe:
-    """Read a recipe, named as one that ships or a TOML file's path. Raises TactileError naming file and field."""
+    """Return a recipe, by the name of one that ships or a TOML file's path. Raises TactileError with file and field."""
     file = known().get(named, Path(named))
     try:
         found = msgspec.toml.decode(read_toml_text(file), type=Recipe)
@@ -183,7 +183,7 @@ def _check(recipe: Recipe, file: Path) -> None:
 
 
 def filled(name: str, labels: dict[str, str]) -> str:
-    """Put labels into a file's name. Raises TactileError for a label that the recording lacks."""
+    """Return a file's name with its {label}s replaced by values. Raises TactileError for a label that is not given."""
     for label in FIELD.findall(name):
         if label not in labels:
             raise TactileError(name, f"{{{label}}}, which is no label", ", ".join(labels) or "no label", ADVICE)
@@ -191,7 +191,7 @@ def filled(name: str, labels: dict[str, str]) -> str:
 
 
 def write(out: Path, folder: Path) -> None:
-    """Write a recipe for the recordings in a folder to the new file `out`. TactileError for a folder without any."""
+    """Write a guessed recipe for the recordings in a folder to the new file `out`. Raises TactileError for none."""
     atomic.claim(out)
     if not folder.is_dir():
         raise TactileError(folder, "no folder", "a folder of recordings")
@@ -207,7 +207,7 @@ def write(out: Path, folder: Path) -> None:
 
 
 def _patterns(paths: list[str]) -> list[str]:
-    """Guess patterns of paths, the commonest first: in names of the same shape, the parts that differ become labels."""
+    """Return guessed patterns of paths, the commonest first: in names of one shape, parts that differ are labels."""
     alike: dict[tuple[str, ...], list[list[str]]] = {}
     for path in paths:
         stem, ending = os.path.splitext(path)
@@ -218,7 +218,7 @@ def _patterns(paths: list[str]) -> list[str]:
 
 
 def _pattern(names: list[list[str]]) -> str:
-    """Return the pattern of names that are cut into equally many parts."""
+    """Return the pattern of names cut into equally many parts: those that differ become {label1}, {label2} ..."""
     fields = (f"{{label{number}}}" for number in itertools.count(1))
     columns = list(zip(*names, strict=True))
     varied = [column for column in columns if len(set(column)) > 1]

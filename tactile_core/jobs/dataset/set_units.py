@@ -1,4 +1,4 @@
-"""Find a data set's readable files, and calibrate its units from them."""
+"""Find a data set's readable files, and calibrate its units by them."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ UNFIT = re.compile(r"[^A-Za-z0-9_-]")  # of a unit's name in that of its files
 
 
 def file_name(unit: str) -> str:
-    """Return the stem of a unit's files: its name if plain, else made so, with a hash that keeps names apart."""
+    """Return the name of a unit's files without ending: the unit's name if plain, else made so, with a hash."""
     plain = UNFIT.sub("_", unit)[:60]
     return plain if plain == unit else f"{plain}-{hashlib.sha256(unit.encode()).hexdigest()[:8]}"
 
 
 def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, str]]:
-    """Return readable files of the set's sensor, and path -> why others are not; read whole if the unit is adapted."""
+    """Return readable files of the recipe's sensor, and path -> why others are not; read whole if units are adapted."""
     good, aside = [], {}
     for file in files:
         path = str(file.path)
@@ -54,10 +54,10 @@ def readable(recipe: Recipe, files: list[File]) -> tuple[list[File], dict[str, s
 def calibrated(
     recipe: Recipe, files: list[File], folder: Path, out: Path, weights: str | None, say: Callable[[str], None]
 ) -> SensorFile | None:
-    """Return the unit's calibration, found as the recipe says; None where each recording is treated by itself.
-    folder : of the data set; weights : folder of networks, None for those that ship; say : called with sentences
+    """Return a unit's calibration, found as the recipe says; None if each recording is treated by itself.
+    folder : the data set's; weights : folder of networks, None for those that ship; say : called with sentences
     out : file that keeps the calibration, reused for the same recordings, rest, weights and recipe
-    Raises TactileError for a rest that is missing or differs between files, and where nothing is found."""
+    Raises TactileError for a rest that is missing or differs between files, and if none is found."""
     how = recipe.unit
     if how.found == "none":
         return None
@@ -87,7 +87,7 @@ def calibrated(
 
 
 def _rest(recipe: Recipe, files: list[File], folder: Path) -> Path | None:
-    """Return the file of the untouched finger; None where the recipe names none."""
+    """Return the recording of the untouched finger, None if the recipe names none; TactileError if it is missing."""
     if not recipe.unit.rest:
         return None
     found = sorted({beside(folder, recipe.unit.rest, file) for file in files})

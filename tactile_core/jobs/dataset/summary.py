@@ -1,4 +1,4 @@
-"""Summary of each recording of a data set: shares, typical values, and the features that classifiers of labels read."""
+"""Summarise each recording of a data set: shares, typical values, and the features that classifiers of labels read."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ ARRAYS = {RAW: ("electrodes",), NUMBERS: ("force", "contact_center", "pressure")
 class Summary:
     """Summary of a recording.
 
-    touched : share of its frames in contact; guesses : share of those that have low confidence
-    flagged : flag -> share of all frames, without flags that no frame bears
+    touched : share of its frames in contact; guesses : share of those with low confidence
+    flagged : flag -> share of all frames, without flags that no frame has
     explained, confidence, force : medians over frames in contact, force in N; NaN without contact
-    labels : label -> its text, "" where it changes within the recording
-    features : kind (electrodes, estimates, gel's code, picture) -> (n, k) of n examples: the recording, by its changes
-        since its first 0.1 s, or each snapshot; told : task -> (n,) labels of the examples"""
+    labels : name -> text, "" if it changes within the recording
+    features : kind (electrodes; force, place, pressure; code of the gel; picture) -> (n, k) of n examples: the whole
+        recording, by changes since its first 0.1 s, or each snapshot; told : task -> (n,) the examples' labels"""
 
     recording: Recorded
     touched: float
@@ -43,7 +43,7 @@ class Summary:
     told: dict[str, np.ndarray] = field(default_factory=dict)
 
     def numbers(self) -> dict[str, Any]:
-        """Return the recording's name, part and frames, labels and shares, by name for a report; None if unknown."""
+        """Return the recording's name, part, number of frames, labels and shares, for a report; None if unknown."""
         known = {"touched": self.touched, "guesses": self.guesses, "explained": self.explained,
                  "confidence": self.confidence, "force_n": self.force}  # fmt: skip
         rounded = {name: round(value, 4) if np.isfinite(value) else None for name, value in known.items()}
@@ -52,7 +52,7 @@ class Summary:
 
 
 def summarise(source: Finished, tasks: Sequence[str], progress: Callable[[int, int], None]) -> list[Summary]:
-    """Summarise all recordings; tasks : labels to learn; progress : called with (recordings done, in all)"""
+    """Return a summary of each recording. tasks : labels to learn; progress : called with (recordings done, in all)"""
     found = []
     for number, one in enumerate(source.recordings, start=1):
         found.append(_summary(one, tasks))
@@ -92,7 +92,7 @@ def _summary(one: Recorded, tasks: Sequence[str]) -> Summary:
 
 
 def _changes(values: np.ndarray, first: int) -> np.ndarray:
-    """Return the means (PARTS k,) of parts of a recording's values (T, k), each less that of its `first` frames."""
+    """Return the means (PARTS k,) of `PARTS` parts of values (T, k), each less that of the `first` frames."""
     parts = [part for part in np.array_split(values, PARTS) if len(part)]
     means = [parts[min(number, len(parts) - 1)].mean(axis=0) for number in range(PARTS)]
     return np.concatenate([mean - values[:first].mean(axis=0) for mean in means])

@@ -1,4 +1,4 @@
-"""How much of a label survives the translation: the best support vector machine on signals, numbers and pictures."""
+"""Measure how much of a label survives the translation: accuracy of support vector machines on signals and pictures."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ MOST, FEWEST = 1000, 12  # examples of a task; with fewer nothing is shown (assu
 
 @dataclass(frozen=True)
 class Row:
-    """Accuracy of a classifier. task : label it predicts; by : features or baseline; examples, classes : their numbers
-    right : share of examples predicted right, 0..1; error : its standard error"""
+    """Accuracy of a classifier. task : name of the label that it predicts; by : features, or baseline
+    right : share of examples predicted right, 0..1; error : its standard error; examples, classes : their numbers"""
 
     task: str
     by: str
@@ -44,10 +44,10 @@ def installed() -> bool:
 
 
 def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[int, int], None]) -> list[Row]:
-    """Score how well each kind of features, ten random maps of the electrodes, and the commonest label tell `task`.
-    apart : label whose values are groups, held out whole; "" holds out single recordings (of snapshots, tenths of each)
-    progress : called with (classifiers made, in all)
-    Needs scikit-learn. Returns no row where the label has one value, one group or too few examples."""
+    """Return how well the label `task` is predicted from each kind of features, from the best of ten random maps of the
+    electrodes, and by its commonest value; [] for one value, one group or too few examples. Needs scikit-learn.
+    apart : label whose values are held out together; "" holds out single recordings (of snapshots, tenths of each)
+    progress : called with (classifiers made, in all)"""
     told = [(one, one.told[task]) for one in summaries if task in one.told]
     labels = np.concatenate([texts for _, texts in told]) if told else np.array([])
     groups = np.concatenate([_groups(one, len(texts), apart) for one, texts in told]) if told else labels
@@ -71,7 +71,7 @@ def rows(task: str, summaries: list[Summary], apart: str, progress: Callable[[in
 
 
 def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
-    """Name each example's group (count,), held out whole: its label `apart`, else its recording or a tenth of it."""
+    """Return each example's group (count,), held out together: its label `apart`, its recording, or a tenth of it."""
     if apart in one.told:
         return one.told[apart]
     name = one.recording.name
@@ -80,8 +80,8 @@ def _groups(one: Summary, count: int, apart: str) -> np.ndarray:
 
 
 def _right(values: np.ndarray, labels: np.ndarray, groups: np.ndarray) -> float:
-    """Return the accuracy of a support vector machine, its width and penalty chosen within the training examples.
-    values : (n, k) features; labels : (n,) to be told from them; groups : (n,) held out together"""
+    """Return a support vector machine's accuracy, 0..1, its width and penalty chosen within the training examples.
+    values : (n, k) features; labels : (n,) to predict; groups : (n,) names of groups that are held out together"""
     from sklearn.model_selection import GridSearchCV, GroupKFold
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler

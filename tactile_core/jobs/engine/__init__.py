@@ -1,8 +1,8 @@
-"""Process many recordings in many processes and machines: a job folder whose files are its only state.
+"""Process many recordings in many processes and machines; the files of a job's folder are its only state.
 
 <job>/job.json                    what to make: inputs and their hashes, weights, options
-<job>/prepared/<recording>.h5     signals of one recording, ready for the networks; see ``prepared_signals``
-<job>/shards/<recording>-%06d.h5  translated frames, numbered within their recording; see ``translate_shards``
+<job>/prepared/<recording>.h5     signals of one recording, ready for the networks (``prepared_signals``)
+<job>/shards/<recording>-%06d.h5  translated frames, numbered within their recording (``translate_shards``)
 <job>/aside/<task>.json           a task that failed, and why; the next run tries it again
 <job>/manifest.json               all shards and their hashes, once the job is done
 

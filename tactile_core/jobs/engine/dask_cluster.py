@@ -1,4 +1,4 @@
-"""Dask workers on any machines that see the same job folder under the same path.
+"""Run a job's tasks by Dask workers, on any machines that see the job's folder under the same path.
 
 Dask's messages are pickles, which run code: a scheduler on ``tcp://`` obeys whoever reaches it. So a scheduler started
 here for a queue speaks TLS, with keys made for this run alone; ``tcp://`` to other machines must be asked for.
@@ -32,7 +32,8 @@ CONFIGURED = "distributed.comm.timeouts.connect"  # Dask's own setting of how lo
 
 
 class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A TOML file that starts a cluster. jobs : number to ask it for; options : keywords of dask_jobqueue's cluster"""
+    """Content of a TOML file that starts a cluster. jobs : number of jobs to submit to the queue
+    options : keyword arguments of dask_jobqueue's class for that queue"""
 
     queue: Literal["slurm", "pbs", "sge", "lsf", "htcondor"]
     jobs: int
@@ -40,13 +41,14 @@ class QueueFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Cluster:
-    """A Dask scheduler's workers; address : its own, or a `QueueFile`'s; say : called when tasks wait for a worker"""
+    """Executor of tasks by the workers of a Dask scheduler; a context manager."""
 
     def __init__(
         self, folder: Path, address: str, say: Callable[[str], None] = lambda text: None, insecure: bool = False
     ) -> None:
-        """Store the address for a job's folder: see the class. Raises TactileError for a bad address or file, and for
-        other machines without TLS unless `insecure`."""
+        """Store what to connect to. folder : the job's; address : the scheduler's, or path of a `QueueFile`
+        say : called with sentences, such as that no worker has come. Raises TactileError for a bad address or file, and
+        for other machines without TLS unless `insecure` is true."""
         self._say, self._insecure = say, insecure
         if address.startswith(("tcp://", "ucx://")) and not _here(address):
             self._without_tls(address)
@@ -71,7 +73,7 @@ class Cluster:
             yield self._tasks.pop(future.key)[0], self._reply(future)
 
     def _next(self) -> Any:
-        """Return the next future that is done."""
+        """Return the next finished future; if no worker comes, say so."""
         patience = PATIENCE
         while True:
             try:
@@ -97,7 +99,7 @@ class Cluster:
 
     @contextmanager
     def _answering(self) -> Iterator[None]:
-        """Turn the library's many errors after the loss of its scheduler into a TactileError."""
+        """Raise Dask's many errors after the loss of its scheduler, in the block, as a TactileError."""
         try:
             yield
         except Exception as error:
@@ -112,8 +114,7 @@ class Cluster:
         return self
 
     def _started(self, stack: ExitStack) -> Any:
-        """Return the context manager of a queue's cluster, with TLS keys of this run in the job's folder until its
-        end."""
+        """Return the context manager of a queue's cluster; TLS keys of this run lie in the job's folder meanwhile."""
         options = {"worker_extra_args": ["--no-dashboard"], **self._queue.options}
         options["scheduler_options"] = {"dashboard_address": "127.0.0.1:0", **options.get("scheduler_options", {})}
         if self._insecure:
@@ -124,14 +125,14 @@ class Cluster:
         return _closing(_start(self._queue, options))
 
     def _without_tls(self, where: str) -> None:
-        """Warn of a scheduler without TLS. Raises TactileError unless that was accepted."""
+        """Warn that a scheduler, at `where`, has no TLS. Raises TactileError unless that was accepted."""
         found = "no TLS: Dask's messages run code, and whoever reaches the scheduler or listens can send them"
         if not self._insecure:
             raise TactileError(where, found, "tls://", "In a network that is yours alone, add --insecure")
         self._say(f"warning: {where}: {found}")
 
     def _connected(self, place: Any) -> Any:
-        """Return a client of the scheduler at place, an address. Raises TactileError where none answers."""
+        """Return a client of the scheduler at `place`, an address or cluster. Raises TactileError if none answers."""
         from distributed import Client, Security
 
         for name in ("distributed", "distributed.client"):  # what its logs tell of a lost scheduler, a sentence tells
@@ -161,7 +162,7 @@ def _read(address: str) -> QueueFile:
 
 @contextmanager
 def _closing(cluster: Any) -> Iterator[Any]:
-    """Close the cluster at the end. Its library asserts that all jobs are closed, which a busy machine may delay."""
+    """Close the cluster at the end, even if its library asserts that all jobs are closed, which may come late."""
     try:
         yield cluster
     finally:
@@ -173,12 +174,12 @@ def _closing(cluster: Any) -> Iterator[Any]:
 
 
 def _here(address: str) -> bool:
-    """Return true for an address of this machine's own loopback."""
+    """Return true if an address is this machine's own loopback."""
     return address.split("://", 1)[1].rsplit(":", 1)[0].strip("[]") in ("127.0.0.1", "::1", "localhost")
 
 
 def _one_time_keys() -> Any:
-    """Make a key and certificate for this run. Raises TactileError where the library for it is missing."""
+    """Return a TLS key and certificate made for this run. Raises TactileError without the library for it."""
     from distributed import Security
 
     try:
@@ -204,7 +205,7 @@ def _start(wanted: QueueFile, options: dict[str, Any]) -> Any:
 
 
 def wait() -> float:
-    """Return how long to wait for loop or scheduler, s; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s sets it."""
+    """Return the time, s, to wait for a loop or scheduler; DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT=120s sets it."""
     import dask
     import distributed  # noqa: F401 - brings its settings
     from dask.utils import parse_timedelta
@@ -214,8 +215,8 @@ def wait() -> float:
 
 @functools.cache
 def loop() -> Any:
-    """Return a tornado loop, in a thread that lasts like this process. (Dask's own gives up after 10 s whatever its
-    settings, too little on a very busy machine.) Raises TactileError where it does not start."""
+    """Return a running tornado loop, in a thread that lasts as long as the process. (Dask's own gives up after 10 s
+    whatever its settings, too soon on a very busy machine.) Raises TactileError if it does not start."""
     from tornado.ioloop import IOLoop
 
     began, found = threading.Event(), []

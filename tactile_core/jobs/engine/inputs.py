@@ -1,4 +1,4 @@
-"""Inputs of a job with names and hashes: scenes, and recordings by file, folder, glob or ``@list``."""
+"""Find a job's inputs, with names and hashes: scenes, and recordings given by file, folder, glob or ``@list``."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ SLIDE, BESIDE = "_bio.csv", ("_cw.csv", "_cp.csv")  # of the slide set; its wren
 
 
 class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Recording of a job; name : unique, begins the names of its files; path : absolute, with ``#finger`` for a finger
-    of a hand; sha256, bytes : hash and size of the file's content"""
+    """An input of a job. name : unique, begins the names of its files
+    path : absolute, with ``#finger`` for a finger of a hand; sha256, bytes : hash and size of the file's content"""
 
     name: str
     path: str
@@ -43,8 +43,8 @@ class Input(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def find(words: Sequence[str], out: Path) -> list[Path]:
-    """Return the recordings that `words` name, in that order, each once, without those in the folder `out`. Raises
-    TactileError for a word that names nothing, and for a glob that would visit a folder again and again."""
+    """Return the recordings that `words` (paths, folders, globs, @lists) name, in order, each once, but those in `out`.
+    Raises TactileError for a word that names nothing, and a glob that may visit folders again and again."""
     own = out.resolve()
     within = functools.cache(lambda folder: list(_of_folder(folder)))  # a list may name a folder on each line
     found: dict[Path, None] = {}
@@ -59,8 +59,7 @@ def find(words: Sequence[str], out: Path) -> list[Path]:
 
 
 def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield each path or glob of words, also those in lists (@list.txt), and its source: "list.txt, line 3, " or
-    empty."""
+    """Yield each path or glob in `words` or in their lists (@list.txt), with its source: "list.txt, line 3, " or ""."""
     for word in words:
         if word.startswith("@"):
             for number, line in _lines(Path(word[1:])):
@@ -70,7 +69,7 @@ def _words(words: Sequence[str]) -> Iterator[tuple[str, str]]:
 
 
 def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
-    """Yield the recordings of a word, a path or glob. within : lists those in a folder"""
+    """Yield the recordings that a word, a path or glob, names. within : lists those in a folder"""
     there = os.path.lexists(word) or not glob.has_magic(word)
     for path in [word] if there else _globbed(word):
         real = os.path.realpath(path)
@@ -81,7 +80,7 @@ def _named(word: str, within: Callable[[Path], list[Path]]) -> Iterator[Path]:
 
 
 def _globbed(word: str) -> list[str]:
-    """Expand a word, a glob, sorted by name; refuse one that may visit the same folders again and again."""
+    """Return a glob's paths, sorted. Raises TactileError for one that may visit the same folders again and again."""
     parts = word.replace(os.sep, "/").split("/")
     wild = next(place for place, part in enumerate(parts) if glob.has_magic(part))
     if ".." in parts[wild:] or parts.count("**") > MOST_STARS or len(parts) > MOST_PARTS:
@@ -91,7 +90,7 @@ def _globbed(word: str) -> list[str]:
 
 
 def _lines(file: Path) -> list[tuple[int, str]]:
-    """Return the paths in a list file with their line numbers, without blank lines and those that begin with #."""
+    """Return (line number, path) of a list file, without blank lines and those that begin with #; or TactileError."""
     try:
         text = read_small(file)
         if "\0" in text:
@@ -107,7 +106,7 @@ def _lines(file: Path) -> list[tuple[int, str]]:
 
 
 def _of_folder(folder: Path) -> Iterator[Path]:
-    """Yield the recordings in a folder and below it, by name, without linked folders; warn of unreadable ones."""
+    """Yield the recordings in a folder and below, by name, without linked folders; log unreadable ones."""
     if _is_bag(folder):
         yield folder
         return
@@ -126,12 +125,12 @@ def passed_over(error: OSError) -> None:
 
 
 def _is_bag(folder: Path) -> bool:
-    """Return true if a folder is a ROS 2 bag; false for one that may not be read."""
+    """Return true if a folder is a ROS 2 bag; false if it may not be read."""
     return os.path.isfile(folder / MARK)
 
 
 def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[Input]:
-    """Return an input, with the file's hash, for each recording in files ``paths``: of a hand, one for each finger.
+    """Return an input for each recording in the files ``paths``; a hand has one for each finger.
     progress : called with (files done, in all). Raises TactileError for a file that cannot be read."""
     found: list[Input] = []
     for done, path in enumerate(paths, 1):
@@ -144,15 +143,14 @@ def hashed(paths: Sequence[Path], progress: Callable[[int, int], None]) -> list[
 
 
 def unit_hash(calibration: Path) -> str:
-    """Hash of a DIGIT's calibration file and the photograph that it names. Raises TactileError for a bad one."""
+    """Return the SHA-256 of a calibration file and the photograph that it names. Raises TactileError for a bad file."""
     photograph = load_calibration(calibration).photograph
     digests = [content_hash(Path(file))[0] for file in (calibration, photograph) if file]
     return hashlib.sha256(" ".join(digests).encode()).hexdigest() if photograph else digests[0]
 
 
 def content_hash(path: Path) -> tuple[str, int]:
-    """Return hash and bytes of a file, or of all files of a bag's folder with their names. Raises TactileError for
-    what cannot be read or is no regular file."""
+    """Return SHA-256 and bytes of a file, or of a bag's folder. Raises TactileError for what cannot be read."""
     path = Path(split(str(path))[0])
     if os.path.exists(path) and not (os.path.isfile(path) or os.path.isdir(path)):
         raise TactileError(path, "no regular file", "a recording", "Copy what it gives into a file")
@@ -164,14 +162,14 @@ def content_hash(path: Path) -> tuple[str, int]:
 
 
 def check_unchanged(one: Input) -> None:
-    """Raise TactileError where an input's content has changed since the job was made."""
+    """Raise TactileError if an input's content has changed since the job was made."""
     if content_hash(Path(one.path)) != (one.sha256, one.bytes):
         found = "another content than when the job was made"
         raise TactileError(one.path, found, f"sha256 {one.sha256[:12]}...", "Start a new job")
 
 
 def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, str, list[Input], list[str]]:
-    """Return a scene, its text, a list of inputs, one for each of ``names``, all of this scene, and its meshes' hashes.
+    """Return a scene, its TOML text, an input for each of ``names``, all this scene, and the SHA-256 of its meshes.
     Raises TactileError for a bad scene."""
     from ...simulation.scene import load_scene
 
@@ -184,8 +182,8 @@ def read_scene(scene_path: str | os.PathLike, names: list[str]) -> tuple[Scene, 
 
 
 def load_scene_of(one: Input, files: tuple[str, ...]) -> tuple[Scene, str]:
-    """Load an input's scene and its text. files : hashes of its meshes when the job was made
-    Raises TactileError where the scene or a mesh has changed since then."""
+    """Return an input's scene and its TOML text. files : SHA-256 of its meshes when the job was made
+    Raises TactileError if the scene or a mesh has changed since then."""
     from ...simulation.scene import load_scene
 
     scene, text = load_scene(one.path)

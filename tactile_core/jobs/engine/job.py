@@ -1,4 +1,4 @@
-"""``job.json``: what a job makes. It never changes after it is written; all else follows from it."""
+"""Read and write ``job.json``: what a job makes. It never changes after it is written; all else follows from it."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ R = TypeVar("R")
 
 
 class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
-    """A job: `inputs` by `recipe`. weights, calibration : folder and file, None for those that ship
-    format : of job.json; versions : of Python, this package and its libraries when it was made, by name"""
+    """A job: what a recipe makes of inputs. weights, calibration : folder and file, None for those that ship
+    format : of job.json; versions : name -> version of Python, this package and libraries that made the job"""
 
     format: str
     inputs: list[Input]
@@ -42,7 +42,7 @@ class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, d
 
     @functools.cached_property  # every shard names it, and with 10,000 inputs it takes 10 ms
     def id(self) -> str:
-        """Hash of all that decides the shards; equal for equal inputs elsewhere."""
+        """Return the SHA-256 of all that decides the shards; equal for equal inputs in another place."""
         named = [[one.name, one.sha256] for one in self.inputs]
         content = json.dumps([named, msgspec.to_builtins(self.recipe)], sort_keys=True)
         return hashlib.sha256(content.encode()).hexdigest()
@@ -55,14 +55,14 @@ def make(inputs: list[Input], recipe: R, weights: str | None, calibration: str |
 
 
 def write(folder: Path, job: Job) -> None:
-    """Make the job folder and write its job file. Raises TactileError where that is not possible."""
+    """Make the job's folder and write its job file. Raises TactileError if that is not possible."""
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
         atomic.write_json(folder / FILE, msgspec.to_builtins(job))
 
 
 def check_empty(folder: Path, advice: str) -> None:
-    """Raise TactileError, with advice, for a folder without a job but with others' files; hidden ones are ignored."""
+    """Raise TactileError, with advice, if a folder that has no job holds files; hidden ones are ignored."""
     others = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     if others:
         raise TactileError(folder, f"holds {others[0]}, and no job", "an empty folder", advice)
@@ -74,7 +74,7 @@ def exists(folder: Path) -> bool:
 
 
 def read_to_run(folder: Path) -> Job:
-    """Read a job in order to run it. Raises TactileError like `read`, and if another version of the package made it."""
+    """Return the job in a folder, to run it. Raises TactileError as `read`, and for a job of another version."""
     job = read(folder)
     if job.recipe.version != __version__:
         found = f"made by version {job.recipe.version}"
@@ -83,13 +83,13 @@ def read_to_run(folder: Path) -> Job:
 
 
 def completion(job: Job) -> str:
-    """Return words, for a message, on which command completes a job that is not complete."""
+    """Return in words, for a message, which command completes a job that is not complete."""
     same = job.recipe.version == __version__
     return "the same command goes on" if same else f"version {job.recipe.version}, which began it, goes on with it"
 
 
 def read(folder: Path) -> Job:
-    """Read the job of a folder. Raises TactileError for no job, and for one that is damaged or of another format."""
+    """Return the job in a folder. Raises TactileError for no job, and for one that is damaged or of another format."""
     file = folder / FILE
     try:
         job = msgspec.convert(json.loads(read_small(file, MOST)), Job[Recipe])

@@ -1,4 +1,4 @@
-"""Processes on this machine; a thread here supervises each, and starts another when one dies."""
+"""Run a job's tasks in processes on this machine; a thread supervises each, and starts another when one dies."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ Start = Callable[[], "subprocess.Popen[str]"]
 
 
 class Local:
-    """Pool of `workers` processes for the job in `folder`, each with one thread.
-    restart : number of tasks after which a process is replaced; command : its words, to which the folder is added"""
+    """Executor of tasks in `workers` processes, each with one thread, for the job in `folder`.
+    restart : number of tasks after which a process is replaced; command : words that start it; the folder is added"""
 
     def __init__(
         self, folder: Path, workers: int, restart: int = RESTART, command: Sequence[str] | None = None
@@ -70,7 +70,7 @@ class Local:
             thread.join()
 
     def _watch(self) -> None:
-        """Serve tasks with one process at a time."""
+        """Take tasks until there are no more, and have them done by one process at a time."""
         worker = _Worker(self._start, self._restart)
         try:
             while (task := self._todo.get()) is not None:
@@ -101,13 +101,13 @@ class Local:
 
 
 def _search_path() -> str:
-    """Return a search path on which a worker finds this package under its name, which is a long one in Blender."""
+    """Return a PYTHONPATH by which a worker finds this package under its name, which is a long one in Blender."""
     root = Path(__file__).parents[__package__.count(".") + 1]
     return os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
 
 
 class _Worker:
-    """Worker that runs one process after another."""
+    """Worker that runs one process after another. cause : why the last process died"""
 
     def __init__(self, start: Start, restart: int) -> None:
         self._start, self._restart = start, restart
@@ -116,7 +116,7 @@ class _Worker:
         self.cause = ""
 
     def ask(self, task: dict[str, Any]) -> dict[str, Any] | None:
-        """Send a task to a process and return its reply; None where the process died, with the reason in `cause`."""
+        """Send a task to a process and return its reply; None if the process died, with the reason in `cause`."""
         if self._process is None:
             self._process, self._served = self._start(), 0
         line = ""
@@ -147,7 +147,7 @@ class _Worker:
 
 
 class InProcess:
-    """Executor that does a job's tasks in this process."""
+    """Executor of tasks in this process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder, self._todo = folder, deque[Task]()
@@ -157,7 +157,7 @@ class InProcess:
         self._todo.append(task)
 
     def results(self, count: Callable[[], int]) -> Iterator[tuple[Task, Reply]]:
-        """Do the submitted tasks in order; yield each with its reply while ``count()``, those awaited, is above 0."""
+        """Do the submitted tasks in order; yield (task, reply) while ``count()``, how many are awaited, is above 0."""
         while count():
             task = self._todo.popleft()
             yield task, msgspec.convert(tasks.run(str(self._folder), msgspec.to_builtins(task)), Reply)

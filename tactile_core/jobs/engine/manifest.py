@@ -1,4 +1,4 @@
-"""Determine the state of a job folder from its files alone."""
+"""Find the state of a job from its folder's files alone, and write its manifest."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ FORMAT = "tactile-batch-1"
 @dataclasses.dataclass
 class Status:
     """Progress of a job.
-    recordings, prepared : number of recordings, and of prepared ones; shards, there : number of the prepared ones'
-        shards, and of shards that exist; frames : of the prepared ones; bytes : of their shards, estimated, 0 unknown
-    aside : task -> why it could not be done"""
+    recordings, prepared : number of recordings, and of those that are prepared; frames : in the prepared ones
+    shards, there : number of shards of the prepared ones, and of shards that exist
+    bytes : of their shards, estimated, 0 if unknown; aside : task -> why it could not be done"""
 
     recordings: int
     prepared: int = 0
@@ -44,7 +44,7 @@ class Status:
 
 
 def status(folder: Path, job: Job) -> Status:
-    """Return the progress of a job, by names and lengths of files; `damaged` checks their content."""
+    """Return the progress of a job, by the names and lengths of its files; their content is not checked."""
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):
@@ -71,7 +71,7 @@ def _aside(folder: Path) -> dict[str, str]:
 
 
 def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
-    """List a job's files that are damaged, or missing by its manifest. progress : (files done, in all)"""
+    """Return a job's files that are damaged, or missing by its manifest. progress : called with (files done, in all)"""
     shards = [shard for recording in _read(folder) for shard in recording.shards]
     listed = {folder / jobs.SHARDS / Path(shard.file).name: shard.sha256 for shard in shards}
     there = [*(folder / jobs.PREPARED).glob("*.h5"), *(folder / jobs.SHARDS).glob("*.h5")]
@@ -86,12 +86,12 @@ def damaged(folder: Path, progress: Callable[[int, int], None]) -> list[Path]:
 
 
 def warnings(folder: Path) -> dict[str, list[str]]:
-    """Return each recording's warnings, by the manifest, without recordings that have none."""
+    """Return recording -> warnings, by the manifest, without recordings that have none."""
     return {recording.name: recording.warnings for recording in _read(folder) if recording.warnings}
 
 
 def _read(folder: Path) -> list[_Recording]:
-    """Return the manifest's recordings; none for a missing or unreadable manifest."""
+    """Return the recordings in the manifest; [] if it is missing or unreadable."""
     try:
         return msgspec.json.decode(read_small(folder / jobs.MANIFEST, jobs.MOST), type=_Manifest).recordings
     except (OSError, ValueError, RecursionError, TactileError):
@@ -114,7 +114,7 @@ class _Manifest(msgspec.Struct):
 
 
 def write(folder: Path, job: Job) -> None:
-    """Write ``manifest.json``: recordings in order, their shards and hashes; the same job gives the same bytes."""
+    """Write ``manifest.json``: recordings in order, with shards and hashes; the same job gives the same bytes."""
     content = {
         "format": FORMAT,
         "job": job.id,
@@ -143,7 +143,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}  # disk, quota, the system's li
 
 
 def refused(folder: Path, job: Job, error: OSError) -> TactileError:
-    """Return the error for an OSError of writing; for a full disk or a removal it names the job folder."""
+    """Return the error for an OSError of writing: what was removed, not writable, or how much space is needed."""
     if not jobs.exists(folder):
         return TactileError(folder, "was removed while the job ran", "the job's folder", "Begin it again")
     reason = error.strerror or str(error)
@@ -155,7 +155,7 @@ def refused(folder: Path, job: Job, error: OSError) -> TactileError:
 
 
 def _needed(folder: Path, job: Job) -> str:
-    """Describe how much space is still needed, by the size of the shards made so far or their kind's estimate."""
+    """Return in words how much space is still needed, by the shards made so far, or by their kind's estimate."""
     state = status(folder, job)
     sizes = [file.stat().st_size for file in (folder / jobs.SHARDS).glob("*.h5")]
     left, unseen = state.shards - state.there, state.recordings - state.prepared

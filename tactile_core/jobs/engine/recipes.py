@@ -1,13 +1,13 @@
 """Recipes, one struct for each kind of job: all that decides a shard's bytes besides the input itself.
 
-Each kind is done by a module of ``jobs``, `MODULES`, which has
-``prepare_input(folder, job, index)``  prepares an input; returns the number of its shards, as far as known, and whether
-anything was made
-``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns whether it was made
-``inspect_input(folder, job, index)``  returns facts of an input, by its files; None before its first task was done
+Each kind of job is done by a module of ``jobs``, in `MODULES`, which has
+``prepare_input(folder, job, index)``  prepares an input; returns the number of its shards, as far as known, and true
+if anything was made
+``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns true if it was made
+``inspect_input(folder, job, index)``  returns `InputFacts` by the input's files; None before its first task is done
 ``GROWS``  true if `prepare_input` is to be called again when all its shards are there
 
-The first two raise TactileError for what cannot be done, OSError where the disk cannot be written."""
+The first two raise TactileError for what cannot be done, OSError if the disk cannot be written."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ PICTURE_FRAMES = 50  # rendered frames per shard: some seconds of work, and 80 M
 
 
 class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Options of ``recordings.PrepareOptions``, with the same meanings."""
+    """Options of ``recordings.PrepareOptions`` that a job can have, under the same names."""
 
     kind: str | None = None
     tare: str | None = None
@@ -51,14 +51,15 @@ class Prepare(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """Recordings to shards of translated frames.
+    """Recipe from recordings to shards of translated frames.
 
-    keep : as of ``convert.Options``; weights : sha256 of the weights' card; shard_frames : frames per shard
-    calibration : sha256 of the DIGIT's calibration and its photograph, empty for the shipped unit
-    preset : of pictures: fast, standard, quality, reference; variant : of Mitsuba: llvm_ad_rgb, scalar_rgb, "" for fast
-    answer : options of the estimated contact; gel : as of ``convert.ToolOptions``
-    source, target : the sensors; every : translate one frame in ``every``; sensor : calibration of the source's unit
-    version : of this package, when the job was made, as in the other recipes"""
+    keep : names of arrays to keep; weights : SHA-256 of the weights' card; shard_frames : frames per shard
+    calibration : SHA-256 of the gel's calibration and its photograph, "" for the shipped unit
+    preset : of pictures: fast, standard, quality, reference; variant : Mitsuba's: llvm_ad_rgb, scalar_rgb, "" for fast
+    answer : options of the estimated contact; gel : "translated", "solved" or "ball:28", see ``convert.ToolOptions``
+    source, target : names of sensors; every : translate one frame in ``every``; sensor : calibration of the source's
+    unit
+    version : of this package when the job was made, as in the other recipes"""
 
     keep: list[str]
     weights: str
@@ -77,8 +78,8 @@ class Translate(msgspec.Struct, tag="batch", tag_field="verb", forbid_unknown_fi
 
 
 class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to `count` paired contacts of sensors source and target, drawn from `seed`; keep : ["traction"] or [].
-    surfaces : sha256 of the sensors' nodes; files : of meshes; electrodes : "sheet", law of counts"""
+    """Recipe from a scene to `count` paired contacts of the sensors source and target, drawn from `seed`.
+    keep : ["traction"] or []; electrodes : law of counts; surfaces, files : SHA-256 of the sensors' nodes, of meshes"""
 
     count: Annotated[int, Meta(ge=1)]
     seed: int
@@ -92,9 +93,9 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """A scene to one recording for each input, with values of its own; see ``jobs.simulate``.
-    seed : of the first input, each next one has one more; values : one dict per input, name -> value
-    keep : electrodes, displacement_<sensor>, traction_<sensor>; files : sha256 of the scene's meshes"""
+    """Recipe from a scene to one recording for each input, each with its own values of the scene's parameters.
+    seed : of the first input, one more for each next one; values : one dict per input, name -> value
+    keep : electrodes, displacement_<sensor>, traction_<sensor>; files : SHA-256 of the scene's meshes"""
 
     seed: int
     values: list[dict[str, float | str]]
@@ -105,7 +106,7 @@ class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_
 
 
 class Render(msgspec.Struct, tag="render", tag_field="verb", forbid_unknown_fields=True, frozen=True):
-    """Deformed gels to pictures; fields as of ``render.Options``, frames "A:B:STEP", calibration as of `Translate`."""
+    """Recipe from deformed gels to pictures; fields as in ``render.Options``, frames "A:B:STEP", calibration a hash."""
 
     preset: str
     variant: str
@@ -128,9 +129,9 @@ MODULES: dict[Any, str] = {
 
 @dataclasses.dataclass(frozen=True)
 class InputFacts:
-    """Facts of an input; shards : their number; frames : of a recording
-    warnings : function that reads the warnings, which takes longer; TactileError where the input is damaged
-    bytes : estimate for all its shards; 0 where unknown before they exist"""
+    """Facts of an input. shards, frames : number of its shards, and of its frames if it is a recording
+    warnings : function that reads its warnings, which takes longer; raises TactileError if the input is damaged
+    bytes : estimated size of all its shards; 0 if unknown before they exist"""
 
     shards: int
     frames: int = 0

@@ -38,7 +38,7 @@ class Place(Protocol):
 
 @dataclasses.dataclass
 class Outcome:
-    """Outcome of a run. made, kept : numbers of shards, new and there before; aside : task's name -> why it failed"""
+    """Outcome of a run. made, kept : number of shards made now and before; aside : task's name -> why it failed"""
 
     made: int = 0
     kept: int = 0
@@ -47,8 +47,8 @@ class Outcome:
 
 @contextlib.contextmanager
 def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
-    """Lock the job's folder, made if needed, and clear what killed runs left; part : (i, n), as in `run`, None for all.
-    TactileError if it is locked."""
+    """Lock a job's folder, which is made if needed, and clear what killed runs left. part : (i, n), the i-th of n parts
+    of a queue's array; None for the whole job. Raises TactileError if it is locked."""
     made, new = not folder.exists(), not (folder / lock.FILE).exists()
     with atomic.writing(folder, advice="Name another --out folder"):
         folder.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def opened(folder: Path, part: tuple[int, int] | None) -> Iterator[None]:
 
 
 def _unmake(folder: Path) -> None:
-    """Remove a folder that holds only our locks, and a job that was refused before it began."""
+    """Remove a job's folder if it holds only locks and the file of a job that was refused before it began."""
     with suppress(OSError):  # others have removed it already
         files = list(folder.iterdir())
         if all(path.name.startswith((lock.FILE, jobs.FILE)) for path in files):
@@ -80,7 +80,7 @@ def _unmake(folder: Path) -> None:
 
 
 def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
-    """Clear what killed workers left; not in an array, whose other parts may be writing, nor without a job."""
+    """Remove what killed workers left; not for a part of an array, as others may be writing, nor without a job."""
     if part is None and jobs.exists(folder):
         with atomic.writing(folder, "a job folder of ours that can be written", "Make it writable"):
             for place in (".", jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
@@ -88,9 +88,9 @@ def _sweep(folder: Path, part: tuple[int, int] | None) -> None:
 
 
 def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
-    """Do the tasks of a job that are not done yet, or part (i, n), which is i of n, of them; call inside `opened`.
-    place : executor of the tasks; progress : called with (tasks done, tasks known so far)
-    Raises TactileError when the disk cannot be written."""
+    """Do the tasks of a job that are not done, all or those of part (i, n), inside the block of `opened`; return the
+    outcome. place : executor of the tasks; progress : called with (tasks done, tasks known so far)
+    Raises TactileError if the disk cannot be written."""
     try:
         return _run(folder, job, place, part, progress)
     except OSError as error:
@@ -98,7 +98,7 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
 
 
 def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
-    """Do `run`; raises OSError."""
+    """Do the work of `run`. Raises OSError if the disk cannot be written."""
     work = _Work(folder, job, part)
     with place:  # which may be refused: the folders say that the job has begun
         for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
@@ -115,7 +115,7 @@ def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, pro
 
 
 class _Work:
-    """Tasks of a run and their outcome."""
+    """Tasks of a run, and its outcome, `done`. known, finished : number of tasks known so far, and of finished ones"""
 
     def __init__(self, folder: Path, job: Job, part: tuple[int, int] | None) -> None:
         self._folder, self._job = folder, job
@@ -129,7 +129,7 @@ class _Work:
         return self.known - self.finished
 
     def first_tasks(self) -> list[Task]:
-        """Return a task to prepare each input; a part of an array begins with its own, for the others to use."""
+        """Return tasks to prepare all inputs; a part of an array begins with its own, for the others to use."""
         count = len(self._job.inputs)
         own = [index for index in range(count) if index % self._parts == self._part]
         others = [index for index in range(count) if index % self._parts != self._part]
@@ -137,7 +137,7 @@ class _Work:
         return [Task(index) for index in own + others]
 
     def take(self, task: Task, reply: Reply) -> list[Task]:
-        """Record a worker's reply; returns the tasks that can be started now."""
+        """Record a worker's reply to a task; return the tasks that can be started now."""
         self.finished += 1
         name = tasks.name(self._job, task)
         file = self._folder / jobs.ASIDE / f"{name}.json"
@@ -159,7 +159,7 @@ class _Work:
         return follow
 
     def _shards(self, recording: int, count: int) -> list[Task]:
-        """Return this part's shards among the first `count` of a recording that were not requested yet."""
+        """Return tasks for this part's shards among the first `count` of a recording, without those returned before."""
         if self._grows:
             count = max(count, self._parts)  # each part makes one, from which it learns how many there are
         numbers = range(self._asked[recording], count)
@@ -171,13 +171,13 @@ class _Work:
 
 
 def folder_of(out: Path) -> Path:
-    """Return <out>.parts, the folder of the job whose shards are merged into the single result `out`."""
+    """Return <out>.parts, the folder of a job whose shards are joined into the single result `out`."""
     return out.with_name(out.name + ".parts")
 
 
 @contextlib.contextmanager
 def begun(out: Path, job: Job) -> Iterator[Path]:
-    """Lock and yield <out>.parts, folder of a new job or the same one begun before. TactileError for another job's."""
+    """Lock and yield <out>.parts, the folder of a new job or of this job, begun before; or raise TactileError."""
     folder = folder_of(out)
     with opened(folder, None):
         if not jobs.exists(folder):
@@ -190,7 +190,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
-    """Write only the job of the result `out`, for `tactile batch --array`; returns <out>.parts. Raises as `begun`."""
+    """Write the job of the result `out` alone, for `tactile batch --array`; return <out>.parts. Raises as `begun`."""
     with begun(Path(out), job) as folder:
         return folder
 
@@ -199,9 +199,9 @@ def write(out: str | os.PathLike, job: Job) -> Path:
 def completed(
     out: Path, job: Job, place: Callable[[Path], Place], progress: Progress = lambda done, known: None
 ) -> Iterator[Path]:
-    """Do a whole job, yield its folder to be merged into `out`, and remove it after that.
-    place : function from the job's folder to the executor of tasks; progress : called with (tasks done, tasks known)
-    Raises TactileError for the first task that failed, and as `begun` and `run` do."""
+    """Do a whole job, yield its folder, whose shards the block joins into `out`, and remove the folder.
+    place : function from the job's folder to its executor; progress : called with (tasks done, tasks known)
+    Raises TactileError for the first task that failed, for another job's folder, and if the disk cannot be written."""
     with begun(out, job) as folder:
         done = run(folder, job, place(folder), None, progress)
         for name, why in sorted(done.aside.items()):

@@ -1,5 +1,5 @@
-"""A process that does tasks of one job: JSON lines in, JSON lines out, until its input ends. ``local`` starts it; it
-ends by itself when its client is killed, and leaves no partial file."""
+"""Process that does tasks of a job, JSON lines in, JSON lines out, until its input ends. ``local`` starts it; it ends
+by itself when its client is killed, and leaves no partial file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TextIO
 
 
 def serve(folder: str, requests: TextIO, replies: TextIO) -> None:
-    """Answer requests, lines of JSON with a task each of the job in a folder, by lines of replies, until they end."""
+    """Answer requests, a task of the folder's job in JSON on each line, by lines of replies, until they end."""
     from . import tasks
 
     for line in requests:

@@ -1,4 +1,4 @@
-"""The two kinds of work in a job, as small values for any process."""
+"""The two kinds of work in a job, to prepare an input and to make a shard, as small values for any process."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _one_thread_once = functools.cache(one_thread)
 
 
 class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Work on the job's input of index `recording`: to prepare it, if `shard` is None, or to make that shard of it."""
+    """Work on the job's input number `recording`: to make its shard number `shard`, or to prepare it if None."""
 
     recording: int
     shard: int | None = None
 
 
 class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Reason why a task failed: the fields of a TactileError; `where` is empty if its input is not to blame."""
+    """Reason why a task failed, with the fields of a TactileError; `where` is "" if its input is not to blame."""
 
     found: str
     where: str = ""
@@ -33,11 +33,11 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     @classmethod
     def from_error(cls, error: TactileError) -> Failure:
-        """Return the failure with the fields of an error."""
+        """Return an error as a failure with the same fields."""
         return cls(error.found, error.where, error.expected, error.advice)
 
     def error(self, task: str) -> TactileError:
-        """Return the failure as an error to raise; task : name of the failed task, in place of an empty `where`"""
+        """Return the failure as an error to raise. task : name of the failed task, in place of an empty `where`"""
         return TactileError(self.where or task, self.found, self.expected, self.advice)
 
     def __str__(self) -> str:
@@ -45,8 +45,8 @@ class Failure(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """Outcome of a task. made : False where the result existed; shards : number that follow an input's first task
-    failure : why it failed; stop : true if every other task would fail, too"""
+    """Outcome of a task. made : false if its result existed; shards : number of the input's shards, if it was prepared
+    failure : why it failed, or None; stop : true if every other task would fail, too"""
 
     made: bool = False
     shards: int = 0
@@ -55,16 +55,16 @@ class Reply(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 def name(job: jobs.Job, task: Task) -> str:
-    """Return the task's name, INPUT or INPUT-000007 for its shard 7, for files and messages."""
+    """Return a task's name for files and messages: INPUT, or INPUT-000007 for shard 7 of that input."""
     recording = job.inputs[task.recording].name
     return recording if task.shard is None else f"{recording}-{task.shard:06d}"
 
 
 def run(folder: str, task: dict[str, Any]) -> dict[str, Any]:
-    """Do a task of the job in `folder`; task and reply are plain data, for JSON and Dask alike.
+    """Do a task of the job in `folder` and return its reply, both plain data for JSON and Dask alike.
 
-    Errors by the task's input or the disk are in the reply and never raised. Linear algebra stays in one thread from
-    here on, as the bytes would otherwise depend on the process."""
+    Errors of the task's input or the disk are in the reply and never raised. From here on linear algebra stays in one
+    thread, as the bytes would otherwise depend on the process."""
     _one_thread_once()
     reply = _run(Path(folder), msgspec.convert(task, Task))
     return msgspec.to_builtins(reply)
@@ -91,7 +91,7 @@ def _run(folder: Path, task: Task) -> Reply:
 
 
 def _stamp(folder: Path) -> tuple[int, int]:
-    """Return inode and size of the job file: a worker may serve several jobs in one place, one after another."""
+    """Return inode and size of the job file, as a worker may serve several jobs in one place; or raise TactileError."""
     try:
         found = (folder / jobs.FILE).stat()
     except OSError as error:
