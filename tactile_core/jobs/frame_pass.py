@@ -1,4 +1,4 @@
-"""One pass over the frames of a recording through all stages: prepare, track, decode, draw and write, in chunks."""
+"""Pass over the frames of a recording through all stages, in chunks: prepare, track, decode, draw and write."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ Take = Callable[[np.ndarray, dict[str, np.ndarray]], None]
 
 @dataclasses.dataclass(frozen=True)
 class Tools:
-    """Networks and drawer of a conversion, the same for every recording; calibration : file, None for the shipped.
-    gel : as of ``convert.ToolOptions``, "solved" where no networks lead to it"""
+    """Networks and drawer of a conversion, the same for every recording. calibration : file, None for the shipped one
+    gel : "translated", "solved" or "ball:28", see ``convert.ToolOptions``"""
 
     translator: Translator
     drawer: Drawer
@@ -36,18 +36,18 @@ class Tools:
 
     @property
     def pair(self) -> tuple[str, str]:
-        """Return (the sensor whose recordings are translated, the gel that is drawn), by name."""
+        """Return the names of the sensor whose recordings are translated, and of the gel that is drawn."""
         return self.translator.source, self.drawer.target
 
 
 class FramePass:
-    """Translates and draws a recording's frames, part by part, and writes the file of their arrays.
+    """Translate and draw a recording's frames, part by part, and write the file of their arrays.
     folded : number of height maps so far in which the gel folds over itself"""
 
     def __init__(
         self, tools: Tools, read: Read, count: int, keep: Iterable[str], clock: Stopwatch | None = None
     ) -> None:
-        """Store tools and read(frames), which returns their times, s, and signals; count : of frames of the recording
+        """Store the tools. read : function from frames to their times, s, and signals; count : the recording's frames
         keep : words of --keep. Raises TactileError for motion of dots on a gel without dots."""
         self._translator, self._drawer, self._pair = tools.translator, tools.drawer, tools.pair
         self._keep, self._clock = tuple(keep), clock or Stopwatch()
@@ -59,10 +59,10 @@ class FramePass:
         self, path: Path, frames: np.ndarray, signals: Signals, start_time: float, about: dict[str, Any],
         take: Take | None = None, labels: dict[str, np.ndarray] | None = None, room: int = 0,
     ) -> None:  # fmt: skip
-        """Translate and draw frames (T,), ascending indices, chunk by chunk, and write their arrays to a new file.
-        signals : of any frame, for the recording's rest and kind; about : attributes of the file
-        take : called with each chunk's frames and arrays; labels : name -> (T,) texts; start_time : unix s
-        room : bytes before the HDF5 part, as in `FramesFile`"""
+        """Translate and draw frames (T,), rising indices, chunk by chunk, and write their arrays to a new file.
+        signals : of any frame, for the recording's rest and kind; start_time : unix s; about : the file's attributes
+        take : called with each chunk's frames and arrays; labels : name -> (T,) texts
+        room : bytes before the HDF5 part, 0 or 512, for a shard's checksum"""
         words = kept(self._keep, self._translator.answer)
         with FramesFile(path, len(frames), words, about, room=room, pair=self._pair) as file:
             for start in range(0, len(frames), CHUNK):
@@ -112,7 +112,7 @@ class FramePass:
         return heights
 
     def pictures(self, arrays: dict[str, np.ndarray], rows: np.ndarray) -> list[np.ndarray]:
-        """Return the pictures (H, W, 3) uint8 of rows (n,) of the arrays, drawn unless the arrays hold them."""
+        """Return the pictures (H, W, 3) uint8 of rows (n,) of the arrays, drawn if the arrays do not hold them."""
         if "image" in arrays:
             return [arrays["image"][row] for row in rows]
         moved = arrays["displacement_digit"][rows]

@@ -1,4 +1,4 @@
-"""``frames.h5``: numbers of a converted recording, one row per frame, T first, SI units, float32 (time: float64)."""
+"""Write ``frames.h5``: arrays of a converted recording, one row per frame, SI units, float32 (time: float64)."""
 
 from __future__ import annotations
 
@@ -87,25 +87,25 @@ LARGE = 4096  # numbers per frame, from which on a shard gives each frame a chun
 
 
 def kept(keep: Sequence[str], answer: Answer) -> tuple[str, ...]:
-    """Return `keep`, words of --keep, and "samples" (of the posterior), "second" (contact) where `answer` has any."""
+    """Return `keep`, words of --keep, with "samples" (other possible contacts) and "second" (contact) if asked for."""
     return (*keep, *[SAMPLES] * (answer.samples > 0), *[SECOND] * (answer.contacts > 1))
 
 
 def arrays_of(keep: Iterable[str], *, shard: bool) -> dict[str, tuple[str, str]]:
-    """Return name -> (unit, meaning) of the datasets of a file that keeps `kept`'s words; shards have pictures too."""
+    """Return name -> (unit, meaning) of the datasets in a file that keeps these words; a shard has pictures, too."""
     kept = [PICTURES if shard and word == "image" else KEPT[word] for word in keep]
     return {name: meaning for about in (ALWAYS, *kept) for name, meaning in about.items()}
 
 
 def named(name: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's name for a pair (source, gel), which takes the place of biotac and digit at its end."""
+    """Return a dataset's name with a pair (sensor, gel) in place of biotac and digit at its end."""
     stem, _, role = name.rpartition("_")
     sensor = dict(zip(PAIR, pair, strict=True)).get(role)
     return f"{stem}_{sensor}" if sensor else name
 
 
 def described(meaning: str, pair: tuple[str, str]) -> str:
-    """Return a dataset's meaning, which names BioTac and DIGIT, in the words of a pair (source, gel) of sensors."""
+    """Return a dataset's meaning with a pair (sensor, gel) in place of BioTac and DIGIT."""
     for role, sensor in zip(PAIR, pair, strict=True):
         if role != sensor:
             meaning = meaning.replace(f"{role}_surface()", f"sensor_surface({sensor!r})")
@@ -115,14 +115,14 @@ def described(meaning: str, pair: tuple[str, str]) -> str:
 
 
 def netcdf_value(value: Any) -> Any:
-    """Return an attribute as netCDF can hold it: without booleans or arrays of several axes."""
+    """Return an attribute as netCDF can hold it: a boolean as an integer, an array flat."""
     if isinstance(value, bool | np.bool_):
         return int(value)
     return value.ravel() if isinstance(value, np.ndarray) else value
 
 
 class FramesFile:
-    """Writer of ``frames.h5``, part by part, of the kept arrays alone. Raises OSError where the disk refuses."""
+    """Writer of the kept arrays to ``frames.h5``, part by part. Raises OSError if the disk refuses."""
 
     def __init__(
         self, path: Path, count: int, keep: tuple[str, ...], attributes: dict[str, Any], *, room: int = 0,
@@ -130,10 +130,10 @@ class FramesFile:
     ) -> None:  # fmt: skip
         """Create the file.
 
-        keep : words of KEPT; pair : the sensor that was read and the gel; they name datasets
-        path : new file; count : T; attributes : of the file itself, beside format and version
-        room : bytes before the HDF5 part, 512 or a doubling of it, for a shard's checksum; the file then holds
-            pictures, too, and a large array has one chunk per frame"""
+        path : of the new file; count : T, number of frames; keep : words of `KEPT`; attributes : those of the file
+        itself
+        room : bytes before the HDF5 part: 0, or 512, 1024 ... for a shard's checksum; a shard holds pictures, too, and
+            its large arrays have one chunk per frame; pair : names of the sensor that was read and the gel"""
         self._about = arrays_of(keep, shard=bool(room))
         self._count, self._framed, self._pair = count, bool(room), pair
         about = {"format": FORMAT, "tactile_core": __version__, **attributes}
@@ -147,7 +147,7 @@ class FramesFile:
         self._opened.__exit__(*error)
 
     def write(self, start: int, arrays: dict[str, np.ndarray]) -> None:
-        """Write arrays (n, ...) of frames from `start` on, those that are kept. Floats become float32."""
+        """Write the kept ones of arrays, name -> (n, ...), for the rows from `start` on. Floats become float32."""
         for name, array in arrays.items():
             if name in self._about:
                 own = named(name, self._pair)
@@ -157,14 +157,14 @@ class FramesFile:
         self._disk.check()
 
     def write_labels(self, labels: dict[str, np.ndarray]) -> None:
-        """Write the group ``labels``: a dataset (T,) of UTF-8 text for each label of the converted frames."""
+        """Write labels, name -> (T,) texts of the converted frames, to the group ``labels``, as UTF-8 text."""
         import h5py
 
         for name, column in labels.items():
             self._file.create_dataset(f"labels/{name}", data=column, dtype=h5py.string_dtype(), track_times=False)
 
     def annotate(self, name: str, **attributes: Any) -> None:
-        """Add attributes to a dataset that exists, by its name in the file; bools become integers, arrays flat ones."""
+        """Add attributes to the dataset called `name` in the file; booleans become integers, arrays flat."""
         self._file[name].attrs.update({key: netcdf_value(value) for key, value in attributes.items()})
 
     def _create(self, name: str, array: np.ndarray) -> h5py.Dataset:

@@ -1,4 +1,4 @@
-"""The shards of a finished job as recordings, some frames in memory at a time."""
+"""Read the shards of a finished job as recordings, some frames at a time."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BLOCK = 32  # frames in memory at a time: 7 MB of pictures, 10 MB of heights
 
 
 def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-    """Name -> shape of one frame, and type."""
+    """Return name -> (shape of one frame, type) of the arrays in a shard."""
     import h5py
 
     with h5py.File(path, "r") as file:
@@ -39,9 +39,9 @@ def _kinds(path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
 
 @dataclasses.dataclass(frozen=True)
 class Recorded:
-    """Recording of a finished job; name : in the job; frames : their number; shards : its files, in order
-    labels : name -> (T,) object array of str; split : "train" or "test"
-    every : one frame in ``every`` was translated; pair : sensor and gel, which some arrays are named after"""
+    """Recording of a finished job. name : in the job; frames : number of translated ones; shards : its files, in order
+    labels : name -> (T,) object array of str; split : "train" or "test"; every : one frame in ``every`` was translated
+    pair : names of sensor and gel, after which some arrays are named"""
 
     name: str
     frames: int
@@ -52,8 +52,8 @@ class Recorded:
     pair: tuple[str, str] = PAIR
 
     def blocks(self, without: Collection[str] = ()) -> Iterator[dict[str, np.ndarray]]:
-        """Yield blocks of frames, arrays (n, ...) by name, called biotac and digit whatever the sensors are.
-        without : names to leave out"""
+        """Yield some frames at a time: array's name -> (n, ...), called after biotac and digit for any sensors.
+        without : names of arrays to leave out"""
         import h5py
 
         for path in self.shards:
@@ -63,7 +63,7 @@ class Recorded:
                     yield {name: data[start : start + BLOCK] for name, data in held.items() if name not in without}
 
     def picture(self, frame: int) -> np.ndarray:
-        """Return the picture (H, W, 3) uint8 of a translated frame, counted from 0, which the job must have kept."""
+        """Return the picture (H, W, 3) uint8 of a translated frame, counted from 0; the job must have kept pictures."""
         import h5py
 
         for path in self.shards:
@@ -74,11 +74,11 @@ class Recorded:
         raise IndexError(frame)
 
     def arrays(self) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
-        """Return (shape, dtype) of one frame's array by name, called biotac and digit as in `blocks`."""
+        """Return name -> (shape, dtype) of one frame's arrays, called after biotac and digit for any sensors."""
         return {self._plain(name): kind for name, kind in _kinds(self.shards[0]).items()}
 
     def stored(self, name: str) -> str:
-        """Return the name in the shards, ending in this pair's sensor, of an array called after biotac or digit."""
+        """Return the name in the shards, after this pair's sensors, of an array called after biotac or digit."""
         return named(name, self.pair)
 
     def _plain(self, name: str) -> str:
@@ -90,7 +90,7 @@ class Recorded:
 
 @dataclasses.dataclass(frozen=True)
 class Finished:
-    """A finished job; aside : recording or shard -> why it is missing; warnings : recording -> sentences"""
+    """A finished job. aside : recording or shard -> why it is missing; warnings : recording -> sentences"""
 
     folder: Path
     id: str
@@ -100,18 +100,18 @@ class Finished:
 
     @property
     def frames(self) -> int:
-        """Number of frames of all recordings."""
+        """Return the number of translated frames of all recordings."""
         return sum(one.frames for one in self.recordings)
 
     def check_kept(self, array: str, word: str) -> None:
-        """Raise TactileError where the job did not keep an array, which ``--keep`` `word` keeps."""
+        """Raise TactileError if the job did not keep an array, which `word` of ``--keep`` keeps."""
         if array not in self.recordings[0].arrays():
             advice = f"Make the job with --keep {word}"
             raise TactileError(self.folder, f"holds no {array}", f"a job that kept {word}", advice)
 
 
 def load(folder: Path) -> Finished:
-    """Load the job of a folder. Raises TactileError where a shard is missing or differs from the job."""
+    """Return the finished job in a folder. Raises TactileError if a shard is missing, damaged or not the job's."""
     job = jobs.read(folder)
     if not isinstance(job.recipe, Translate):
         raise TactileError(folder, "a job of another verb", "one of `tactile batch`", "Give the verb's command again")
@@ -162,7 +162,7 @@ def _check(path: Path, job: Job[Translate], index: int, number: int, frames: int
 
 
 def _check_alike(paths: list[Path]) -> None:
-    """Raise TactileError where an array's frames differ in shape or type between shards."""
+    """Raise TactileError if an array's frames differ in shape or type between shards."""
     first: dict[str, str] = {}
     for path in paths:
         for name, found in _kinds(path).items():

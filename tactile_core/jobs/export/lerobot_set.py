@@ -1,9 +1,9 @@
-"""Common part of LeRobot's layouts 2.1 and 3.0: features, rows, statistics, and the pass over a job's recordings.
+"""Write what LeRobot's layouts 2.1 and 3.0 share: features, rows, statistics, and the pass over a job's recordings.
 
-One recording is one episode. LeRobot trains on what a robot sees, its state, and the action asked of it. A touch has no
-command, so the state is the contact on the DIGIT, and the action the next frame's state: a policy learns the touch to
-come. Time steps are even, as LeRobot requires; ``time`` is the recording's own clock. An unknown number is 0, as
-training on NaN ends in NaN; ``contact`` says whether a place is one."""
+One recording is one episode. LeRobot trains on what a robot sees, its state, and the action asked of it. A touch has
+no command, so the state is the contact on the DIGIT, and the action the next frame's state: a policy learns the touch
+to come. Time steps are even, as LeRobot requires; ``time`` is the recording's own clock. An unknown number is 0, as
+training on NaN ends in NaN; ``contact`` is 1 if there is a place."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ PLAIN = {
 
 
 class EpisodeStats:
-    """Collects an episode's rows: all numbers, and a histogram of the levels in each channel of its pictures."""
+    """Statistics of an episode's rows: of all numbers, and of the levels in each channel of its pictures."""
 
     def __init__(self) -> None:
         self._numbers: dict[str, list[np.ndarray]] = defaultdict(list)
@@ -54,7 +54,7 @@ class EpisodeStats:
         self._pictures = 0
 
     def add(self, rows: dict[str, np.ndarray]) -> None:
-        """Add rows, name -> column: numbers (n, ...), pictures (n, H, W, 3) uint8, or words (no statistics)."""
+        """Add rows, feature -> column: numbers (n, ...), pictures (n, H, W, 3) uint8, or words (no statistics)."""
         for name, values in rows.items():
             if values.dtype.kind in "fiu" and values.ndim < 4:
                 self._numbers[name].append(values.reshape(len(values), -1))
@@ -72,7 +72,7 @@ class EpisodeStats:
 
 
 def _of_numbers(values: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the statistics (k,) of values (n, k), by LeRobot's names."""
+    """Return the statistics (k,) of values (n, k), under LeRobot's names."""
     quantiles = np.quantile(values, list(QUANTILES.values()), axis=0)
     return {
         "min": values.min(axis=0), "max": values.max(axis=0), "mean": values.mean(axis=0, dtype=np.float64),
@@ -82,7 +82,7 @@ def _of_numbers(values: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
-    """Return the statistics of channels given as histograms `counts` (3, LEVELS) of pixels; pictures : their number"""
+    """Return the statistics (3, 1, 1) of pixels, given as histograms counts (3, LEVELS); pictures : their number"""
     levels, shares = np.linspace(0, 1, LEVELS), counts / counts.sum(axis=1, keepdims=True)
     mean = shares @ levels
     below = np.cumsum(counts, axis=1) / counts.sum(axis=1, keepdims=True)
@@ -94,7 +94,7 @@ def _of_levels(counts: np.ndarray, pictures: int) -> dict[str, np.ndarray]:
 
 
 def aggregate(episodes: list[Stats]) -> Stats:
-    """Join the episodes' statistics to those of all together; quantiles are the episodes' means, as in LeRobot."""
+    """Return the statistics of all episodes together; quantiles are the means of the episodes', as in LeRobot."""
     return {name: _together([episode[name] for episode in episodes]) for name in episodes[0]}
 
 
@@ -109,30 +109,30 @@ def _together(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def listed(stats: Stats) -> dict[str, dict[str, Any]]:
-    """Return the statistics of features, by feature and statistic, with lists in place of arrays, for JSON."""
+    """Return statistics, feature -> name -> value, with lists in place of arrays, for JSON."""
     return {name: {key: value.tolist() for key, value in one.items()} for name, one in stats.items()}
 
 
 class Layout(Protocol):
-    """Writer of the files of one version of LeRobot's layout, called for each episode by ``write_set``.
-    version : as info.json names it; picture : pictures are in the rows (image), or in a file each episode (video)"""
+    """Writer of the files of one version of LeRobot's layout, which ``write_set`` calls for each episode.
+    version : as info.json names it; picture : "image" if pictures are in the rows, "video" for a file per episode"""
 
     version: str
     picture: Literal["image", "video"]
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows, name -> column, of an episode (its number). features : name -> dtype and shape; rate : Hz"""
+        """Add rows, feature -> column, of an episode (its number). features : name -> dtype and shape; rate : Hz"""
 
     def end_episode(self) -> dict[str, Any]:
-        """Close an episode's files; returns chunk and file that hold it, for the list of episodes."""
+        """Close an episode's files; return which chunk and file hold it, for the list of episodes."""
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Close all files and write the lists of episodes and stats; returns the layout's entries of info.json."""
+        """Close all files and write the lists of episodes and statistics; return the layout's entries of info.json."""
 
 
 def write_set(source: Finished, folder: Path, progress: Callable[[int, int], None], layout: Layout) -> None:
-    """Write all recordings, with progress (frames done, in all); needs pyarrow of the extra [batch]. Raises
-    TactileError where numpy does not fit pyarrow, and for recordings of different rates."""
+    """Write all recordings in a layout; progress : called with (frames done, in all). Needs pyarrow (extra [batch]).
+    Raises TactileError for a numpy that does not fit pyarrow, and for recordings of different rates."""
     try:
         import pyarrow  # noqa: F401
     except ModuleNotFoundError:
@@ -164,7 +164,7 @@ def write_set(source: Finished, folder: Path, progress: Callable[[int, int], Non
 
 
 def _splits(source: Finished) -> dict[str, str]:
-    """Return each part's episodes, which lie together, as info.json has them."""
+    """Return, for info.json, each part's range of episodes, such as {"train": "0:8"}."""
     first = 0
     found: dict[str, str] = {}
     for name, same in groupby(source.recordings, lambda one: one.split):
@@ -175,7 +175,7 @@ def _splits(source: Finished) -> dict[str, str]:
 
 
 def _features(source: Finished, picture: Literal["image", "video"], rate: int) -> Features:
-    """Describe the columns of a frame; rate : frames per second"""
+    """Return the columns of a frame, name -> dtype, shape and names. rate : frames per second"""
     arrays = source.recordings[0].arrays()
     shapes = {name: list(shape) or [1] for name, (shape, _) in arrays.items()} | {"contact": [1]}
     found: Features = {}
@@ -201,7 +201,7 @@ def _about_video(shape: list[int], rate: int) -> dict[str, Any]:
 
 
 def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int) -> Iterator[Rows]:
-    """Yield columns of some rows of an episode. start : its first row in the data set; rate : frames per second"""
+    """Yield some rows of an episode at a time, feature -> column. start : its first row in the data set; rate : Hz"""
     for block, following in _followed(one):
         frame = block["frame"].astype(np.int64) // one.every
         own = {f"observation.{name}": block[name] for name in (*NUMBERS, "state") if name in block} | {
@@ -222,7 +222,7 @@ def _rows(one: Recorded, episode: int, start: int, features: Features, rate: int
 
 
 def _followed(one: Recorded) -> Iterator[tuple[Rows, np.ndarray]]:
-    """Yield blocks of frames with their states and the state (1, k) after each block; the last state follows itself."""
+    """Yield pairs: some frames with their states, and the state (1, k) that follows; the last state follows itself."""
     held: Rows = {}
     for block in one.blocks():
         block["contact"] = np.isfinite(block["contact_center"]).all(axis=1)
@@ -239,7 +239,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 
 def _one_rate(source: Finished) -> int:
-    """Return the recordings' common rate, whole frames per second. TactileError for different ones, or below 1."""
+    """Return the recordings' rate, whole frames per second. Raises TactileError for different ones, or below 1."""
     first = _rate(source.recordings[0])
     for one in source.recordings:
         rate = _rate(one)
@@ -251,14 +251,14 @@ def _one_rate(source: Finished) -> int:
 
 
 def _rate(one: Recorded) -> float:
-    """Hz, over the first frames; the nominal rate for a single one."""
+    """Return a recording's frames per second, by its first frames; the nominal rate for a single frame."""
     steps = np.diff(next(one.blocks())["time"])
     steps = steps[steps > 0]
     return float(1 / np.median(steps)) if len(steps) else SAMPLE_RATE
 
 
 def table(rows: dict[str, Any], features: Features) -> pa.Table:
-    """Return rows, name -> column, without videos, as Arrow's table; features : name -> dtype, shape: its metadata."""
+    """Return rows, feature -> column, as an Arrow table without videos; features : name -> dtype and shape"""
     import pyarrow as pa
 
     fields: list[Any] = []

@@ -1,5 +1,5 @@
-"""``<recording>/%06d.exr``: float32, numbered by the frame's index in the recording; of ``height``, m, and ``R``,
-``G``, ``B``, grey levels 0..255, what the job kept. Needs OpenEXR, of the extra [render]."""
+"""Write ``<recording>/%06d.exr``, numbered by the frame's index in the recording: float32 channels ``height``, m, and
+``R``, ``G``, ``B``, grey levels 0..255, if the job kept them. Needs OpenEXR, of the extra [render]."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ BRIEF = "a folder of OpenEXR files a recording: heights, pictures"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one folder per recording: see `formats`. TactileError for a job that kept neither heights nor pictures."""
+    """Write a folder for each recording. Raises TactileError for a job that kept neither heights nor pictures."""
     if not {"height_map", "image"} & set(source.recordings[0].arrays()):
         found, advice = "holds neither heights nor pictures", "Make the job with --keep height or image"
         raise TactileError(source.folder, found, "a job that kept one of them", advice)
@@ -32,7 +32,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _channels(block: dict[str, np.ndarray], row: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield name and (H, W) values of each channel of frame `row` in block, arrays height_map, image by name."""
+    """Yield (name, (H, W) values) of the channels of frame number `row` in a block, array's name -> (n, ...)."""
     if "height_map" in block:
         yield "height", block["height_map"][row]
     if "image" in block:

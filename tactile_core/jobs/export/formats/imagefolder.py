@@ -1,4 +1,4 @@
-"""``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``: pictures as Hugging Face's ``datasets`` loads them.
+"""Write ``<split>/<recording>/%06d.png`` and ``<split>/metadata.csv``, as Hugging Face's ``datasets`` loads pictures.
 Each row of metadata.csv is a picture: file, recording, frame, time, labels, and numbers of the contact."""
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ NUMBERS: dict[str, tuple[str, int | None]] = {
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write all pictures, see `formats`."""
+    """Write all pictures and the tables. Raises TactileError for a job that kept no pictures."""
     source.check_kept("image", "image")
     labels = sorted({name for one in source.recordings for name in one.labels})
     head, done = ["file_name", "recording", "frame", *labels, *NUMBERS, "flags"], 0
@@ -46,7 +46,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[Any]]]:
-    """Write the pictures of a recording; yields the rows of some frames at a time. labels : names of their columns"""
+    """Write a recording's pictures; yield rows of the table, some frames at a time. labels : their columns' names"""
     for block in one.blocks():
         rows = []
         for row, frame in enumerate(map(int, block["frame"])):
@@ -61,6 +61,6 @@ def _rows(one: Recorded, labels: list[str], folder: Path) -> Iterator[list[list[
 
 
 def _number(value: Any, part: int | None) -> str:
-    """Format a value, or its number `part` (None: it has none), with six digits; empty for an unknown one."""
+    """Return a value, or its number `part` unless that is None, with six digits; "" for NaN."""
     number = float(value if part is None else value[part])
     return f"{number:.6g}" if np.isfinite(number) else ""

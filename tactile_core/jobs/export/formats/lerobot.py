@@ -1,4 +1,4 @@
-"""LeRobot's dataset layout v3.0: rows in Parquet, many episodes per file, pictures inside as PNG; see ``lerobot_set``.
+"""Write LeRobot's dataset layout v3.0: rows in Parquet, many episodes per file, pictures inside as PNG.
 meta/info.json, meta/stats.json, meta/tasks.parquet, meta/episodes/chunk-000/file-000.parquet,
 data/chunk-CCC/file-FFF.parquet"""
 
@@ -21,12 +21,12 @@ FILE_MB = 100  # a data file is closed at the end of the episode that takes it b
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write the data set, see `formats`."""
+    """Write the data set. Raises TactileError for recordings of different rates, or a numpy unfit for pyarrow."""
     write_set(source, folder, progress, _Together(folder))
 
 
 class _Together:
-    """Data files of many episodes each."""
+    """Writer of data files of many episodes each."""
 
     version = "v3.0"
     picture: Literal["image", "video"] = "image"
@@ -36,7 +36,7 @@ class _Together:
         self._writer: Any = None
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows to the file that is open."""
+        """Add rows, feature -> column, of an episode to the open file. features : name -> dtype and shape; rate : Hz"""
         import pyarrow.parquet as pq
 
         columns: dict[str, Any] = dict(rows)
@@ -50,7 +50,7 @@ class _Together:
         self._writer.write_table(added)
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the file if it has become large; returns chunk_index and file_index of the episode's data and meta."""
+        """Close the file if it has become large; return chunk_index and file_index of the episode's data and meta."""
         place = {f"data/{name}": number for name, number in self._place().items()}
         if self._path.stat().st_size > FILE_MB * 1e6:
             self._close()
@@ -58,7 +58,7 @@ class _Together:
         return place | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Write the lists of episodes, with their statistics, and of tasks; returns entries of info.json."""
+        """Write the lists of episodes, with statistics, and of tasks; return this layout's entries of info.json."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -82,7 +82,7 @@ class _Together:
 
 
 def _write_tasks(path: Path) -> None:
-    """Write the single task; LeRobot looks it up by the index of this table, as pandas writes it."""
+    """Write the list of tasks, a single one; LeRobot finds it by the table's index, as pandas writes it."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

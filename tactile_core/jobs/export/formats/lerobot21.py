@@ -27,12 +27,12 @@ VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write the data set, see `formats`. Raises TactileError where OpenCV cannot write the video."""
+    """Write the data set. Raises TactileError for recordings of different rates, and if OpenCV cannot write videos."""
     lerobot_set.write_set(source, folder, progress, _Apart(folder))
 
 
 class _Apart:
-    """A data file and a video per episode."""
+    """Writer of a data file and a video for each episode."""
 
     version = "v2.1"
     picture: Literal["image", "video"] = "video"
@@ -43,7 +43,7 @@ class _Apart:
         self._video: Any = None
 
     def write(self, episode: int, rows: Rows, features: Features, rate: int) -> None:
-        """Add rows to the episode's files."""
+        """Add rows, feature -> column, to the episode's files. features : name -> dtype and shape; rate : Hz"""
         import pyarrow.parquet as pq
 
         added = lerobot_set.table(rows, features)
@@ -57,7 +57,7 @@ class _Apart:
                 self._video.write(picture[..., ::-1].copy())  # OpenCV has blue first
 
     def end_episode(self) -> dict[str, Any]:
-        """Close the episode's files; returns {}: its place follows from its number."""
+        """Close the episode's files; return {}, as its place follows from its number."""
         self._data.close()
         if self._video is not None:
             self._video.release()
@@ -65,7 +65,7 @@ class _Apart:
         return {}
 
     def finish(self, episodes: list[dict[str, Any]], stats: list[Stats]) -> dict[str, Any]:
-        """Write the lists of episodes, statistics and tasks, and GR00T's own files; returns entries of info.json."""
+        """Write the lists of episodes, statistics and tasks, and GR00T's files; return entries of info.json."""
         meta, drawn = self._folder / "meta", PICTURE in stats[0]
         whole = lerobot_set.listed(lerobot_set.aggregate(stats))
         _write_lines(meta / "episodes.jsonl", episodes)
@@ -100,7 +100,7 @@ def _write_lines(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def _modality(drawn: bool) -> dict[str, Any]:
-    """Return the meaning of the state's and action's numbers, and, if drawn, of the picture, as GR00T requires."""
+    """Return, as GR00T requires, what the numbers of state and action mean, and, if `drawn`, the picture."""
     ends = list(itertools.accumulate(len(parts) for parts in CONTACT.values()))
     spans = {name: {"start": end - len(CONTACT[name]), "end": end} for name, end in zip(CONTACT, ends, strict=True)}
     found: dict[str, Any] = {

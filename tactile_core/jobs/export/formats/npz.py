@@ -1,4 +1,4 @@
-"""``<recording>.npz``: all arrays of a recording, as NumPy reads them; labels as ``labels/<name>``."""
+"""Write ``<recording>.npz``: all arrays of a recording, as NumPy reads them; labels as ``labels/<name>``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TIME = (1980, 1, 1, 0, 0, 0)  # of the files inside: the same job gives the same
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one file per recording, see `formats`."""
+    """Write a file for each recording."""
     done = 0
     for one in source.recordings:
         with zipfile.ZipFile(folder / f"{one.name}.npz", "w", zipfile.ZIP_STORED) as archive:
@@ -29,7 +29,7 @@ def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) 
 
 
 def _write(archive: zipfile.ZipFile, one: Recorded, name: str, shape: tuple[int, ...], kind: np.dtype) -> None:
-    """Write an array, named, of any length: its header (shape, kind) first, then its rows, some at a time."""
+    """Write the array `name` of any length: its header (shape, kind) first, then its rows, some at a time."""
     header = {"descr": np.lib.format.dtype_to_descr(kind), "fortran_order": False, "shape": shape}
     with archive.open(zipfile.ZipInfo(f"{one.stored(name)}.npy", TIME), "w", force_zip64=True) as out:
         np.lib.format.write_array_header_2_0(out, header)

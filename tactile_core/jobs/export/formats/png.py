@@ -1,4 +1,4 @@
-"""``<recording>/%06d.png``: the pictures, numbered by the frame's index in the recording."""
+"""Write ``<recording>/%06d.png``: the pictures, numbered by the frame's index in the recording."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ BRIEF = "a folder of PNG pictures a recording"
 
 
 def write(source: Finished, folder: Path, progress: Callable[[int, int], None]) -> None:
-    """Write one folder per recording, see `formats`."""
+    """Write a folder for each recording. Raises TactileError for a job that kept no pictures."""
     source.check_kept("image", "image")
     done = 0
     for one in source.recordings:
