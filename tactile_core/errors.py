@@ -17,7 +17,7 @@ class TactileError(Exception):
     found : what is there
     expected : what should be there
     advice : what the user can do, an imperative sentence
-    second : s from a recording's start, the moment at which it is wrong; None for any other error"""
+    second : s from the start of a recording, if the error is of one moment in it; else None"""
 
     second: float | None = None  # of a recording, where the error is of a moment in it
 

@@ -52,9 +52,9 @@ class Surface(NamedTuple):
 class Lit(NamedTuple):
     """Light of L LEDs on a surface without shadows, float32.
     near : (H, W), s of ``Surface``; tilt, length : (H, W), third component and length of the normal given there
-    facing : (L, H, W) m, cosine of incidence times distance from the LED times ``length``
-    square : (L, H, W) m2, of that distance; light : (L, H, W), over that on a coating at the origin that faces the
-        LED"""
+    facing : (L, H, W) m, cosine of incidence times distance from the LED times ``length``; square : (L, H, W) m2, of
+        that distance
+    light : (L, H, W), relative to that on a coating at the origin that faces the LED"""
 
     near: np.ndarray
     tilt: np.ndarray
@@ -100,8 +100,8 @@ def lambert(surface: Surface, positions: np.ndarray) -> Lit:
 
 
 def falling(facing: np.ndarray, square: np.ndarray, length: np.ndarray, strength: np.float32) -> np.ndarray:
-    """Return one LED's light (H, W), strength facing / (length square^1.5), from these fields of ``Lit``; strength :
-    m2, its squared distance from the origin"""
+    """Return one LED's light (H, W), strength facing / (length square^1.5).
+    facing, square, length : (H, W), fields of ``Lit``; strength : m2, squared distance of the LED from the origin"""
     return facing / (square * np.sqrt(square) * length) * strength
 
 
@@ -120,7 +120,7 @@ class Lamps:
         self._positions = np.array([led.position for led in leds])
 
     def light(self, view: Perspective, height: np.ndarray) -> np.ndarray:
-        """Return the light (L, H, W) float32 of ``Lit`` in soft shadows; height : (H, W) m, gel that ``view`` sees"""
+        """Return `Lit.light` (L, H, W) float32 in soft shadows, of the gel that ``view`` sees at height (H, W) m."""
         surface = Surface.in_perspective(view, height)
         lit, mapped = lambert(surface, self._positions), None
         for k, caster in enumerate(self._casters):

@@ -171,10 +171,10 @@ class Renderer:
         self, radiance: np.ndarray, noise: np.random.Generator | None = None, marks: np.ndarray | None = None
     ) -> np.ndarray:
         """Return the picture (H, W, 3) uint8: background + response (radiance - radiance at rest), times dots' share.
-        radiance : (H, W, LED) levels, of ``radiance``. The change passes the camera's toe and shoulder
+        radiance : (H, W, LED) levels, from method ``radiance``. Its change passes the camera's curve
             (``camera_curve``).
         noise : generator of the camera's noise, as strong as measured on the unit; None adds none
-        marks : (H, W) of ``marks``. Raises TactileError if they are missing for a unit with dots."""
+        marks : (H, W), from method ``marks``. Raises TactileError if they are missing for a unit with dots."""
         radiance = numbers(radiance, "radiance")
         if (other := radiance.shape != self.rest_radiance.shape) or not np.isfinite(radiance).all():
             found = f"shape {radiance.shape}" if other else "values that are not finite"
@@ -270,8 +270,8 @@ def check_reach(height: np.ndarray, unit: Calibration, name: str) -> None:
 
 @Loop
 def _fill_levels(radiance, rest, response, background, ends, largest, picture):  # noqa: ANN001, ANN202
-    """Fill ``picture`` (H, 3 W) uint8 in place: background (H, 3 W) + response (3, L, H, W) times (radiance - rest),
-    both (L, H, W), the change bent by the camera's curve. ends : (4, H, 3 W), of the curve; largest : grey level"""
+    """Fill ``picture`` (H, 3 W) uint8 in place: background (H, 3 W), plus response (3, L, H, W) times (radiance - rest)
+    (L, H, W), bent by the camera's curve. ends : (4, H, 3 W), the curve's; largest : grey level"""
     leds, height, width = radiance.shape
     lowest, one, line = np.float32(0), np.float32(1), np.empty(3 * width, np.float32)
     change, level = np.empty((leds, width), np.float32), np.empty(width, np.float32)

@@ -144,7 +144,7 @@ def signal_statistics(model: Model, contacts: Contacts, seed: int) -> dict[str, 
 def pressure_of_rectified(contacts: Contacts, seed: int) -> np.ndarray:
     """Return the fluid's pressure, (1,) Pa, per count of the sum of rectified changes: the median over training
     contacts above PRESSURE_FROM. On sample 7 of the slides (docs/sources.md) this law of one number does better than
-    networks, large and small (docs/train.md). seed : of the noise"""
+    networks, large and small (docs/train.md). seed : number that seeds noise"""
     rows = contacts.split.train
     rows = rows[contacts.pairs.pressure[rows] > PRESSURE_FROM]
     signal = contacts.read(rows, np.random.default_rng([seed, 7]), rectified=1.0)

@@ -228,8 +228,8 @@ def _state_and_latent(module: ContactPosterior, latent_signal: Tensor) -> Tensor
 
 
 def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
-    """Return rows of the median errors of place and force on held-out presses; the baseline is to answer always with
-    the training presses' median. when : for the rows' set, "before" or "after" the fine-tuning"""
+    """Return rows of the median errors of place and force on held-out presses; the baseline always answers with the
+    training presses' median. when : word in the rows' set, "before" or "after" the fine-tuning"""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
     latent = nets.encode_signal(data.change[test], data.rectified)

@@ -198,8 +198,7 @@ def length(vectors: Tensor) -> Tensor:
 
 
 def error_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Return the mean absolute error of ``Model.expected_error``'s logarithms, which makes it learn the median
-    error."""
+    """Return the mean absolute error of ``Model.expected_error``'s logarithms; by it the network learns the median."""
     with torch.no_grad():
         biotac, digit = model.from_signal(batch.signal)
         answers = (model.MVB, biotac), (model.MVD, digit)

@@ -138,7 +138,8 @@ class SurfaceCodec:
         return torch.cat([self.modes[at], place], -1) * touching(rows)
 
     def cells(self, place: Tensor) -> tuple[Tensor, Tensor]:
-        """Round place (B, 2) to cells (B, 2); also return remainders (B, 2), with gradients: `ContactFrame.cells`."""
+        """Round place (B, 2) to cells (B, 2), see `ContactFrame.cells`, and remainders (B, 2), which carry
+        gradients."""
         middle = torch.tensor([self.frame.rows - 1.0, self.frame.columns - 1.0], device=place.device) / 2
         at = place * PLACE_UNIT + middle
         cell = torch.round(torch.minimum(at.detach().clamp(min=0.0), 2 * middle))

@@ -118,8 +118,8 @@ WORSE = 0.8  # error over that of zero displacement, above which weights hardly 
 
 
 def pair_of(card: dict[str, Any], where: str | os.PathLike) -> tuple[str, str]:
-    """Return the sensor that is read and the gel that is translated to. Raises TactileError for a card of no such
-    pair."""
+    """Return the sensor that is read and the gel that is translated to. Raises TactileError if the card has no such
+    two."""
     return descriptor.pair_of(card, where, "networks", "") or PAIR
 
 
@@ -151,7 +151,7 @@ def doubt(card: Mapping[str, Any]) -> str:
 
 
 def silent_level(silence: dict[str, list[float]], quantity: str) -> float:
-    """Return what 99 % of translated frames of noise stay below, by a card's silence; quantity : biotac_m, digit_m,
+    """Return what 99 % of translated frames of noise stay below; silence : the card's; quantity : biotac_m, digit_m,
     force_N"""
     return float(np.interp(0.99, silence["levels"], silence[quantity]))
 

@@ -96,7 +96,7 @@ def track(evidence: Evidence, time: np.ndarray) -> np.ndarray:
 
 
 def needed(frames: np.ndarray, count: int) -> np.ndarray:
-    """Return the frames (n,), of `count` in all, whose evidence the states of rising ``frames`` (T,) depend on."""
+    """Return the frames (n,), of `count` in all, on whose evidence the states of rising ``frames`` (T,) depend."""
     blocks = np.unique(frames // BLOCK)
     return np.unique(np.concatenate([np.arange(*_span(int(block), count)) for block in blocks]))
 

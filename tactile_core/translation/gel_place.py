@@ -46,8 +46,8 @@ def contact_center(displacement: np.ndarray, rest: np.ndarray, silent: float) ->
 
 
 def elsewhere(posterior: Posterior, state: np.ndarray, frame: ContactFrame) -> np.ndarray:
-    """Return the share (T,) of the posterior in contacts at least ``APART`` m on the gel from those of state (T,
-    STATE)."""
+    """Return the share (T,) of the posterior in contacts over ``APART`` m from the contact of state (T, STATE) on the
+    gel."""
     place, others = state[:, :PLACE], posterior.mean[..., :PLACE]
     points = on_gel(frame, others.reshape(-1, PLACE)).reshape(*others.shape[:2], 2)
     far = accuracy.lengths(points - on_gel(frame, place)[:, None]) > APART

@@ -68,8 +68,8 @@ class Networks:
         return ContactFrame(sizes["rows"], sizes["columns"], sizes["half"], self.tensors[net]["turn"], sensor)
 
     def encode_signal(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Encode change (T, 19) counts, below 0 where a film thins unless rectified (T,) or one, as latent_signal (T,
-        K), the mean that SVB infers."""
+        """Return latent_signal (T, K), the mean that SVB infers from change (T, 19) counts, which is below 0 if a film
+        thins or, by rectified (T,) bool or one for all, has no sign."""
         return in_blocks(self._encode_signal, *self._signal(change, rectified), "encode_signal")
 
     def decode_signal(self, latent_signal: np.ndarray) -> np.ndarray:
@@ -78,11 +78,11 @@ class Networks:
         return in_blocks(lambda z: expand(self._decode_signal(z)), latent_signal, (size,), "decode_signal")
 
     def contact(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), rectified (T,) or one, to the state (T, STATE) of the most plausible contact."""
+        """Return the likeliest contact's state (T, STATE) by latent_signal (T, K); rectified : (T,) or one bool"""
         return self.posterior(latent_signal, rectified).likely
 
     def posterior(self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False) -> Posterior:
-        """Map latent_signal (T, K), rectified (T,) or one, to the posterior of the contact."""
+        """Return the contact's posterior by latent_signal (T, K); rectified : (T,) or one bool"""
         raw = self._either("posterior", latent_signal, rectified)
         count = self.sizes["S2MPN"]["components"]
         weight = raw[:, :count] - raw[:, :count].max(-1, keepdims=True)
@@ -91,8 +91,7 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Map latent_signal (T, K), rectified (T,) or one, and the state (T, STATE) of contacts to latent_source (T,
-        L)."""
+        """Return latent_source (T, L) by latent_signal (T, K), state (T, STATE); rectified : (T,) or one bool"""
         return self._either("code", np.concatenate([latent_signal, state], -1), rectified)
 
     def m2m(self, latent_source: np.ndarray) -> np.ndarray:
@@ -102,14 +101,15 @@ class Networks:
     def latents(
         self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), rectified (T,) or one, and state (T, STATE) to latent_source and latent_target."""
+        """Return latent_source, latent_target by latent_signal (T, K), state (T, STATE); rectified : (T,) or one
+        bool"""
         latent_source = self.given(latent_signal, state, rectified)
         return latent_source, self.to_target(state, latent_source)
 
     def likely_latents(
         self, latent_signal: np.ndarray, rectified: np.ndarray | bool = False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Map latent_signal (T, K), rectified (T,) or one, to latent_source, latent_target of the likeliest contact."""
+        """Return `latents` of the likeliest contact, by latent_signal (T, K); rectified : (T,) or one bool"""
         return self.latents(latent_signal, self.contact(latent_signal, rectified), rectified)
 
     def to_target(self, state: np.ndarray, latent_source: np.ndarray) -> np.ndarray:
@@ -127,7 +127,7 @@ class Networks:
         return self._map_placed("B2SPN", "MVB", latent_source)
 
     def expected_error(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return expected largest node errors (T, 2) m, BioTac and DIGIT, by change (T, 19), rectified (T,) or one."""
+        """Return expected largest node errors (T, 2) m, BioTac and DIGIT, by change (T, 19); rectified : (T,) or one"""
         return in_blocks(self._expected_error, *self._signal(change, rectified), "expected_error")
 
     def encode_source(self, displacement: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ class Networks:
         return in_blocks(self._pressure, *self._signal(change, rectified), "pressure")[:, 0]
 
     def signal_distance(self, change: np.ndarray, rectified: np.ndarray | bool = False) -> SignalDistance:
-        """Return each frame's `SignalDistance` from the training, by change (T, 19) counts, rectified (T,) or one."""
+        """Return each frame's `SignalDistance` from the training, by change (T, 19); rectified : (T,) or one bool"""
         distances = in_blocks(self._distance, *self._signal(change, rectified), "signal_distance")
         return SignalDistance(*np.ascontiguousarray(distances.T))
 

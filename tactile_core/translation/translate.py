@@ -73,14 +73,14 @@ def pass_over(translator: Translator, signals: Signals, time: np.ndarray) -> Rec
 
 class PreparedRows:
     """Prepared frames of a recording in memory; of a long one only those that the requested frames depend on.
-    recording, signals : of these frames; rest and the like are the whole recording's; count : frames in that"""
+    recording, signals : these frames, prepared by the whole recording's rest; count : frames of the whole recording"""
 
     def __init__(
         self, recording: Recording, frames: np.ndarray, answer: Answer, options: PrepareOptions | None = None,
         unit: ElectrodeGains | None = None,
     ) -> None:  # fmt: skip
         """Prepare rising ``frames`` (T,) of a recording and, if `answer` tracks the contact, their neighbours.
-        options, unit : of the `Preparer`, which raises TactileError for a recording that it cannot prepare"""
+        options, unit : for `Preparer`, which raises TactileError for a recording that it cannot prepare"""
         rows, self.count = needed(frames, len(recording)) if answer.follows else frames, len(recording)
         if 2 * len(rows) > self.count:  # a copy would take more than it lets go
             self._rows, self.recording = np.arange(self.count), recording

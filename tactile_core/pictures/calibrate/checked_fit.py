@@ -180,8 +180,8 @@ def cross_validated(
     progress: Progress = lambda done, total: None,
 ) -> list[Evaluation]:
     """Evaluate each third of the presses by a calibration fitted to the others; return none for a single press.
-    ball_diameter : m; start : that fits begin with; quick : without Mitsuba; progress : called with (steps done, in
-        all)"""
+    ball_diameter : m; start : calibration to start fits from; quick : no Mitsuba; progress : called with (done, in
+    all)"""
     names = [press.name for press in photographs.presses]
     folds = min(FOLDS, len(names))
     tried = []

@@ -191,8 +191,8 @@ class _Search:
     def fit(
         self, free: np.ndarray, pictures: Callable[[Calibration], BallPictures] = FastPictures, steps: int = STEPS
     ) -> None:
-        """Go on with the search for the unit's numbers that are ``free`` (22,) bool, for ``steps`` at most; pictures :
-        class that draws them"""
+        """Go on with the search over the unit's numbers that are ``free`` (22,) bool, by at most ``steps``; pictures :
+        class that draws a unit's pictures"""
         numbers, balls = parameters_of(self._problem.unit(self._x)), self._problem.balls(self._x)
         self._problem, self._free = UnitResiduals(self.start, self._sights, self.radius, free, pictures), free
         self._minimise(np.concatenate([numbers[free], balls.ravel()]), steps)

@@ -35,7 +35,7 @@ class Press:
         changes
     region : (H, W) bool, in which pictures are compared: near changes of picture from background, drift included
     flags : what is wrong with it, in words; empty for nothing
-    radius : m, of its ball; None for that of the whole set"""
+    radius : m, its ball's; None for the whole set's"""
 
     name: str
     picture: np.ndarray
@@ -214,8 +214,8 @@ def _pictures(path: Path) -> dict[str, np.ndarray]:
 
 
 def press_of(name: str, picture: np.ndarray, background: np.ndarray, radius: float | None = None) -> Press | None:
-    """Return the press in a photograph ``picture`` (H, W, 3) uint8; None if it shows none. name : of the press
-    background : (H, W, 3) levels, of the untouched gel; radius : m, of its ball, None for that of the whole set"""
+    """Return the press, called ``name``, in a photograph ``picture`` (H, W, 3) uint8; None if it shows none.
+    background : (H, W, 3) levels, the untouched gel; radius : m, the ball's, None for that of the whole set"""
     difference = picture.astype(np.float32) - background
     drift = lighting_drift(difference)
     change = difference - drift

@@ -92,8 +92,8 @@ class Sight:
         return common if self._radius is None else self._radius
 
     def guesses(self, bench: BallPictures, radius: float) -> list[tuple[float, float]]:
-        """Return two starts (right, down) m for a ball of a radius, m: the change's centre of mass, and where its mean
-        over the width of a print is largest. bench : gives the places of the reduced pixels"""
+        """Return two starts (right, down) m for a ball of a radius, m: the change's centre of mass, and the place where
+        its mean over a dent's width is largest. bench : gives the places of the reduced pixels"""
         weight = np.abs(self.change).max(-1) * self.region
         width = round(min(PRINT, 2 * radius) / bench.camera.pixel_size[0]) | 1
         largest = np.unravel_index(windowed(weight[..., None].astype(float), width)[..., 0].argmax(), weight.shape)
