@@ -72,7 +72,8 @@ def tracked() -> list[str]:
 
 
 def fetch(platform: str, python: str, folder: Path) -> list[Path]:
-    """Download the wheels for a Blender's platform and Python into a folder; return them. pip says what is missing."""
+    """Download the wheels for a platform and a Python into a folder; return their paths. Raises CalledProcessError
+    after pip has said what is missing."""
     command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary=:all:",
                "--implementation", "cp", "--python-version", python, "--dest", str(folder)]  # fmt: skip
     for name in PLATFORMS[platform]:
@@ -89,7 +90,7 @@ def requirements(python: str, platform: str) -> list[str]:
 
 
 def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool) -> str:
-    """Return the text of blender_manifest.toml with the platform, Blender versions and wheels of one zip added.
+    """Return the text of blender_manifest.toml, with platform, Blender's versions and wheels of one zip filled in.
     platform : None for a zip without wheels; debian : true for a distribution's Blender, of any version"""
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     if platform is None:
@@ -103,7 +104,7 @@ def manifest(platform: str | None, python: str, wheels: list[Path], debian: bool
 
 
 def build(out: Path, platform: str | None, python: str, wheels: list[Path], debian: bool = False) -> Path:
-    """Write the zip into the folder ``out`` as one piece; return its path. Other arguments as for ``manifest``"""
+    """Write the zip into the folder ``out`` and return its path. platform, python, wheels, debian : of ``manifest``"""
     text = manifest(platform, python, wheels, debian)
     version = re.search(r'(?m)^version = "(.+)"$', text).group(1)
     tag = f"-{platform}-py{python}{'-debian' * debian}" if platform else ""

@@ -1,11 +1,11 @@
-"""Check that LeRobot trains on what `tactile export` writes: its make_dataset, a step of policies, and lerobot-doctor.
+"""Check that LeRobot can load and train on what `tactile export` writes, and that lerobot-doctor passes it.
 
     python scripts/check_lerobot.py [--venv DIR]
 
 Installs LeRobot and lerobot-doctor in a virtual environment of their own (some GB, with torch; kept with --venv),
 exports the recording that ships in both of LeRobot's layouts, and runs there what a user of LeRobot would: the doctor
-on each, LeRobot's own conversion of v2.1 to v3.0, and a step of ACT and of a diffusion policy on both. Exits with 1
-where one of them fails. No part of .ci/run, as it fetches so much.
+on each, LeRobot's own conversion of v2.1 to v3.0, and a training step of ACT and of a diffusion policy on both. Exits
+with 1 if one of them fails. It is no part of .ci/run, as it fetches so much.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def check(folder: Path, venv: Path) -> int:
 
 
 def install(venv: Path) -> Path:
-    """Return the Python of the environment ``venv``, which is made, with PACKAGES, where it is missing."""
+    """Return the Python of the environment ``venv``; if it is missing, make it and install PACKAGES."""
     python = venv / ("Scripts" if sys.platform == "win32" else "bin") / "python"
     if not python.exists():
         call(sys.executable, "-m", "venv", venv)
@@ -65,7 +65,8 @@ def install(venv: Path) -> Path:
 
 
 def train(dataset: Path) -> None:
-    """Load a data set as LeRobot's training does by default, and take one step of each policy on the CPU."""
+    """Load a data set as LeRobot's training does, and take one step of each policy on the CPU; exit if a loss is not
+    finite."""
     import math
 
     import torch  # noqa: TID251  # LeRobot's own environment
@@ -96,7 +97,7 @@ def train(dataset: Path) -> None:
 
 
 def can_find(python: Path, module: str) -> bool:
-    """Return true if the environment of ``python`` has a module."""
+    """Return true if the Python at the path ``python`` can import a module."""
     tried = f"import importlib.util as u, sys; sys.exit(u.find_spec('{module}') is None)"
     return subprocess.call([str(python), "-c", tried], stderr=subprocess.DEVNULL) == 0
 
@@ -108,7 +109,7 @@ def run(*command: object) -> int:
 
 
 def call(*command: object) -> None:
-    """Run a command; ends this script where the command fails."""
+    """Run a command; end this script if it fails."""
     if run(*command):
         raise SystemExit(1)
 

@@ -99,7 +99,7 @@ def check_python(version: tuple[int, int]) -> None:
 
 
 def run_demo(folder: Path) -> int:
-    """Convert the shipped recording into out/demo by the environment in ``folder``, name the files; return status."""
+    """Convert the shipped recording into out/demo in the environment ``folder``; print the files; return the status."""
     python = install(folder, extras=())
     out = ROOT / "out" / "demo"
     command = ["-m", "tactile_core", "convert", str(DEMO_RECORDING), "--out", str(out), "--overwrite"]
@@ -116,8 +116,8 @@ def run_demo(folder: Path) -> int:
 
 
 def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
-    """Run ruff and, whatever it finds, pytest, all tests on up to WORKERS processes of one thread; return the first
-    status that is not 0."""
+    """Run ruff, then pytest even if ruff fails; return the first status that is not 0, or 0. If all tests are to run,
+    they run in up to WORKERS processes of one thread."""
     extras = ("plain" if options.numpy else "dev", *(("train",) if options.train else ()))
     python = install(options.venv, extras, options.numpy)
     variables, workers = environment(), min(os.cpu_count() or 1, WORKERS)
@@ -129,8 +129,8 @@ def run_tests(options: argparse.Namespace, pytest_arguments: list[str]) -> int:
 
 
 def run_all(python: Path, commands: Iterable[list[str]], variables: dict[str, str]) -> int:
-    """Run commands, modules of Python's, each whatever the others report; return the first status that is not 0, or 0.
-    variables : the environment's"""
+    """Run commands, each a Python module and its arguments, even if one fails; return the first status that is not 0,
+    or 0. variables : environment variables"""
     failed = []
     for command in commands:
         say(" ".join(command))
@@ -194,8 +194,7 @@ def install(
     """Make the virtual environment ``folder`` hold the project with extras, or ``packages`` alone; return its Python.
 
     numpy : its version, None for that of constraints.txt
-    A stamp remembers what is installed, so that this costs nothing when nothing has changed. What an earlier call
-    installed beyond the extras asked for stays."""
+    A stamp file records what is installed, so that a second call costs nothing. Extras of earlier calls stay."""
     folder = Path(os.path.abspath(str(folder)))
     python = make_venv(folder)
     have = read_stamp(folder)
@@ -223,8 +222,8 @@ def install(
 
 
 def make_venv(folder: Path) -> Path:
-    """Make the environment ``folder``, or replace it when it is half made, moved, or of another Python; return its
-    Python. Raises SetupError where it holds something else, or cannot be made."""
+    """Make the environment ``folder``, or make it again if it is half made, moved, or of another Python; return its
+    Python. Raises SetupError if the folder holds something else, or if the environment cannot be made."""
     python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     if folder.is_file() or (folder.is_dir() and folder != ROOT / ".venv" and is_foreign(folder)):
         raise SetupError(f"{folder} holds something else. Name a new or an empty folder")
@@ -246,7 +245,7 @@ def make_venv(folder: Path) -> Path:
 
 
 def is_foreign(folder: Path) -> bool:
-    """Return true if a folder holds other files than a virtual environment's, which making one there would destroy."""
+    """Return true if a folder holds files but no virtual environment: making one there would destroy them."""
     return any(folder.iterdir()) and not (folder / "pyvenv.cfg").exists()
 
 
@@ -268,7 +267,7 @@ def why_unusable(python: Path, have: dict) -> str | None:
 
 
 def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None) -> bool:
-    """Install packages ``what`` by pip, which prints what it does; return false if it failed. numpy : of ``install``"""
+    """Install packages ``what`` by pip, which prints what it does; return true if it worked. numpy : of ``install``"""
     constraints = ROOT / "constraints.txt"
     if numpy:
         text = re.sub(r"(?m)^numpy==.*$", f"numpy=={numpy}", constraints.read_text(encoding="utf-8"))
@@ -280,10 +279,10 @@ def run_pip(python: Path, folder: Path, what: tuple[str, ...], numpy: str | None
 
 
 def environment() -> dict[str, str]:
-    """The caller's environment without what would lead Python or pip away from the virtual environment.
+    """Return the environment variables without those that would lead Python or pip away from the virtual environment.
 
-    Nor does PYTHONDONTWRITEBYTECODE stay, which containers set: the packages were installed uncompiled, and every
-    command of a test would compile them again, for five times the start of `tactile --version`.
+    PYTHONDONTWRITEBYTECODE, which containers set, is dropped too: packages are installed uncompiled, and each command
+    of a test would compile them again, so that `tactile --version` takes five times as long.
     """
     dropped = ("PYTHONHOME", "PYTHONPATH", "PIP_USER", "PYTHONDONTWRITEBYTECODE")
     kept = {key: value for key, value in os.environ.items() if key not in dropped}
@@ -305,7 +304,7 @@ def read_stamp(folder: Path) -> dict:
 
 
 def write_stamp(folder: Path, content: dict) -> None:
-    """Write what is installed in an environment, in place of what was written before, as one piece."""
+    """Write the record of what is installed in an environment, replacing the former one in one step."""
     fresh = folder / (STAMP + ".new")
     fresh.write_text(json.dumps(content, indent=1), encoding="utf-8")
     os.replace(str(fresh), str(folder / STAMP))

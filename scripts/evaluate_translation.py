@@ -1,7 +1,7 @@
-"""Judge the translation against the simulated truth and on recordings of a real BioTac, beside doing nothing.
+"""Judge the translation, on simulated contacts of known truth and on recordings of a real BioTac, beside baselines.
 
     python scripts/evaluate_translation.py --json FILE              on the test contacts that ship
-    python scripts/evaluate_translation.py --held-out FOLDER      and networks kept from some of it (again for more)
+    python scripts/evaluate_translation.py --held-out FOLDER      also networks that were trained without some of it
     python scripts/evaluate_translation.py --recordings DIR         on real recordings: slides (but sample 7 of each
                                                                     material) or grips; --quick: six slides
 
@@ -80,7 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]:
-    """Measure real recordings: grips of the PHAC set where the folder holds them, else slides."""
+    """Return rows on real recordings: on grips of the PHAC set if the folder holds some, else on slides."""
     folder = Path(options.recordings)
     if grips.find(folder):
         return grips.rows(folder, network, read_pairs(options.test_set))
@@ -89,7 +89,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
 
 
 def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
-    """Measure simulated contacts, and renew the model card if one is named. options : the command line's"""
+    """Return rows on simulated contacts, and renew the model card if the command line's options name one."""
     pairs, bodies = read_pairs(options.test_set), our_bodies()
     if options.quick:
         pairs = pairs.select_rows(np.flatnonzero(pairs.press % QUICK_PRESSES == 0))
@@ -108,7 +108,7 @@ def on_test_set(network: Translator, options: argparse.Namespace) -> list[Row]:
 
 
 def expected(rows: Sequence[Row]) -> list[str]:
-    """Return a Markdown table's lines: errors of contacts 0.1 to 0.3 mm deep and of deeper ones, beside baselines."""
+    """Return the lines of a Markdown table: errors of contacts 0.1 to 0.3 mm deep and deeper, beside baselines."""
     by_set = {(row["name"], part): row for row in rows for part in (SHALLOW, DEEP) if part in (row["set"] or "")}
     lines = [HEAD, "|---|---|---|---|---|"]
     for words, name, unit in EXPECTED:
@@ -122,8 +122,8 @@ def expected(rows: Sequence[Row]) -> list[str]:
 def renew_model_card(
     page: Path, rows: list[Row], translator: Translator, pairs: Pairs, apart: Sequence[Translator] = ()
 ) -> None:
-    """Renew the card ``page``: its tables, and CSV and picture beside it. rows : all that was measured; apart :
-    networks kept from what the rows of unseen sets measure. Raises ValueError for a page without the tables."""
+    """Renew the tables of the model card ``page``, and CSV and picture beside it. rows : all that was measured
+    apart : networks that rows of unseen sets are about. Raises ValueError for a page without the tables."""
     conditions = [f"| {what} | {words} |" for what, words in _conditions(translator.card, pairs, apart)]
     renew_tables(page, {HEAD: expected(rows), CONDITIONS[0]: [*CONDITIONS, *conditions]})
     unseen = [each for each in rows if (each["set"] or "").startswith("unseen")]
@@ -133,7 +133,8 @@ def renew_model_card(
 
 
 def _conditions(card: dict, pairs: Pairs, apart: Sequence[Translator]) -> Iterator[tuple[str, str]]:
-    """Yield what the networks were trained on and measured with, in words."""
+    """Yield the cells of a table, name and text, on what the networks were trained on and measured with.
+    card : of the networks; apart : networks that were trained without something"""
     data, options = card["pairs"], card["options"]
     counts = ", ".join(f"{number} for {what}" for what, number in data["contacts"].items())
     total = sum(data["contacts"].values())
@@ -152,7 +153,7 @@ def _conditions(card: dict, pairs: Pairs, apart: Sequence[Translator]) -> Iterat
 
 
 def _cases(translator: Translator, pairs: Pairs) -> bytes:
-    """Draw a PNG: true, translated and difference of the gel's depth, for three contacts."""
+    """Return a PNG of the gel's true and translated depth and their difference, for the best, median, worst contact."""
     from matplotlib.figure import Figure
 
     nets, gel = translator.nets, sensors.digit_surface()

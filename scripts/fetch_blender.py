@@ -56,7 +56,7 @@ chroot {tree} /usr/bin/env --chdir="$PWD" LIBGL_ALWAYS_SOFTWARE=1 "$@"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Fetch Blender, run the tests in it, photograph it; return the tests' exit status, 2 where another step failed."""
+    """Fetch Blender, run the tests in it, take screenshots; return the tests' exit status, 2 if another step failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--suite", choices=("trixie", "sid"), default="trixie")
     parser.add_argument("--folder", type=Path, help="of the Debian tree (default: out/blender-SUITE)")
@@ -81,7 +81,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def fetch(tree: Path, suite: str) -> None:
-    """Make the Debian tree of a ``suite`` with Blender in the folder ``tree``, unless it is there."""
+    """Install a Debian ``suite`` with Blender into the folder ``tree``, unless it is there."""
     if (tree / "usr" / "bin" / "blender").exists():
         return
     tools = tree.parent / "debootstrap"
@@ -110,7 +110,7 @@ def wrapper(tree: Path) -> Path:
 
 
 def photograph(binary: Path) -> None:
-    """Photograph the window at each of ``STAGES``, out/screenshots/<stage>.png; binary : of ``wrapper``"""
+    """Save a screenshot of the window at each of ``STAGES``, out/screenshots/<stage>.png; binary : by ``wrapper``"""
     out = ROOT / "out" / "screenshots"
     out.mkdir(parents=True, exist_ok=True)
     ask = [str(binary), "-b", "--python-expr", "import sys; print('PY %d.%d' % sys.version_info[:2])"]

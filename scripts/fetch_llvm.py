@@ -40,7 +40,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def fetch_llvm(folder: Path) -> str:
-    """Return the path of libLLVM in `folder`, after unpacking it there if need be. Raises NoLlvm: there is none."""
+    """Return the path of libLLVM in `folder`; unpack it there if need be. Raises NoLlvm if apt has none."""
     found = library_in(folder)
     if found:
         return found
@@ -65,7 +65,7 @@ def fetch_llvm(folder: Path) -> str:
 
 
 def library_in(folder: Path) -> str:
-    """Return the path of libLLVM, not of a link to it, under a folder; "" for none."""
+    """Return the path of libLLVM under a folder, not of a link to it; "" if there is none."""
     files = [path for path in folder.glob("usr/lib/**/libLLVM.so*") if path.is_file() and not path.is_symlink()]
     files += [path for path in folder.glob("usr/lib/**/libLLVM-*.so.*") if path.is_file() and not path.is_symlink()]
     return str(files[0].resolve()) if files else ""

@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def agreed_version(root: Path) -> str:
-    """Return the version that all files of ``VERSIONS`` name. Raises ReleaseError where two differ."""
+    """Return the version that all files of ``VERSIONS`` name. Raises ReleaseError if two differ."""
     found = {}
     for name, pattern in VERSIONS.items():
         match = re.search(pattern, (root / name).read_text(encoding="utf-8"))
@@ -73,7 +73,7 @@ def agreed_version(root: Path) -> str:
 
 
 def check_clean(out: Path) -> None:
-    """Raise ReleaseError for changes that no commit holds, or a folder that holds another release."""
+    """Raise ReleaseError if the checkout has uncommitted changes, or if the folder ``out`` is not empty."""
     changed = run("git", "status", "--porcelain")
     if changed:
         raise ReleaseError(f"these changes are in no commit; commit or drop them first:\n{changed}")
@@ -82,7 +82,7 @@ def check_clean(out: Path) -> None:
 
 
 def build_packages(out: Path) -> Path:
-    """Build the sdist, and from it the wheel, stamped with the commit's time; returns the wheel."""
+    """Build the sdist, and from it the wheel, whose files get the commit's time; return the wheel's path."""
     with tempfile.TemporaryDirectory() as folder:
         python = new_environment(Path(folder), "build")
         os.environ["SOURCE_DATE_EPOCH"] = run("git", "log", "-1", "--format=%ct")
@@ -91,7 +91,7 @@ def build_packages(out: Path) -> Path:
 
 
 def try_wheel(wheel: Path, version: str) -> None:
-    """Install the wheel alone and convert the recording that it brings. ReleaseError unless it states ``version``."""
+    """Install the wheel alone and convert the recording in it. Raises ReleaseError unless it reports ``version``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         python = new_environment(folder / "venv", "--constraint", str(ROOT / "constraints.txt"), str(wheel))
@@ -105,7 +105,7 @@ def try_wheel(wheel: Path, version: str) -> None:
 
 
 def build_zips(out: Path) -> None:
-    """Build the extension's zip without wheels, and one per platform and Python."""
+    """Build the extension's zip without wheels, and one per platform and Python. Raises ReleaseError if one fails."""
     wanted = [["--no-wheels"]]
     wanted += [["--platform", one, "--python", python, *["--debian"] * debian] for one, python, debian in ZIPS]
     for options in wanted:

@@ -61,7 +61,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def measured(name: str, quick: bool) -> Iterator[Row]:
-    """Yield the rows of the check ``name``; an error in it becomes a last row, so that other checks go on."""
+    """Yield the rows of the check ``name``; if it raises an error, a last row says so, and other checks can go on."""
     try:
         yield from CHECKS[name][0](quick)
     except Exception:  # whatever it was, the other checks are still worth their rows
@@ -70,8 +70,8 @@ def measured(name: str, quick: bool) -> Iterator[Row]:
 
 
 def write(report: Path, parts: dict[str, list[Row]]) -> None:
-    """Renew the two tables of the page ``report``, and the rows as CSV beside it; parts : heading -> its rows. Raises
-    ValueError for a page without the tables."""
+    """Renew the two tables of the page ``report``, and the CSV of all rows beside it; parts : heading -> its rows.
+    Raises ValueError for a page without the tables."""
     rows = [row for part in parts.values() for row in part]
     checks = [*_CHECKS, *(_check(heading, part) for heading, part in parts.items())]
     renew_tables(report, {_TIERS[0]: _tier_table(rows), _CHECKS[0]: checks})
@@ -79,13 +79,13 @@ def write(report: Path, parts: dict[str, list[Row]]) -> None:
 
 
 def _check(heading: str, rows: list[Row]) -> str:
-    """Return a check's line: its rows, how many have a target, and which errors miss it."""
+    """Return a check's line of a Markdown table: how many rows it has, how many have a target, and which miss it."""
     missed = ", ".join(f"`{row['name']}` {short(row['value'])} {row['unit']}" for row in failed(rows))
     return f"| {heading} | {len(rows)} | {sum(row['ok'] is not None for row in rows)} | {missed} |"
 
 
 def _tier_table(rows: list[Row]) -> list[str]:
-    """Return the table of the tiers' time and errors at 0.6 mm; a cell is empty where nothing was measured."""
+    """Return the lines of a Markdown table of the tiers' times and errors at 0.6 mm; cells not measured are empty."""
     found = {row["name"]: row for row in rows}
 
     def number(name: str, unit: str, scale: float = 1.0, field: str = "value") -> str:

@@ -25,8 +25,7 @@ def can_show(thing: bpy.types.Object, style: str) -> bool:
 
 
 def get_ready(thing: bpy.types.Object) -> None:
-    """Let a sensor take any style, from the asset library too: keep its rest as an attribute, let Solid views show
-    the styles' colours."""
+    """Let a sensor take any style, also from the asset library: keep its rest, let Solid views show its colours."""
     thing.add_rest_position_attribute = True
     make_colour_active(thing.data)
 

@@ -173,8 +173,7 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
 
 
 def play(skin: bpy.types.Object, found: recording_data.Translated, frames: np.ndarray) -> str:
-    """Animate a skin and its electrodes by the recording ``found`` at frames (T,) of the scene; return a sentence on
-    what plays them."""
+    """Animate a skin and its electrodes by ``found`` at frames (T,) of the scene; return a sentence on how."""
     rows = unit_rows(found.signals) or [("unit", "nothing is known of it by this recording")]
     skin.tactile.known = "\n".join(f"{label}: {words}" for label, words in rows)
     if table_of(properties.sensor_name(skin)).is_file():

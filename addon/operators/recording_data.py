@@ -50,8 +50,7 @@ class Translated:
     gel: Motion
 
     def fits(self, motion: str) -> bool:
-        """Return true if the movements are where ``in_files`` wants them for a ``motion``: in memory, or in files that
-        still exist."""
+        """Return true if the movements are where ``in_files`` wants them: in memory, or in files that still exist."""
         files = [moved.file for moved in (self.skin, self.gel) if moved.file is not None]
         return bool(files) == in_files(motion, len(self.chosen)) and all(file.is_file() for file in files)
 

@@ -1,5 +1,4 @@
-"""Set the window so that what was imported can be seen: 3D views, the sidebar's tab, a place for the picture; and the
-scene's time."""
+"""Set the window to show what was imported: 3D views, sidebar's tab, place for the picture; and the scene's time."""
 
 from __future__ import annotations
 

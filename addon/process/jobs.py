@@ -61,8 +61,7 @@ class Job:
             self._process.stdin.flush()
 
     def poll(self, wait: float = 0.0) -> bool:
-        """Read the worker's messages, waiting up to ``wait`` s; return true once it has ended. Raises TactileError if
-        it failed."""
+        """Read messages for up to ``wait`` s; return true once the worker ended. Raises TactileError if it failed."""
         error = None
         for message in self._messages(wait):
             error = message.get("error", error)

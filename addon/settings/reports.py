@@ -65,8 +65,7 @@ class Refused(Exception):
 
 @contextmanager
 def reported(operator: bpy.types.Operator) -> Iterator[None]:
-    """Turn TactileError, a missing module and an error of a file or disk into the operator's error report and raise
-    ``Refused``."""
+    """Turn TactileError, missing modules, and errors of files or disks into an error report, then raise ``Refused``."""
     try:
         yield
     except TactileError as error:

@@ -60,8 +60,7 @@ def own_unit(data: Path) -> Photographs:
 
 
 def deeper(data: Path, known: Photographs) -> Photographs:
-    """Read two deeper presses, of another ball and day, from the folder ``data``; their background is that of ``known``
-    photographs."""
+    """Read two deeper presses, of another ball and day, from the folder ``data``; background : that of ``known``"""
     files = sorted((data / "digit_real" / "deeper").glob("*.png"))
     found = (press_of(file.name, read_photograph(file), known.background) for file in files)
     return dataclasses.replace(known, presses=tuple(press for press in found if press is not None))
@@ -74,8 +73,7 @@ def other_unit(data: Path) -> Photographs:
 
 
 def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
-    """Split photographs into ``count`` parts; for each part yield a fit to all other parts, begun at ``start``, and the
-    part."""
+    """Split photographs into ``count`` parts; for each yield a fit from ``start`` to all others, and the part."""
     names = [press.name for press in photographs.presses]
     for fold in range(count):
         apart = names[fold::count]

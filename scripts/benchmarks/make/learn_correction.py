@@ -316,8 +316,7 @@ def _errors(sensor: str, sample: Sample, factor: float, field: np.ndarray) -> li
 
 
 def _bins(depth: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
-    """Yield lower and upper end of each bin of depth (n,) (over the thickness) with enough contacts, and a mask (n,)
-    bool of these."""
+    """Yield the ends of each bin of depth (n,), over thickness, with enough contacts, and a mask (n,) of these."""
     for low, high in itertools.pairwise((0.0, *_BINS)):
         here = (depth > low) & (depth <= high)
         if here.sum() >= _LEAST:

@@ -137,8 +137,7 @@ def _true_place(nets: Networks, pairs: Pairs, part: slice) -> np.ndarray:
 
 
 def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return ``metrics`` of the likely, the mean and the solved answer to ``change`` (B, 19) counts, read from the
-    ``part`` of the pairs."""
+    """Return ``metrics`` of the likely, mean and solved answer to ``change`` (B, 19) counts of a ``part`` of pairs."""
     read = nets.encode_signal(change)
     posterior = nets.posterior(read)
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
