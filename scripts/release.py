@@ -1,4 +1,4 @@
-"""Build a release into a folder, try it where nothing else is installed, and print its hashes.
+"""Build a release into a folder, try it in an empty environment, and print its hashes.
 
     python3 scripts/release.py                 wheel, sdist and the extension's zips, in dist/
     python3 scripts/release.py --no-zips       wheel and sdist alone: two minutes

@@ -102,8 +102,7 @@ def triangles_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.t
 
 
 def stl_of(thing: bpy.types.Object, relative: np.ndarray, depsgraph: bpy.types.Depsgraph) -> bytes:
-    """Return the object's surface as a binary STL in mm, z out of the sensor.
-    relative : (3, 3), the object's axes by ``world_axes``"""
+    """Return the surface as a binary STL in mm, z out of the sensor. relative : (3, 3), axes by ``world_axes``"""
     corners = triangles_of(thing, relative, depsgraph) * np.float32(1e3 / thing.tactile.per_metre)
     record = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]))
     record["corners"] = corners
@@ -126,7 +125,8 @@ def world_axes(thing: bpy.types.Object, sensor: bpy.types.Object) -> np.ndarray:
 
 
 def place_of(thing: bpy.types.Object, sensor: bpy.types.Object, foot: np.ndarray) -> np.ndarray:
-    """Return the indenter's point that touches first, (3,) m in the sensor's frame. foot : (3,), of ``foot_of``"""
+    """Return the indenter's point that touches first, (3,) m in the sensor's frame.
+    foot : (3,), Blender units, from the indenter's origin to that point, by ``foot_of``"""
     origin = np.array((axes.from_world(sensor) @ thing.matrix_world).translation)
     return axes.to_sensor(origin + foot, sensor.tactile.per_metre)
 

@@ -31,10 +31,10 @@ def check_rest(*things: bpy.types.Object) -> None:
 
 
 def animate(thing: bpy.types.Object, moved: mesh_cache.Motion, frames: np.ndarray, motion: str) -> str:
-    """Let an object play a movement at the scene's frames (T,); returns words for the user on what plays it.
+    """Let an object play a movement at frames (T,) of the scene; return words for the user on what plays it.
 
-    motion : "SHAPE_KEYS" or "MESH_CACHE"; empty, as for the compact keys of older files, is "SHAPE_KEYS"
-    Raises TactileError where a mesh cache cannot be written.
+    motion : "SHAPE_KEYS" or "MESH_CACHE"; "", which older files have for compact keys, stands for "SHAPE_KEYS"
+    Raises TactileError if a mesh cache cannot be written.
     """
     about = thing.tactile
     about.motion = motion = motion or "SHAPE_KEYS"

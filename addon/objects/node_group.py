@@ -30,11 +30,11 @@ class Nodes:
         return next(s for s in self.add(kind, *links, **settings).outputs if s.enabled)
 
     def math(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a math node of an operation and return its output; links : sockets or values"""
+        """Add a math node for an ``operation`` and return its output; links : sockets or values of its inputs"""
         return self.output("ShaderNodeMath", *links, operation=operation)
 
     def vector(self, operation: str, *links: object) -> bpy.types.NodeSocket:
-        """Add a node of vector math, of an operation, and return its output; links : sockets or values"""
+        """Add a vector math node for an ``operation`` and return its output; links : sockets or values of its inputs"""
         return self.output("ShaderNodeVectorMath", *links, operation=operation)
 
 

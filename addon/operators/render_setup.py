@@ -70,7 +70,7 @@ class OnGel:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a gel."""
+        """Return true if there is a gel."""
         return properties.can(cls, lambda: properties.needed_gel(context.scene))
 
 

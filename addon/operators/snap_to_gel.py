@@ -67,7 +67,7 @@ class TACTILE_OT_snap_to_gel(TactileOperator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where an indenter has a gel to touch."""
+        """Return true if there is an indenter and a sensor for it to touch."""
         scene = context.scene
         if properties.of_role(scene, "INDENTER", context.object) is None:
             cls.poll_message_set("Add an indenter first")

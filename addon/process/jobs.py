@@ -51,7 +51,7 @@ class Job:
 
     @property
     def share(self) -> float:
-        """Share of the stage that is done, 0..1."""
+        """Share of the stage that is done, 0 to 1."""
         return self.done / self.total
 
     def tell(self, message: dict) -> None:

@@ -57,7 +57,7 @@ def _held() -> Iterator[tuple[bpy.types.bpy_struct, str, str]]:
 
 @persistent
 def _copy_beside(file: str, *_: object) -> None:
-    """Copy a .blend's files to where it is being saved, and make paths relative to there; Blender calls it before."""
+    """Copy a .blend's files to where it will be saved, make paths relative to there; Blender calls it before."""
     _named.clear()
     here, there = Path(bpy.data.filepath).parent if bpy.data.is_saved else None, Path(file).parent
     moves = file and not (here and there.exists() and here.samefile(there))

@@ -15,7 +15,7 @@ LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
 
 
 def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences | None:
-    """Return the extension's preferences; None where ``--addons`` has switched it on for one run alone."""
+    """Return the extension's preferences; None if the option ``--addons`` has switched it on for one run alone."""
     known = context.preferences.addons.get(ID)
     return None if known is None else known.preferences
 

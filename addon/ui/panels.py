@@ -146,7 +146,7 @@ class TACTILE_PT_parts(_Panel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return true where there is a DIGIT."""
+        """Return true if there is a gel."""
         return properties.gel_of(context.scene, context.object) is not None
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -69,7 +69,7 @@ def words_of(command: str, out: str) -> list[str]:
 
 
 def digests(folder: Path) -> dict[str, str]:
-    """Return path in the folder -> SHA-256 of all files under it, without notes and timings, which always differ."""
+    """Return path -> SHA-256 of every file under a folder, without notes and timings, which always differ."""
     files = (path for path in sorted(folder.rglob("*")) if path.is_file() and path.name not in HOLD_CLOCKS)
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
 

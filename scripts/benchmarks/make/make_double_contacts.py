@@ -32,7 +32,7 @@ STEPS = 4  # of the way in, for friction
 
 
 def drawn(random: np.random.Generator) -> list[tuple[Sphere, Placement, float]]:
-    """Draw two balls; return each ball, its place, and the force, N: the ball goes as deep as that takes it alone."""
+    """Draw two balls; return each one's shape, place, and the force, N, that would take it alone to its depth."""
     while True:
         places = random.uniform([-17e-3, -6e-3], [1e-3, 6e-3], (2, 2))
         forces = np.exp(random.uniform(*np.log(FORCES), 2))

@@ -90,7 +90,7 @@ def _coarsen(fine: pathlib.Path, out: pathlib.Path) -> None:
 
 
 def _numbers(text: str) -> range:
-    """Parse N or FROM:TO:STEP."""
+    """Return the range that a text, N or FROM:TO:STEP, names."""
     return range(*map(int, text.split(":")))
 
 

@@ -22,7 +22,7 @@ def block(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> HexMesh:
 
 
 def inside(mesh: HexMesh) -> np.ndarray:
-    """Mark (n,) bool the nodes of a block that do not lie on its sides."""
+    """Return a mask (n,) bool of a block's nodes that do not lie on its sides."""
     low, high = mesh.nodes.min(0), mesh.nodes.max(0)
     margin = 1e-6 * (high - low)
     return ((mesh.nodes > low + margin) & (mesh.nodes < high - margin)).all(1)

@@ -183,7 +183,7 @@ def rows(network: Translator, units: int = UNITS, presses: int = PRESSES) -> lis
 
 
 def unit_of(number: int) -> Unit:
-    """Draw a unit; number : the only seed."""
+    """Return a random unit; number : its own seed"""
     random = np.random.default_rng([SEED, number, 0])
     return Unit(*(float(np.exp(random.uniform(*np.log(each)))) for each in (FILMS, CONDUCTIVITIES, STIFFNESSES)))
 

@@ -141,7 +141,7 @@ def creeping(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarra
 
 
 def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-    """Add the mains' 50 Hz, seen at 100 Hz as a slow beat, to electrodes (T, 19). rest : unused"""
+    """Add mains hum of 50 Hz to electrodes (T, 19): sampled at 100 Hz, it shows as a slow beat. rest : not used"""
     return electrodes + 5 * np.sin(2 * np.pi * 50 * np.arange(len(electrodes)) / 100.3)[:, None]
 
 
@@ -237,8 +237,8 @@ def wrong(found: Translation, true: Translation) -> np.ndarray:
 
 
 def measured(recordings: list[Base]) -> list[Row]:
-    """Return rows of shares of frames, %: for each unbroken recording of guesses; for each fault of frames that are
-    wrong and confident, mean over recordings."""
+    """Return rows of shares of frames, %: guesses in each unbroken recording; for each fault, wrong and confident
+    frames, mean over recordings."""
     true = [base.translated(np.asarray(base.recording.electrodes, float)) for base in recordings]
     kept = [(base, found) for base, found in zip(recordings, true, strict=True) if found is not None]
     rows = []
