@@ -6,7 +6,7 @@
     python3 scripts/dev.py test tests/cli/test_cli.py -x    what is not known here goes to pytest
     python3 scripts/dev.py check                    check style and types (ruff, mypy)
     python3 scripts/dev.py docs                     build the pages and the API reference as a site in out/site/
-    python3 scripts/dev.py test-blender             the extension's tests in the bpy wheel (--bpy 5.0.1 for another)
+    python3 scripts/dev.py test-blender             the extension's tests in the bpy wheel (--bpy 4.2.0 for another)
     python3 scripts/dev.py test-blender --binary /usr/bin/blender    and in a real Blender, from the zip that users get
 
 The first two make `.venv` in the checkout and install the project there (editable, versions from constraints.txt).
