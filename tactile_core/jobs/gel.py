@@ -86,7 +86,7 @@ class Gel:
         return f"<Gel of a {self.sensor}, friction {self.friction:g}, preset {self.preset}, under {self.indenter!r}>"
 
     def reset(self) -> None:
-        """Remove the indenter: the next contact does not depend on earlier ones."""
+        """Remove the indenter; the next contact does not depend on earlier ones."""
         self._press: CorrectedPress | None = None
         self._work = Work()
         self._pose: Pose | None = None  # of the step before
@@ -104,7 +104,7 @@ class Gel:
         return self._step(*given(pose, force))
 
     def _step(self, here: Pose, force: float | None) -> GelContact:
-        """Do ``press`` to a checked pose and force."""
+        """Do the work of ``press`` for a checked pose and force, N."""
         flags: list[str] = []
         self._work.left = _WORK
         jumps = self._press is not None and self._contact.patch.any() and too_far(self._pose, here)
@@ -126,10 +126,10 @@ class Gel:
         return self._contact
 
     def follow(self, poses: Iterable[Any], forces: Iterable[float | None] | None = None) -> Iterator[GelContact]:
-        """Solve the contact at each of many poses and yield each; forces : N along +y or None, one per pose.
+        """Yield the contact at each of many poses. forces : N along +y or None, one for each pose
 
         For an invalid pose or force the contact before comes again, flagged ``refused``, and the reason is logged.
-        Raises TactileError where poses and forces differ in number, or are no series."""
+        Raises TactileError if poses and forces differ in number, or are no series."""
         if not (isinstance(poses, Iterable) and isinstance(forces, Iterable | None)):
             raise TactileError("Gel, follow", f"{poses!r:.80}, {forces!r:.80}", "a series of poses, forces or None")
         if forces is None:
@@ -142,7 +142,7 @@ class Gel:
             yield self._press_or_keep(pose, force)
 
     def _press_or_keep(self, pose: Any, force: float | None = None) -> GelContact:
-        """Return the contact at a pose, or the one before, flagged, for an invalid pose or force."""
+        """Return the contact at a pose and force, N; for an invalid one the last contact, flagged ``refused``."""
         try:
             asked = given(pose, force)
         except TactileError as error:
@@ -152,18 +152,18 @@ class Gel:
 
     @property
     def contact(self) -> GelContact:
-        """The last contact; an untouched one before the first step."""
+        """Return the last contact; an untouched one before the first step."""
         return self._contact
 
     @property
     def areas(self) -> np.ndarray:
-        """Area (n,) m2 of the resting surface that belongs to each node."""
+        """Return the area (n,) m2 of the resting surface that belongs to each node."""
         return node_areas(self.sensor)
 
     def height_map(self) -> np.ndarray:
-        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact, in which it
-        follows the indenter between its nodes, too. Where a hard slide folds the gel over itself a height is a guess.
-        Raises TactileError for the BioTac, and for a gel without a calibration."""
+        """Return the heights (H, W) float32, m, of the gel under the camera's pixels in the last contact; it follows
+        the indenter between its nodes, too. Where a hard slide folds it over itself a height is a guess. Raises
+        TactileError for the BioTac, and for a gel without a calibration."""
         if not sensors.is_gel(self.sensor):
             found = f"the {sensors.title(self.sensor)}, of which no picture can be drawn"
             raise TactileError("Gel, picture", found, "a Gel of a sensor with a camera, as the DIGIT")
@@ -182,14 +182,14 @@ class Gel:
 
     def touching(self, x: float, z: float, depth: float = 0.0) -> np.ndarray:
         """Return the pose (4, 4) of the indenter, its own z out of the sensor, ``depth`` m past first touch.
-        x, z : m, place of its origin in the sensor's frame. Raises TactileError where it misses the sensor."""
+        x, z : m, place of its origin in the sensor's frame. Raises TactileError if it misses the sensor."""
         x, z, depth = (finite_number(each, "Gel.touching", "x, z and depth in m", -1.0, 1.0) for each in (x, z, depth))
         axes = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # own x along the finger, own z to -y
         place = Pose(np.array([x, 0.0, z]), axes, PUSH)
         return matrix_of(first_touch_on_line(self.surface, self.indenter, place).moved(depth))
 
     def _touch_and_limit(self, pose: Pose) -> tuple[Pose, float]:
-        """Return the pose at first touch and the greatest depth, m; reused where the pose differs in depth alone."""
+        """Return the pose at first touch and the greatest depth, m; the last ones if a pose differs in depth alone."""
         if self._touch is None or not same_line(self._touch[0], pose):
             touch = first_touch_on_line(self.surface, self.indenter, pose)
             self._touch = touch, DEPTH_LIMIT * thickness_under(self.sensor, self.indenter, touch)
@@ -204,8 +204,8 @@ class Gel:
         return compliance_of(self.sensor)
 
     def _solved_at(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """Return ``_moved_to``'s contact or None; if it fails, that of an indenter that comes straight in.
-        force : N, None for the pose as it is; flags : words are added; began : true if there was no pose before"""
+        """Return the contact at a pose, or None; if none is solved, that of an indenter that comes straight in.
+        force : N, None for the pose as it is; flags : list, extended; began : true if there was no pose before"""
         path = self._press
         try:
             return self._moved_to(pose, force, flags, began=began)
@@ -223,8 +223,8 @@ class Gel:
         return found
 
     def _moved_to(self, pose: Pose, force: float | None, flags: list[str], *, began: bool) -> FastContact | None:
-        """Return the contact at a pose or force, N; None where nothing touches. Raises UnsolvedError.
-        flags : words are added; began : true if there was no pose before"""
+        """Return the contact at a pose or force, N; None if nothing touches. Raises UnsolvedError.
+        flags : list, extended; began : true if there was no pose before"""
         try:
             touch, limit = self._touch_and_limit(pose)
         except TactileError:  # it passes the sensor by
@@ -259,8 +259,8 @@ class Gel:
     def _at_force(
         self, press: CorrectedPress, touch: Pose, force: float, limit: float, flags: list[str]
     ) -> FastContact:
-        """Return the contact at force, N, from first touch or, if that is not reached, the nearest one found.
-        limit : m, greatest depth; flags : words on a miss are added"""
+        """Return the contact at force, N, searched from first touch, or the nearest one that was found.
+        limit : m, greatest depth; flags : list, extended if the force is missed"""
         bears, above = float(self._contact.force[1]), None
         if bears > _LARGEST_DROP * force:
             above = press.at_force(float(np.sqrt(bears * force)), touch, touches=True)

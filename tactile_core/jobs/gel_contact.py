@@ -1,5 +1,5 @@
-"""A contact of a ``Gel``, and the pose and force of a request. Poses come as simulators give them: 4 x 4 matrices, or a
-position and a quaternion."""
+"""Contacts of a ``Gel``, and the pose and force that are asked for. Poses come as simulators give them: 4 x 4 matrices,
+or a position and a quaternion."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ FLAGS = {
 class GelContact(Summary):
     """A contact of a ``Gel``, SI units, in the sensor's frame; n surface nodes.
 
-    force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the surface
+    force : (3,) N, exerted by the indenter; displacement : (n, 3) m of the nodes
     traction : (n, 3) Pa; its sum, weighted with the nodes' areas (n,) m2 (``Gel.areas``), is the force
-    patch : (n,) bool, the nodes that carry force; slipping : share of them at the limit of friction
+    patch : (n,) bool, true for nodes that carry force; slipping : share of these at the limit of friction
     depth : m, past first touch along +y; below zero the indenter stands in front of the sensor
     pressure : Pa, rise of the BioTac's fluid pressure; 0 for the DIGIT
-    pose : (4, 4) of the indenter, deeper than the given one where a force was asked for
-    flags : what is wrong with it, none for a sound contact: names such as "too deep", explained in ``FLAGS``"""
+    pose : (4, 4) of the indenter; if a force was asked for, where it bears that
+    flags : names of what is wrong with the contact, such as "too deep", explained in ``FLAGS``; () for a sound one"""
 
     force: np.ndarray
     displacement: np.ndarray
@@ -56,7 +56,7 @@ class GelContact(Summary):
 
     @classmethod
     def untouched(cls, count: int, pose: Pose) -> GelContact:
-        """Return the contact of an indenter, at a pose, that touches none of `count` surface nodes; its depth is 0."""
+        """Return the contact of an indenter at a pose that touches none of `count` surface nodes; its depth is 0."""
         none, patch = np.zeros((count, 3)), np.zeros(count, bool)
         return cls(np.zeros(3), none, none.copy(), patch, 0.0, 0.0, 0.0, matrix_of(pose))
 
@@ -70,8 +70,8 @@ def too_far(before: Pose | None, pose: Pose) -> bool:
 
 
 def given(pose: Any, force: float | None) -> tuple[Pose, float | None]:
-    """Return an indenter's pose and force, N, checked; force : None where none is asked for
-    pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z). TactileError for an invalid one or force."""
+    """Return an indenter's pose and force, N, or None, after checking them. force : N, None if none is asked for
+    pose : (4, 4) matrix, or (position (3,) m, quaternion (4,) w, x, y, z). Raises TactileError for invalid ones."""
     if force is not None:
         force = finite_number(force, "Gel, force", "newtons, zero or more, and finite", 0.0)
         if force > MOST_FORCE:

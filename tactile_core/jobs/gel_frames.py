@@ -1,4 +1,4 @@
-"""Read inputs of rendering (frames of a recording, height maps or a scene) as displacements or height maps."""
+"""Read inputs of rendering, frames of a recording, height maps or a scene, as displacements or height maps."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ Progress = Callable[[], AbstractContextManager[Callable[[int, int], None]]]
 
 @dataclasses.dataclass(frozen=True)
 class Frames:
-    """Frames of an input: displacements of a gel's nodes, or height maps.
-    kind : of the input, in words; numbers : (T,) frame numbers; of the two arrays below one is None
-    displacement : (T, M, 3) m of M nodes, once multiplied by scale; heights : (T, H, W) m"""
+    """Frames of an input: displacements of a gel's nodes, or height maps, the other being None.
+    kind : the input's, in words; numbers : (T,) int, numbers of the frames
+    displacement : (T, M, 3) m of M nodes, after multiplication by scale; heights : (T, H, W) m"""
 
     kind: str
     numbers: np.ndarray
@@ -41,7 +41,7 @@ class Frames:
     heights: np.ndarray | None = None
 
     def iterate_rows(self, rows: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the displacement (M, 3) m or heights (H, W) m of each of rows (n,), positions in ``numbers``."""
+        """Yield the displacement (M, 3) m or heights (H, W) m of each of rows (n,), indices into ``numbers``."""
         if self.heights is not None:
             yield from self.heights[rows]
         elif self.displacement is not None:
@@ -51,8 +51,9 @@ class Frames:
 def read_frames(
     path: str | os.PathLike, progress: Progress = lambda: nullcontext(lambda done, total: None), gel: str = TARGET
 ) -> Frames:
-    """Read the frames of a file or folder; `progress` yields a callback (done, in all) while a scene is simulated.
-    gel : sensor that is read or simulated. Raises TactileError for anything else, or an unreadable file."""
+    """Return the frames of a file, or of a scene's folder, which is simulated. gel : name of the sensor to read or
+    simulate; progress : function to a context of a callback (done, in all) for a simulation
+    Raises TactileError for anything else, and for an unreadable file."""
     path = Path(path)
     if path.is_dir() or path.suffix == ".toml":  # a scene, which is simulated first
         return _of_scene(path, progress, gel)
@@ -66,8 +67,8 @@ def read_frames(
 
 
 def read_displacement(path: str | os.PathLike, gel: str = TARGET) -> Frames:
-    """Read the displacement of a sensor's surface, `gel`, from ``frames.h5`` or a simulated recording. Raises
-    TactileError for other files, and where it was not kept."""
+    """Return the frames of a sensor's surface, `gel`, in ``frames.h5`` or a simulated recording. Raises TactileError
+    for other files, and if the displacement was not kept."""
     if not os.path.isfile(path):
         raise TactileError(path, "there is no such file", EXPECTED)
     with open(path, "rb") as file:  # the project's own files for this have no user block
@@ -118,8 +119,8 @@ def _of_scene(path: Path, progress: Progress, gel: str) -> Frames:
 
 def frame_displacement(path: str | os.PathLike, sensor: str, frame: int) -> np.ndarray:
     """Return the displacement (n, 3) m of a sensor's surface nodes in a frame, by its number in the recording. Raises
-    TactileError for a file that is neither ``frames.h5`` nor a simulated recording, one whose displacement was not kept
-    or is of another surface, and a missing frame."""
+    TactileError for a file that is neither ``frames.h5`` nor a simulated recording, a displacement that was not kept or
+    is another surface's, and a missing frame."""
     held = read_displacement(path, sensor)
     row = np.flatnonzero(held.numbers == frame)
     if held.displacement is None or len(row) != 1:

@@ -1,4 +1,4 @@
-"""Observations of a ``Gel`` for learning: picture, force and marker motion, and their Gymnasium space."""
+"""Observe a ``Gel`` for learning: picture, force and marker motion, and their Gymnasium space."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _MOST_FORCE, _MOST_MOTION = 100.0, 5e-3  # N, m: beyond what a gel bears and mov
 
 
 def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarray:
-    """Return the nodes (rows, columns) nearest to an even grid of markers over the camera's picture: rows from the tip
-    along +x, columns along +z."""
+    """Return the indices (rows, columns) int of the nodes nearest to an even grid of markers over the camera's picture:
+    rows from the tip along +x, columns along +z."""
     camera = load_calibration().camera
     x = np.linspace(camera.gel_x.min(), camera.gel_x.max(), rows + 2)[1:-1]
     z = np.linspace(camera.gel_z.min(), camera.gel_z.max(), columns + 2)[1:-1]
@@ -26,8 +26,8 @@ def marker_nodes(gel: Gel, rows: int = ROWS, columns: int = COLUMNS) -> np.ndarr
 
 
 def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str, np.ndarray]:
-    """Return the last contact's "force" (3,) N, "markers" (rows, columns, 2) m, motion along x and z, and, if asked,
-    "picture" (H, W, 3) uint8; markers : (rows, columns) int, nodes of ``marker_nodes``"""
+    """Return the last contact's "force" (3,) N, "markers" (rows, columns, 2) m, their motion along x and z, and, if
+    asked, "picture" (H, W, 3) uint8. markers : (rows, columns) int, nodes of ``marker_nodes``"""
     moved = gel.contact.displacement[markers.ravel()][:, [0, 2]].reshape(*markers.shape, 2)
     seen = {"force": gel.contact.force.astype(np.float32), "markers": moved.astype(np.float32)}
     return seen | {"picture": gel.picture()} if picture else seen
@@ -35,7 +35,7 @@ def observe(gel: Gel, markers: np.ndarray, *, picture: bool = True) -> dict[str,
 
 def observation_space(markers: np.ndarray, *, picture: bool = True) -> Any:
     """Return the ``gymnasium.spaces.Dict`` of ``observe``. Raises ModuleNotFoundError without the extra [mujoco].
-    markers : (rows, columns) int, of ``marker_nodes``; picture : whether it is observed"""
+    markers : (rows, columns) int, nodes of ``marker_nodes``; picture : true if pictures are observed"""
     with needing("mujoco"):
         from gymnasium.spaces import Box, Dict
 

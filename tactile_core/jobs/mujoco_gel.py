@@ -1,4 +1,4 @@
-"""A fingertip in MuJoCo: contacts of ``mujoco.MjData`` with a gel's geom become contacts of a ``Gel``."""
+"""Convert contacts of ``mujoco.MjData`` with a fingertip's geom to contacts of a ``Gel``."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class MujocoGel:
         """Shift the next pose along the gel so that its force there approaches MuJoCo's ``force`` (3,) N.
 
         MuJoCo's contacts creep and have no shear stiffness, so its poses say little about shear. A ball's shear
-        stiffness is Mindlin's: 2 (1 - nu) / (2 - nu), 0.68, times the normal one, which by Hertz is 3/2 of force over
+        stiffness, by Mindlin, is 2 (1 - nu) / (2 - nu), 0.68, times the normal one, by Hertz 3/2 of force over
         depth."""
         if contact.force[1] <= 0 or contact.depth <= 0:
             self._shift = np.zeros(3)
@@ -100,7 +100,7 @@ class MujocoGel:
         self._shift = np.clip(self._shift + step, -_MOST_SHIFT, _MOST_SHIFT)
 
     def forces(self, data: mujoco.MjData) -> dict[int, np.ndarray]:
-        """Return MuJoCo's force (3,) N on the gel, in the sensor's frame, by the id of each geom that touches it."""
+        """Return geom's id -> MuJoCo's force (3,) N on the gel, in the sensor's frame, for the geoms that touch it."""
         import mujoco
 
         found: dict[int, np.ndarray] = {}
@@ -116,7 +116,7 @@ class MujocoGel:
         return found
 
     def _presses(self, geom: int) -> bool:
-        """Return false for a geom that is a plane or height field, which have no bounds; this is logged once."""
+        """Return false if a geom is a plane or height field, which have no bounds, and log that once."""
         import mujoco
 
         endless = self.model.geom_type[geom] in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -135,7 +135,7 @@ class MujocoGel:
 
 
 def indenter_of(model: mujoco.MjModel, geom: int) -> tuple[Indenter, np.ndarray]:
-    """Return a geom as an indenter, and the indenter's frame (4, 4) in the geom's.
+    """Return a geom as an indenter, and the pose (4, 4) of the indenter's frame in the geom's.
 
     Spheres, capsules, boxes and cylinders are exact but for edges, which are rounded by 0.4 mm; meshes and ellipsoids
     become a grid of their distance, built once. Raises TactileError for planes and height fields."""
@@ -180,7 +180,7 @@ def _trimesh(model: mujoco.MjModel, geom: int, kind: Any, size: np.ndarray) -> A
 
 
 def _number(model: mujoco.MjModel, kind: str, name: str) -> int:
-    """Return the number of a named "geom" or "site", the kind."""
+    """Return the id of the geom or site (`kind`) of that name. Raises TactileError for none."""
     try:
         return getattr(model, kind)(name).id
     except KeyError as error:

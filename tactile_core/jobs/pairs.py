@@ -1,6 +1,6 @@
-"""Paired contacts: the same force, lean and place on BioTac and DIGIT, as training data. Press i draws all it
+"""Simulate paired contacts, the same force, lean and place on BioTac and DIGIT, as training data. Press i draws all it
 needs from (seed, i), so any number of workers makes the same file, and an interrupted run continues with the missing
-blocks of presses. `prepare_input`, `make` and `inspect_input` are called as ``engine.recipes`` says."""
+blocks of presses. What jobs call is described in ``engine.recipes``."""
 
 from __future__ import annotations
 
@@ -49,12 +49,11 @@ def make_pairs(
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> None:
-    """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``.
+    """Simulate ``count`` paired contacts of a scene into the HDF5 file ``out``, and write its card (``pairs_writer``).
 
-    progress : called with (blocks of presses done, known so far). Blocks are kept in ``<out>.parts``, a folder as of
-        ``tactile batch``, which is removed at the end; the file's card (``pairs_writer``) is written beside it.
-    place : function from the job's folder to the executor of tasks
-    pair : the sensors, source and target; keep : ("traction",) to keep it, else ()
+    progress : called with (blocks of presses done, known so far); blocks are kept in ``<out>.parts``, which is removed
+        at the end; place : function from the job's folder to the executor of tasks
+    pair : names of the sensors, source and target; keep : ("traction",) to keep it, else ()
     Raises TactileError for a bad scene or count, and for parts of another scene or seed."""
     out = Path(out)
     job, names, text = plan(scene_path, count, seed, out, pair, keep)
@@ -72,7 +71,7 @@ def plan(
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> tuple[Job[Pairs], list[str], str]:
-    """Return the job, the indenters' names and the scene's text. Arguments and errors as of ``make_pairs``."""
+    """Return the job, the indenters' names and the scene's TOML text; arguments and errors as of ``make_pairs``."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, GelSensor)
     scene, text, inputs, files = read_scene(scene_path, ["presses"])
@@ -90,13 +89,13 @@ def plan(
 
 
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:
-    """Return the number of blocks that the job needs, by the contacts made so far; False: nothing is prepared."""
+    """Return the number of blocks that the job needs, by the contacts made so far, and False: nothing is prepared."""
     _scene(job.inputs[index], tuple(job.recipe.files))
     return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
 
 
 def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
-    """Solve the contacts of block `number` of presses and write them; returns false if it was there already."""
+    """Solve the contacts of block `number` of presses and write them; return false if they were there already."""
     from ..simulation.pair_sampling import press_rows
 
     one = job.inputs[index]
@@ -114,7 +113,7 @@ def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Pairs], index: int) -> InputFacts | None:
-    """Return the number of blocks needed in all, by the contacts made so far; None before the first."""
+    """Return the number of blocks needed in all, by the contacts made so far; None before the first block."""
     counts = _counts(folder, job, index)
     if not counts:
         return None
@@ -122,14 +121,14 @@ def inspect_input(folder: Path, job: Job[Pairs], index: int) -> InputFacts | Non
 
 
 def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
-    """Return the files of the blocks that hold the contacts of a finished job, in order."""
+    """Return the files of the blocks, in order, that hold the contacts of a finished job."""
     count = wanted(_counts(folder, job, 0), job.recipe.count, job.inputs[0].path)
     return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(count)]
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
-    """Estimate the blocks for `count` contacts from counts, block -> contacts so far. Raises TactileError, on the
-    scene's file `where`, if many blocks made no contact."""
+    """Return the estimated number of blocks for `count` contacts; counts : block -> contacts made so far
+    Raises TactileError, on the scene's file `where`, if many blocks made no contact."""
     have, number = 0, 0
     while have < count and number in counts:
         have += counts[number]
@@ -146,7 +145,7 @@ def wanted(counts: dict[int, int], count: int, where: str) -> int:
 
 
 def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
-    """Return the number of contacts in each existing block."""
+    """Return block -> number of contacts, for the blocks that exist."""
     name, found = job.inputs[index].name, {}
     for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
         number = file.stem.rpartition("-")[2]

@@ -25,7 +25,7 @@ TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
 
 class Part(NamedTuple):
-    """A part of the output: what it is, its extent in words, s of CPU, and MB of memory and of disk that it adds."""
+    """Cost of a part of a command's output: what it is, its extent in words, CPU s, and MB of memory and of disk."""
 
     what: str
     extent: str
@@ -35,23 +35,23 @@ class Part(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Cost of a command, part by part. Memory for building matrices counts once: they are built one by one."""
+    """Cost of a command, part by part. Memory to build matrices counts once, as they are built one by one."""
 
     parts: Sequence[Part]
 
     @property
     def seconds(self) -> float:
-        """CPU time of all parts together, s."""
+        """Return the CPU time of all parts together, s."""
         return sum(part.seconds for part in self.parts)
 
     @property
     def memory(self) -> float:
-        """Peak memory, MB: the sum of what the parts add, matrices built once."""
+        """Return the peak memory, MB: the sum of what the parts add, that to build matrices once."""
         built = [part.memory for part in self.parts if part.memory == BUILD_MB]
         return sum(part.memory for part in self.parts) - sum(built[1:])
 
     def lines(self) -> list[str]:
-        """Return a table, and the totals, as lines of text."""
+        """Return a table of the parts, and a line of totals, as lines of text."""
         found = [f"{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
         found += [f"{what:22}{s:9.2f}{mb:7.0f}{disk:9.1f}  {extent}" for what, extent, s, mb, disk in self.parts]
         disk = sum(part.disk for part in self.parts)
@@ -60,12 +60,12 @@ class Plan(NamedTuple):
 
 @functools.cache
 def costs() -> dict[str, Any]:
-    """Read the shipped costs.json: ``parts``, name -> ms and kb a frame, mb, start s; full_ms by sensor; machine."""
+    """Return the shipped costs.json: ``parts``, name -> ms and kb a frame, mb, start s; full_ms by sensor; machine."""
     return json.loads(COSTS.read_text(encoding="utf-8"))
 
 
 def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[str, TierChoice]) -> Plan:
-    """Plan `tactile simulate`. keep : its words of --keep; choices : sensor that is solved -> its tier of mechanics.
+    """Return the cost of `tactile simulate`. keep : words of its --keep; choices : sensor -> tier of mechanics
     Raises TactileError for a scene that cannot be read."""
     from ..simulation import scene_recording
     from ..simulation.scene import load_scene
@@ -86,7 +86,7 @@ def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[st
 
 
 def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
-    """Plan `tactile pairs` of `count` in the fast tier; a sensor without measured cost counts 0 and is marked."""
+    """Return the cost of `tactile pairs`, `count` in the fast tier; a sensor that was not measured counts 0."""
     parts = []
     for sensor in pair:
         what = f"{title(sensor)} contacts"
@@ -100,7 +100,7 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Estimate what a conversion of frames costs. keep : words of --keep; preset : of the pictures"""
+    """Return the cost of converting a number of frames. keep : words of --keep; preset : of the pictures"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
@@ -121,7 +121,7 @@ def _part(name: str) -> dict[str, float]:
 
 
 def _matrices(sensor: str) -> Part:
-    """Plan the surface compliance: its memory, and the cost of building it where it is not cached."""
+    """Return the cost of a sensor's surface compliance: memory, and the building if it is not cached."""
     from ..mechanics.fast.compliance import stored
 
     found, what = stored(sensor), f"{title(sensor)} matrices"
@@ -133,7 +133,8 @@ def _matrices(sensor: str) -> Part:
 
 
 def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept: int) -> Part:
-    """Plan the solves of one sensor. kept : number of frames kept; rough : true with friction, which takes longer"""
+    """Return the cost of a sensor's solves. kept : number of frames kept; rough : true with friction, which is
+    slower"""
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":

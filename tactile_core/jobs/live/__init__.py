@@ -1,4 +1,4 @@
-"""Live view: the newest frame of a growing recording as a picture, as soon as it is there."""
+"""Show the newest frame of a growing recording as a picture, as soon as it is there."""
 
 from .digit_camera import DigitCamera
 from .frame_server import FrameServer

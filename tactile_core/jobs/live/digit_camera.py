@@ -1,4 +1,4 @@
-"""The camera of a real DIGIT, or a video: its newest picture, upright as simulated ones are."""
+"""Read the camera of a real DIGIT, or a video: its newest picture, upright as simulated ones are."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class DigitCamera:
             self._ended.wait(self._pause)
 
     def picture(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the newest picture, uint8 of a shape (H, W, 3), upright; black before the first and after the last."""
+        """Return the newest picture, uint8 of a shape (H, W, 3), upright; black before the first and once lost."""
         import cv2
 
         frame = self._newest

@@ -1,4 +1,4 @@
-"""Frames for other programs on this machine: a ZeroMQ message each, to whoever listens.
+"""Serve frames to other programs on this machine, in a ZeroMQ message each.
 
 A message is one line of JSON and then the bytes of the arrays that it names, one after the other; docs/read_frames.py
 reads it. The publisher's half of ZeroMQ's protocol (ZMTP 3.0, rfc.zeromq.org/spec/23) is written here: the library's
@@ -29,8 +29,7 @@ READY = b"\x04\x19\x05READY\x0bSocket-Type" + (3).to_bytes(4, "big") + b"PUB"
 
 
 class FrameServer:
-    """Publisher of frames at a port of this machine, open to all its users; readers, fast or slow, do not affect the
-    view.
+    """Publisher of frames at a port of this machine, open to all its users; slow readers do not delay the view.
 
     port : 0 for any free one; address : tcp://127.0.0.1:PORT. Raises TactileError for a port that is not available.
     Whatever readers send is ignored: their libraries drop what they did not subscribe to. A slow one misses frames."""
@@ -47,8 +46,7 @@ class FrameServer:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def send(self, shown: Shown, arrays: dict[str, np.ndarray]) -> bool:
-        """Publish a frame and its arrays by name, as ``message`` writes them; never waits for a reader. Returns true,
-        as an output of `watch` that goes on does."""
+        """Publish a frame and its arrays, name -> array, without waiting for a reader. Return true: `watch` goes on."""
         content = message(shown, arrays)
         with self._news:
             self._message, self._sent = b"\x02" + len(content).to_bytes(8, "big") + content, self._sent + 1
@@ -65,7 +63,7 @@ class FrameServer:
         self._listener.close()
 
     def _accept(self) -> None:
-        """Give each reader a thread, until the port is closed."""
+        """Accept readers, each served by a thread of its own, until the port is closed."""
         with suppress(OSError):
             while True:
                 reader, _ = self._listener.accept()
@@ -75,7 +73,7 @@ class FrameServer:
                     reader.close()
 
     def _feed(self, reader: socket.socket) -> None:
-        """Send a reader the newest message whenever there is a new one, until it leaves or blocks."""
+        """Send a reader the newest message whenever there is one, until it leaves or blocks."""
         sent = self._sent
         with reader, suppress(OSError):
             reader.settimeout(PATIENCE)
@@ -94,9 +92,9 @@ class FrameServer:
 def message(shown: Shown, arrays: dict[str, np.ndarray]) -> bytes:
     """Return a frame's header in JSON, a line feed, and its arrays' bytes, row by row.
 
-    The header has frame, its index; force_n and confidence 0..1, null where unknown; flags, bits of
-    ``recordings.flags``; trust, the same in words; latency_s, from the newest row to the picture; arrays, each with a
-    name, a type of numpy's and a shape."""
+    The header has frame, its index; force_n, and confidence 0..1, null if unknown; flags, bits of
+    ``recordings.flags``; trust, these in words; latency_s, from the newest row to the picture; arrays, a list of
+    (name, numpy's type, shape)."""
     known = math.isfinite(shown.newtons + shown.confidence)  # JSON has no NaN
     header = {
         "format": FORMAT,

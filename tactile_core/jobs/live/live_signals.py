@@ -1,4 +1,4 @@
-"""Signals of a recording of which only the past is known."""
+"""Prepare the signals of a recording of which only the past is known."""
 
 from __future__ import annotations
 
@@ -34,11 +34,10 @@ class LiveSignals:
 
     Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
     polarity; until then it is the given one, or "falls".
-    rate : Hz; options : of the preparation; drift, repair and smoothing do not count, tare is of the first 10 s
-    unit : gains, offsets and rest; its rest counts where the first window is not calm near it
-    sensor : whose counts they are
-    found : source of the rest, in words, once it is known
-    polarity, evidence : "falls" or "rises", and its evidence; sure : true once it is final
+    rate : Hz; options : of the preparation, without effect of drift, repair and smooth; tare is of the first 10 s
+    unit : gains, offsets and rest, which is taken if the first window is not calm near it; sensor : the sensor's name
+    found : where the rest is from, in words, "" until it is known; polarity : "falls" or "rises"; evidence : what
+        shows that, in words; sure : true once it is final
     silent : true if the finger does not respond: its electrodes all read the same
     Raises TactileError for a tare of other frames."""
 
@@ -70,7 +69,7 @@ class LiveSignals:
         self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
 
     def learn(self, rows: Recording) -> bool:
-        """Search new frames, rows, for rest and polarity; returns true once rest is known."""
+        """Search new frames, rows, for rest and polarity; return true once rest is known."""
         self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
         self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
         if self._known is None or not self.sure:
@@ -80,7 +79,7 @@ class LiveSignals:
         return self._known is not None
 
     def _joined(self, rows: Recording) -> Recording:
-        """Join the frames so far, up to a number, with the channels that preparation needs."""
+        """Return the frames so far, up to a number, with the channels that preparation needs."""
         electrodes, pdc = rows.electrodes, rows.pdc
         if self._seen is not None:
             electrodes = np.concatenate([self._seen.electrodes, electrodes])[: self._most]
@@ -93,7 +92,7 @@ class LiveSignals:
         )  # fmt: skip
 
     def _look(self, seen: Recording) -> None:
-        """Prepare the frames so far, and keep their first rest, and their polarity once it is sure."""
+        """Prepare the frames so far; store their rest, once it shows, and their polarity."""
         self._next_look = len(seen) + AGAIN
         if self._known is None:
             unit = full_scale(seen.electrodes)
@@ -116,13 +115,14 @@ class LiveSignals:
 
     @property
     def known(self) -> Signals:
-        """Return the first frames' signals, whose rest counts for all; raises ValueError before it is known."""
+        """Return the first frames' signals, whose rest is taken for all. Raises ValueError before it is known."""
         if self._known is None:
             raise ValueError("no rest is known yet")
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return signals of electrodes (T, 19), pressures pdc (T,) or NaN, as in the file. ValueError if no rest."""
+        """Return the signals of electrodes (T, 19) and pdc (T,), as in the file or NaN; raises ValueError as
+        `known`."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)
@@ -150,7 +150,7 @@ class LiveSignals:
 
 
 def _source(signals: Signals) -> str:
-    """Describe the source of the signals' rest."""
+    """Return in words where the signals' rest is from."""
     doubts = [text for text in signals.warnings if reason_of(text) in REST]
     parts = ", ".join(f"{first}:{last}" for first, last in signals.report["quiet_parts"])
     if doubts or not parts:

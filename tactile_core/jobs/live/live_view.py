@@ -1,4 +1,4 @@
-"""The newest frame as a picture, and how long that took."""
+"""Draw the newest frame as a picture, and measure how long that takes."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ REMEMBERED = 1000  # latencies whose quantiles are reported
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """Picture on display.
+    """A picture on display.
     frame : its index; confidence : 0..1; flags : bits of ``recordings.flags.Flag``; words : a text on both
     picture : (H, W, 3) uint8; force : (3,) N, of the object on the sensor
-    latency : s from rows to picture; work : s of computation in it"""
+    latency : s from the rows' arrival to the picture; work : s of CPU time in that"""
 
     frame: int
     picture: np.ndarray
@@ -44,19 +44,18 @@ class Shown:
 
     @property
     def newtons(self) -> float:
-        """Size of the force, N."""
+        """Return the magnitude of the force, N."""
         return float(np.linalg.norm(self.force))
 
 
 class View:
-    """Translates arriving rows to pictures: always the newest row; older ones that arrived meanwhile are skipped.
-    signals : `LiveSignals`, rest and polarity so far; frames, passed : number of rows that arrived, and of skipped ones
-    """
+    """Translate arriving rows to pictures: always the newest row; older ones that arrived meanwhile are skipped.
+    signals : `LiveSignals`, rest and polarity so far; frames, passed : number of rows that arrived, and were skipped"""
 
     def __init__(
         self, tools: Tools, rate: float, options: PrepareOptions | None = None, unit: ElectrodeGains | None = None
     ) -> None:
-        """Make a view of a recording of a rate, Hz; the other arguments are those of `LiveSignals`."""
+        """Make a view of a recording. rate : Hz; options, unit : see `LiveSignals`"""
         self.signals = LiveSignals(rate, options, unit, tools.translator.source)
         self._tools, self._rate = tools, rate
         self._track = ForwardTracker()
@@ -66,7 +65,8 @@ class View:
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
     def show(self, rows: Recording, came: float) -> Shown | None:
-        """Translate and draw the last of rows that arrived at `came` (time.perf_counter); None before rest is known."""
+        """Translate and draw the last of rows that came at `came`, s of time.perf_counter; None before rest is
+        known."""
         began = time.thread_time()
         self.frames += len(rows)
         self._counts = _newest(rows.electrodes, self._counts)
@@ -91,7 +91,7 @@ class View:
         return shown
 
     def _translation(self, signals: Signals) -> Translation:
-        """Translate the newest frame, tracked from those before it, without delay."""
+        """Return the translation of the newest frame, whose contact is tracked from the frames before."""
         translator = self._tools.translator
         evidence, state = translator.encode(signals), None
         if translator.answer.follows:
@@ -99,7 +99,7 @@ class View:
         return translator.decode(signals, evidence, state)
 
     def describe_latency(self) -> str:
-        """Return a sentence: median and 99 % of the last pictures' latency, median of computing, frames passed over."""
+        """Return a sentence: median and 99th percentile of the last latencies, median of computing, frames skipped."""
         if not self.latencies:
             return "no picture yet: waiting for a quiet part"
         (middle, work), (late, _) = 1e3 * np.percentile(np.array(self.latencies), [50, 99], axis=0)

@@ -30,11 +30,11 @@ FEW = 20  # rows, 0.2 s, of which any number may be bad at once: a program that 
 
 class Growing:
     """A CSV recording that another program is writing, in any of the text layouts.
-    rows, bad : number of rows read so far, and of bad rows left out"""
+    rows, bad : number of rows read so far, and of bad ones among them"""
 
     def __init__(self, path: str | os.PathLike, columns: ColumnMap | None = None, sensor: str = SOURCE) -> None:
-        """Follow a file, or ``path#1``, its finger 1; columns, sensor : as of `recordings.read`. Raises
-        TactileError where there is none."""
+        """Follow a CSV file, or finger 1 of it by ``path#1``. columns : map of its columns; sensor : name of its sensor
+        Raises TactileError if there is no such file."""
         file, self._finger, _ = split(os.fspath(path))
         self._path, self._columns, self._sensor = Path(file), columns, sensor
         self._place, self._rest, self._lines = 0, b"", 0
@@ -45,10 +45,10 @@ class Growing:
         self._file = _identity(self._path.stat())
 
     def poll(self) -> Recording | None:
-        """Return the rows since the last call; None where there are none, or where too many are bad.
+        """Return the rows since the last call; None if there are none, or if too many of them are bad.
 
         Raises TactileError for a file that became shorter or another one, for one that is no recording, for a row of
-        another sensor, and where over a fifth of all rows is bad. A bad cell among good rows is NaN."""
+        another sensor, and if over a fifth of all rows is bad. A bad cell among good rows is NaN."""
         data = self._new_bytes()
         whole, end, self._rest = (self._rest + data).rpartition(b"\n")
         if len(self._rest) > MAX_LINE:
@@ -107,7 +107,8 @@ Say = Callable[[str], None]
 
 
 def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequence[Output], say: Say, tell: Say) -> None:
-    """Show a view's frames until `source`, as of `followed`, or an output ends. camera : of a real DIGIT, or None
+    """Show a view's frames until `source` (of `followed` or `played`) or an output ends. camera : a real DIGIT's, or
+    None
     outputs : called with each frame and its picture and camera (H, W, 3); say, tell : with progress, with a summary"""
     reported, failed, lost, silent = time.perf_counter(), False, False, False
     try:
@@ -139,9 +140,9 @@ def watch(source: Rows, view: View, camera: DigitCamera | None, outputs: Sequenc
 
 
 def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
-    """Yield new rows of a growing file and their arrival time, s, of time.perf_counter; None while no row comes.
-    idle : s without a row after which it ends; None: never. say : called with a line when rows are bad
-    columns, sensor : as of `recordings.read`. Raises as `Growing.poll` does."""
+    """Yield new rows of a growing file and their arrival time, s of time.perf_counter; None and the time if none came.
+    idle : s without a row after which it ends, None for never; say : called with a line on bad rows
+    columns : map of the columns; sensor : name of the sensor. Raises TactileError as `Growing.poll` does."""
     growing, last, bad = Growing(path, columns, sensor), time.perf_counter(), 0
     while idle is None or time.perf_counter() - last < idle:
         came = time.perf_counter()
@@ -158,7 +159,7 @@ def followed(path: str, idle: float | None, say: Say, columns: ColumnMap | None 
 
 def played(path: str, speed: float, say: Say, columns: ColumnMap | None = None, sensor: str = SOURCE) -> Rows:
     """Yield the rows of a finished recording at their times, one part in memory at a time.
-    speed : times as fast as recorded, 0 without waiting; say : called with warnings; columns, sensor : as `followed`"""
+    speed : times as fast as recorded, 0 without waiting; say : called with warnings; others : see `followed`"""
     began = time.perf_counter()
     for part in read_parts(path, columns, sensor):
         recording, done = part.recording, part.repeated
