@@ -133,8 +133,7 @@ def _matrices(sensor: str) -> Part:
 
 
 def _contacts(sensor: str, choice: TierChoice, contacts: int, rough: bool, kept: int) -> Part:
-    """Return the cost of a sensor's solves. kept : number of frames kept; rough : true with friction, which is
-    slower"""
+    """Return the cost of a sensor's solves. kept : number of frames kept; rough : true with friction"""
     part, start = _part(f"simulate_{sensor}"), _part("simulate_nothing")
     ms = part["ms"]
     if choice.tier != "fast":

@@ -1,4 +1,4 @@
-"""A recording's signals, ready for the networks, in a checksummed file of which shards read a few rows.
+"""Store a recording's signals, ready for the networks, in a checksummed file of which shards read a few rows.
 
 Datasets, T first: ``time`` s; ``change`` from rest and ``electrodes`` as read (T, e) counts; ``quiet``, no contact;
 ``flags``; ``pdc`` counts, the fluid's pressure over rest. ``part`` (P,) first frame of each part of the recording,
@@ -45,8 +45,8 @@ MAX_WARNINGS = 100  # kept of one recording, the rest are counted
 
 
 class About(TypedDict):
-    """Facts of a recording. prepared : ``Signals.report`` of each part; frames, labels : of all parts
-    start_time : unix s, 0 if unknown; film, stiffness : divided by a typical unit's"""
+    """Facts of a recording. prepared : ``Signals.report`` of each part; frames : number of frames; labels : all of them
+    start_time : unix s, 0 if unknown; film, stiffness : the unit's, divided by a typical unit's"""
 
     recording: str
     layout: str
@@ -64,8 +64,8 @@ class About(TypedDict):
 
 
 def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare recording `index` unless it is prepared; return its number of frames, and true if it was made now. Raises
-    TactileError if the recording changed."""
+    """Prepare recording `index` unless it is prepared; return its number of frames, and true if it was prepared now.
+    Raises TactileError if the recording changed."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     _, frames = checksummed.stated(file)
@@ -88,7 +88,7 @@ def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
 
 
 def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signals, int]]:
-    """Prepare each part of a recording; also yields the number of its first frames that repeat the part before."""
+    """Yield each part of a recording, its signals, and the number of its first frames that repeat the part before."""
     options, source = job.recipe.prepare.options(), job.recipe.source
     sensor = job.recipe.sensor
     unit = None if sensor is None else sensor.gains_for(path, split(path).section, "--sensor", source)
@@ -138,7 +138,7 @@ class _Writer:
         self.count = end
 
     def close(self, digest: str) -> None:
-        """Write the facts known only at the end. digest : SHA-256 of the recording"""
+        """Write the facts that are known at the end alone. digest : SHA-256 of the recording"""
         warnings = self._about["warnings"]
         if len(warnings) > MAX_WARNINGS:
             warnings[MAX_WARNINGS:] = [f"{len(warnings) - MAX_WARNINGS} more warnings"]
@@ -150,7 +150,7 @@ class _Writer:
 
 
 class Prepared:
-    """Reader of a prepared file, opened anew by each call. Raises TactileError where it is damaged."""
+    """Reader of a prepared file, which each call opens anew. Raises TactileError if it is damaged."""
 
     def __init__(self, file: Path) -> None:
         self._path = file
@@ -159,11 +159,11 @@ class Prepared:
         return self._read(lambda file: len(file["time"]))
 
     def about(self) -> About:
-        """Read the facts of the whole recording: layout, kind, warnings, number of frames and the like."""
+        """Return the facts of the whole recording: layout, kind, warnings, number of frames and the like."""
         return self._read(lambda file: msgspec.convert(json.loads(file["about"][()].tobytes()), About))
 
     def read(self, frames: np.ndarray) -> tuple[np.ndarray, Signals]:
-        """Return the times (n,) s and signals of rising frames (n,); ``rest`` is that of the first."""
+        """Return the times (n,) s and signals of rising frames (n,); ``rest`` is that of the first frame's part."""
         start, about = int(frames[0]), self.about()
 
         def read(file: h5py.File) -> tuple[np.ndarray, Signals]:

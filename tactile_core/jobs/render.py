@@ -50,12 +50,13 @@ MAKER = "tactile render"  # in the note
 class Options:
     """Options of rendering.
 
-    preset : fast, standard, quality or reference; None to choose by levels : error, grey levels rms, None for standard
+    preset : "fast", "standard", "quality" or "reference"; None: the cheapest whose error, rms grey levels, is within
+        `levels`, or "standard" without `levels`
     object_reflectance : 0 black to 1 white, of what touches the gel; None for the calibration's
     calibration : file, None for the one that ships; size : (width, height) pixels, None for the calibration's
-    frames : part of the input; exr : true writes OpenEXR too; variant : of Mitsuba, None for the faster
+    frames : slice of the input's; exr : true writes OpenEXR too; variant : Mitsuba's, None for the faster
     noise : true adds the camera's noise to PNG pictures, the same in every run; overwrite : true replaces a result
-    scene_out : file for the first frame as a Mitsuba scene, None for none"""
+    scene_out : file to write the first frame to as a Mitsuba scene, or None"""
 
     preset: str | None = None
     levels: float | None = None
@@ -77,8 +78,8 @@ def render(
     progress: Callable[[str], Any],
     say: Callable[[str], None] = lambda words: None,
 ) -> Path:
-    """Render an input into the folder `out`, which appears whole or not at all; returns it.
-    progress : word -> context that yields a callback (done, in all); say : called with a sentence on the chosen preset
+    """Render an input into the folder `out`, which appears whole or not at all; return it.
+    progress : function from a word to a context of a callback (done, in all); say : called with sentences
     Raises TactileError for a bad input, calibration or option, and a disk that cannot be written."""
     clock, out = Stopwatch(), Path(out)
     gel = load_calibration(options.calibration).camera.sensor
@@ -112,8 +113,8 @@ def render(
 
 
 def claimed(out: Path, options: Options) -> str:
-    """Return the preset (`choose_preset`) once `out` and ``scene_out`` are known to be writable, and sweep away what
-    killed runs left beside `out`. Raises TactileError where one exists and may not be replaced."""
+    """Return the preset to render with, after checking that `out` and ``scene_out`` can be written, and remove what
+    killed runs left beside `out`. Raises TactileError for one that exists and may not be replaced."""
     results.check_free(out, options.overwrite, MAKER)
     if options.scene_out is not None and not options.overwrite:
         for file in scene_files(options.scene_out):
@@ -124,7 +125,7 @@ def claimed(out: Path, options: Options) -> str:
 
 
 def choose_preset(options: Options) -> str:
-    """Return the named preset, the cheapest within the levels, or the default. Raises TactileError for both options."""
+    """Return the preset's name: as given, the cheapest within the levels, or the default; TactileError for both."""
     if options.levels is None:
         return options.preset or DEFAULT
     if options.preset is not None:
@@ -133,7 +134,7 @@ def choose_preset(options: Options) -> str:
 
 
 def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration at a size (width, height), or height maps' (H, W), px; TactileError where they differ."""
+    """Return the calibration at a size (width, height), or heights' (H, W), px; TactileError if both differ."""
     if heights is not None:
         height, width = heights
         if size not in (None, (width, height)):
@@ -145,8 +146,8 @@ def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tup
 
 @dataclasses.dataclass(frozen=True)
 class Pictures:
-    """Writer of frames as files.
-    clock : times stages; about : attributes of EXR files; heights : true for height maps, false for displacements
+    """Writer of rendered frames to files. clock : measures stages; about : attributes of EXR files
+    heights : true if frames are height maps, false for displacements
     noise : true adds the camera's noise to PNG pictures; exr : true writes OpenEXR too"""
 
     renderer: Renderer
@@ -157,7 +158,7 @@ class Pictures:
     exr: bool
 
     def begin(self, folder: Path) -> None:
-        """Make the folders of the pictures and, where asked for, of the EXR files, in ``folder``."""
+        """Make the folders of the pictures and, if asked for, of the EXR files, in ``folder``."""
         (folder / results.IMAGES).mkdir()
         if self.exr:
             (folder / EXR).mkdir()
@@ -187,7 +188,7 @@ class Pictures:
                 self._write_exr(folder / EXR / EXR_NAME.format(number), radiance, about)
 
     def write_scene(self, path: str | os.PathLike, values: np.ndarray) -> None:
-        """Write a frame as Mitsuba's file; values : displacement (M, 3) m, or heights (H, W) m"""
+        """Write a frame as a Mitsuba scene; values : displacement (M, 3) m, or heights (H, W) m"""
         unit = self.renderer.calibration
         height = values if self.heights else gel_mapper(unit.camera)(values)
         write_scene(path, unit, of_unit(height, unit))
@@ -199,7 +200,8 @@ class Pictures:
 def pictures(
     options: Options, preset: str, heights: tuple[int, int] | None, clock: Stopwatch | None = None
 ) -> Pictures:
-    """Return the writer of frames; heights : (H, W) of maps, None for displacements. Raises as ``Renderer`` does."""
+    """Return the writer of frames. heights : (H, W) of height maps, None for displacements
+    Raises TactileError for a bad calibration or size, and ModuleNotFoundError without Mitsuba if it is needed."""
     unit = at_size(load_calibration(options.calibration, None, options.object_reflectance), heights, options.size)
     about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
     renderer = Renderer(unit, preset, options.variant)
@@ -209,8 +211,8 @@ def pictures(
 def note_of(
     path: str | os.PathLike, kind: str, count: int, renderer: Renderer, preset: str, options: Options
 ) -> dict[str, Any]:
-    """Return a result's origin for JSON: only what the same input reproduces.
-    path, kind : of the input, kind in words; count : of rendered frames; preset : by name"""
+    """Return the content of a result's note.json: what the same input reproduces.
+    path, kind : the input, and what it is in words; count : number of rendered frames; preset : its name"""
     file = Path(path) / "scene.toml" if os.path.isdir(path) else Path(path)
     unit, calibration = renderer.calibration.unit, Path(options.calibration or calibration_path(renderer.camera.sensor))
     about = PRESETS[preset] if preset != FAST else None
@@ -235,7 +237,7 @@ def note_of(
 
 
 def background_of(renderer: Renderer) -> dict[str, Any] | str:
-    """Return, for the note, "lights" for a modelled resting picture, else its photograph and the correction by it."""
+    """Return, for the note, "lights" for a modelled resting picture, else its photograph and how that corrects them."""
     photograph = renderer.calibration.photograph
     if not photograph:
         return "lights"

@@ -1,6 +1,6 @@
-"""`tactile render` in many processes: the same folder as from one process, but without timings.json.
+"""Run `tactile render` in many processes: the same folder as from one process, but without timings.json.
 
-`prepare_input`, `make` and `inspect_input` are called as ``engine.recipes`` says."""
+What jobs call is described in ``engine.recipes``."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def render_in_parts(
     place: Callable[[Path], Place],
     progress: Callable[[int, int], None],
 ) -> Path:
-    """Render `path` into `out` as ``render.render`` does, in a job in ``<out>.parts``; the same call resumes it.
-    place : function from the job's folder to the executor of tasks; progress : (tasks done, known so far)"""
+    """Render the input `path` into `out` by a job in ``<out>.parts``, which the same call resumes; return `out`.
+    place : function from the job's folder to an executor; progress : called with (tasks done, known so far)"""
     out = Path(out)
     job = plan(path, out, options)
     with (
@@ -52,8 +52,8 @@ def render_in_parts(
 
 
 def plan(path: str | os.PathLike, out: str | os.PathLike, options: Options) -> Job[Render]:
-    """Plan the rendering of a file, or of a folder's scene.toml, to the folder `out`. Raises TactileError for what can
-    be refused before any work."""
+    """Return the job that renders a file, or a folder's scene.toml, into the folder `out`. Raises TactileError for what
+    can be refused before any work."""
     preset = claimed(Path(out), options)
     file = Path(path).resolve()
     file = file / "scene.toml" if file.is_dir() else file
@@ -85,7 +85,7 @@ def _put_together(folder: Path, job: Job[Render], out: Path, options: Options) -
 
 
 def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool]:
-    """Read the input (a scene is simulated) and keep its values; return the number of shards, and true if read now."""
+    """Read the input (a scene is simulated) and store its values; return the number of shards, and true if read now."""
     one = job.inputs[index]
     file = jobs.prepared_file(folder, one.name)
     made = checksummed.verified_checksum(file) is None
@@ -100,7 +100,7 @@ def prepare_input(folder: Path, job: Job[Render], index: int) -> tuple[int, bool
 
 
 def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
-    """Render the frames of shard `number`, unless they are there; returns true if they were made."""
+    """Render the frames of shard `number`, unless they are there; return true if they were rendered."""
     one, recipe = job.inputs[index], job.recipe
     file = jobs.shard_file(folder, one.name, number)
     if checksummed.verified_checksum(file) is not None:
@@ -118,8 +118,7 @@ def make(folder: Path, job: Job[Render], index: int, number: int) -> bool:
 
 
 def inspect_input(folder: Path, job: Job[Render], index: int) -> InputFacts | None:
-    """Return the number of frames and of shards of the input ``index`` of a job in ``folder``; None if it is not
-    prepared."""
+    """Return the number of frames and shards of the job's input; None if it is not prepared."""
     if not jobs.prepared_file(folder, job.inputs[index].name).exists():
         return None
     return InputFacts(count(folder, job), _frames(folder, job))
@@ -131,7 +130,7 @@ def count(folder: Path, job: Job[Render]) -> int:
 
 
 def input_kind(folder: Path, job: Job[Render]) -> tuple[str, bool]:
-    """Describe the prepared input: its kind in words, and true if it holds height maps."""
+    """Return the prepared input's kind in words, and true if it holds height maps."""
     found = _prepared(folder, job, KIND, HEIGHTS)
     return found[KIND].tobytes().decode(), bool(found[HEIGHTS])
 
@@ -141,13 +140,13 @@ def _frames(folder: Path, job: Job[Render]) -> int:
 
 
 def _prepared(folder: Path, job: Job[Render], *names: str, rows: Any = ()) -> dict[str, np.ndarray]:
-    """Read arrays of the prepared input by names; rows : of those that have rows"""
+    """Return arrays of the prepared input by their names; rows : index that selects rows of those that have any"""
     return checksummed.read(jobs.prepared_file(folder, job.inputs[0].name), rows, names)
 
 
 @functools.lru_cache(maxsize=2)
 def _pictures(calibration: str | None, recipe: Render, heights: tuple[int, int] | None) -> Pictures:
-    """Make the renderer, once per process; heights : (H, W) of height maps, None for displacements."""
+    """Return the writer of pictures, made once per process; heights : (H, W) of height maps, None for displacements"""
     check_unit(calibration, recipe.calibration)
     options = Options(
         calibration=calibration, size=recipe.size, exr=recipe.exr, variant=recipe.variant or None, noise=recipe.noise,

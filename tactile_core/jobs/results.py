@@ -1,11 +1,10 @@
-"""Layout of a converted recording's result folder, and the check of where it may be written.
+"""Describe the layout of a converted recording's result folder, and check where it may be written.
 
-<recording>/frames.h5           numbers, T first, SI units; see ``frames_file``
+<recording>/frames.h5           arrays, T first, SI units (``frames_file``)
 <recording>/images/%05d.png     DIGIT pictures, 240 wide, 320 high, numbered by the frame's index in the recording
 <recording>/contact_sheet.png   a few frames to look at
 <recording>/note.json           where it came from: versions, weights, options, warnings; same input, same bytes
-<recording>/timings.json        ms per frame of each stage on this machine; differs from run to run
-"""
+<recording>/timings.json        ms per frame of each stage on this machine; differs from run to run"""
 
 from __future__ import annotations
 
@@ -36,7 +35,7 @@ DEFAULT_KEEP = ("latent", "displacement", "image")
 
 
 def parse_keep(text: str) -> tuple[str, ...]:
-    """Parse ``"image,latent"`` to ("latent", "image"), words of --keep in KEEPABLE's order. TactileError for others."""
+    """Return the words of --keep in ``"image,latent"``, in KEEPABLE's order. Raises TactileError for other words."""
     return parse_words(text, KEEPABLE, least=0)
 
 
@@ -54,9 +53,9 @@ def ball_radius(gel: str) -> float | None:
 
 
 def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLike, overwrite: bool) -> list[Path]:
-    """Return the result folder of each recording, after all checks that need no work; clears what killed runs left in
-    `out`. Raises TactileError: an empty `out`, two recordings of one name, a result that exists (unless `overwrite`),
-    something else in its place, a folder that cannot be written."""
+    """Return the result folder of each recording, after all checks that need no work; remove what killed runs left
+    there. Raises TactileError for an empty `out`, two recordings of one name, a result that exists (unless
+    `overwrite`), something else in its place, and a folder that cannot be written."""
     if not os.fspath(out):
         raise TactileError("--out", "an empty name", "a folder to write", "Name one")
     out = Path(out)
@@ -76,9 +75,9 @@ def result_folders(recordings: Sequence[str | os.PathLike], out: str | os.PathLi
 
 
 def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
-    """Raise TactileError where a folder exists, unless it is a result of the verb and `overwrite` is true.
-    maker : verb by which the result's note says it was made, "" for `tactile convert`
-    A result of another verb, or with foreign files in it, is refused whatever `overwrite` says."""
+    """Raise TactileError if a folder exists, unless it is a result of the same verb and `overwrite` is true. A result
+    of another verb, or with other files in it, is refused whatever `overwrite` says.
+    maker : verb that must have made it, as its note says; "" for `tactile convert`"""
     if not os.path.lexists(folder):
         return
     if not is_result(folder, maker):
@@ -93,13 +92,13 @@ def check_free(folder: Path, overwrite: bool, maker: str = "") -> None:
 
 
 def check_writable(out: Path) -> None:
-    """Raise TactileError for a folder that cannot be made or written; a missing one is not made."""
+    """Raise TactileError if a folder cannot be made or written; a missing one is not made."""
     with atomic.writing(out, advice="Name another --out, or allow writing"):
         atomic.probe(out)
 
 
 def is_result(folder: Path, maker: str = "") -> bool:
-    """Return true if a folder holds a result that --overwrite may replace; maker : of `check_free`"""
+    """Return true if a folder holds a result of a verb; maker : the verb, "" for `tactile convert`"""
     try:
         note = json.loads(read_small(folder / NOTE))
     except (OSError, ValueError, RecursionError, TactileError):
@@ -108,7 +107,7 @@ def is_result(folder: Path, maker: str = "") -> bool:
 
 
 def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
-    """Parse ``"image,electrodes"`` to words in known's order; None: all. TactileError for others, or under least."""
+    """Return the words of ``"image,electrodes"`` in known's order, None: all; TactileError for others or too few."""
     words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in known:
@@ -119,7 +118,7 @@ def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tup
 
 
 def parse_frames(text: str) -> slice:
-    """Parse ``"A:B:STEP"`` as in Python, with STEP above 0; raises TactileError for anything else."""
+    """Return the slice of ``"A:B:STEP"`` as in Python, with STEP above 0. Raises TactileError for anything else."""
     if not re.fullmatch(r"(-?\d{1,9})?:(-?\d{1,9})?(:\d{0,9})?", text):
         raise TactileError("--frames", repr(text), "A:B or A:B:STEP, such as 100:200 or ::10")
     first, last, step = ([int(part) if part else None for part in text.split(":")] + [None])[:3]
@@ -129,7 +128,7 @@ def parse_frames(text: str) -> slice:
 
 
 def select(frames: slice, count: int) -> np.ndarray:
-    """Return the indices (n,) of the selected ones of `count` frames; raises TactileError for none."""
+    """Return the indices (n,) that a slice selects of `count` frames. Raises TactileError if it selects none."""
     chosen = np.arange(count)[frames]
     if not len(chosen):
         found = f"{frames_text(frames)} takes none of the {count} frames"
@@ -138,6 +137,6 @@ def select(frames: slice, count: int) -> np.ndarray:
 
 
 def frames_text(frames: slice) -> str:
-    """Return the text that `parse_frames` reads; "all" for a selection without limits."""
+    """Return a slice as text that `parse_frames` reads; "all" if it has no limits."""
     first, last, step = [("" if part is None else str(part)) for part in (frames.start, frames.stop, frames.step)]
     return ":".join([first, last, step] if step else [first, last]) if first or last or step else "all"

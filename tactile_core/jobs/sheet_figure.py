@@ -1,4 +1,4 @@
-"""The figure of a contact sheet: its layout and its rows."""
+"""Draw the figure of a contact sheet: its layout and its rows."""
 
 from __future__ import annotations
 
@@ -41,14 +41,13 @@ PACKING = {"compress_level": 4}  # of a sheet without libdeflate: 1.2 MB in 0.14
 
 
 class SheetFigure:
-    """A figure filled from the top; rows and columns lie as the camera sees the gel, fingertip up."""
+    """Figure of a contact sheet, drawn from the top; maps lie as the camera sees the gel, fingertip up."""
 
     def __init__(
         self, columns: int, camera: Camera, warnings: list[str], truth: bool, *, snapshots: bool = False
     ) -> None:
-        """Make an empty figure for `columns` frames and a camera's gel, with warnings below the title.
-        truth : true makes room for rows of the true deformation; snapshots : true labels frames by number, not by
-            time"""
+        """Make an empty figure for `columns` frames and a camera's gel. warnings : lines below the title
+        truth : true makes room for rows of the true deformation; snapshots : true labels frames by number, not time"""
         from matplotlib.figure import Figure
 
         self._over, self._heading = ("snapshot", "snapshot {:.0f}") if snapshots else ("time, s", "{:.2f} s")
@@ -93,7 +92,7 @@ class SheetFigure:
             self.top += WARNING_LINE
 
     def electrodes(self, time: np.ndarray, electrodes: np.ndarray, frames: np.ndarray) -> None:
-        """Draw electrodes (T, 19), counts from rest, over time (T,) s, and mark frames (k,) of the columns."""
+        """Draw electrodes (T, 19), counts from rest, over time (T,) s; mark frames (k,), those of the columns."""
         import matplotlib
 
         self.top += NUMBERS
@@ -113,7 +112,7 @@ class SheetFigure:
         self.top += ELECTRODES + TIME_AXIS
 
     def explained(self, time: np.ndarray, explained: np.ndarray) -> None:
-        """Draw explained (T,), the explained share of the electrodes' change, over time (T,) s; below 0 as 0."""
+        """Draw explained (T,), share of the electrodes' change that is explained, over time (T,) s; below 0 as 0."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, EXPLAINED)
         axes.plot(time, np.clip(explained, 0, 1), color="black", linewidth=0.8)
         axes.set(xlim=self._over_time, ylim=(0, 1), yticks=[0, 0.5, 1], xticklabels=[])
@@ -121,7 +120,7 @@ class SheetFigure:
         self.top += EXPLAINED + GAP
 
     def pressure(self, time: np.ndarray, pressure: np.ndarray, measured: np.ndarray) -> None:
-        """Draw the fluid's pressure (T,) Pa over time (T,) s, translated and, where known, measured (T,) Pa."""
+        """Draw the fluid's translated pressure (T,) Pa over time (T,) s and, if known, the measured one (T,) Pa."""
         axes = self._axes(LEFT, WIDTH - LEFT - RIGHT, PRESSURE)
         if np.isfinite(measured).any():
             axes.plot(time, 1e-3 * measured, color="0.55", linewidth=1.6, label="measured")
@@ -133,8 +132,8 @@ class SheetFigure:
         self.top += PRESSURE + TIME_AXIS
 
     def headings(self, seconds: np.ndarray) -> None:
-        """Write above each column its number, from 1, and its time; seconds : (k,) s from the start; where
-        the figure was made with ``snapshots``, their numbers"""
+        """Write above each column its number, from 1, and its time; seconds : (k,) s from the recording's start, or
+        numbers of snapshots"""
         for k, at in enumerate(seconds):
             text = f"{k + 1}:  {self._heading.format(at)}"
             self._text(self._middle(k), 0.17, text, size=10, weight="bold", ha="center", va="center")
@@ -143,7 +142,7 @@ class SheetFigure:
     def skin_row(
         self, label: str, displacement: np.ndarray, largest: float, centers: np.ndarray | None, sensor: str
     ) -> None:
-        """Draw maps of displacement (k, N, 3) m on a sensor's unrolled skin, one per column; label : before the row
+        """Draw maps of displacement (k, N, 3) m on a sensor's unrolled skin, one per column. label : before the row
         largest : m, where colours end; centers : (k, c, 2) = (x, z) m of contacts, or None"""
         plan, faces = unrolling.unrolled_nodes(sensor), sensors.sensor_surface(sensor).faces
         faces = faces[np.isfinite(plan[faces]).all((1, 2))]
@@ -151,7 +150,7 @@ class SheetFigure:
         self.top += GAP
 
     def gel_row(self, label: str, displacement: np.ndarray, centers: np.ndarray) -> None:
-        """Draw maps of displacement (k, M, 3) m of the gel after a label, the picture's border, centers (k, c, 2) m."""
+        """Draw maps of displacement (k, M, 3) m of the gel, the picture's border, and centers (k, c, 2) m."""
         gel, z = self._gel, self._gel_z
         axes = self._surface_row(
             label, gel.rest[:, [0, 2]], gel.faces, displacement, scale(displacement), self._gel_x, z, centers
@@ -167,7 +166,7 @@ class SheetFigure:
         self.top += Z_AXIS
 
     def _on_sheet(self, place: np.ndarray, column: int, z: tuple[float, float]) -> np.ndarray:
-        """Convert place (..., 2) = (x, z) m on a column's map to (..., 2) mm from a row's left edge, and along x.
+        """Convert place (..., 2) = (x, z) m on a column's map to (..., 2) mm from the row's left edge, and along x.
         z : m, range that a map shows"""
         pitch = (self.column_width + GAP) / self.column_width * (z[1] - z[0])
         from_left = self.camera.right_z * place[..., 1] - min(self.camera.right_z * np.array(z))
@@ -184,8 +183,7 @@ class SheetFigure:
         z: tuple[float, float],
         centers: np.ndarray | None,
     ) -> Axes:
-        """Draw a row of maps of |displacement| (k, n, 3), m, over the plan (n, 2) = (x, z) m; one set of axes is
-        faster.
+        """Draw maps of the length of displacement (k, n, 3) m over the plan (n, 2) = (x, z) m, in one set of axes.
         faces : (f, 3) nodes; x, z : m, ranges shown; largest : m, where colours end; centers : (k, c, 2) m, or None"""
         from matplotlib.tri import Triangulation
 
@@ -213,7 +211,7 @@ class SheetFigure:
         return axes
 
     def _row(self, height: float) -> Axes:
-        """Make the axes that all columns of a row share, without a border; height : inches"""
+        """Return the axes that all columns of a row share, without a border; height : inches"""
         axes = self._axes(LEFT, self.columns * (self.column_width + GAP) - GAP, height)
         axes.spines[:].set_visible(False)
         axes.tick_params(length=2.5, labelsize=7)
@@ -221,7 +219,7 @@ class SheetFigure:
         return axes
 
     def _frame(self, axes: Axes, corner: np.ndarray, opposite: np.ndarray) -> Rectangle:
-        """Draw border and background of one column, corner to opposite corner (2,) of the axes; return the latter."""
+        """Draw a column's border and background, corner to opposite corner (2,) of the axes; return the latter."""
         from matplotlib.patches import Rectangle
 
         width, height = opposite - corner
@@ -240,7 +238,7 @@ class SheetFigure:
         bar.set_label("displacement, mm", size=8)
 
     def picture_row(self, label: str, pictures: np.ndarray) -> None:
-        """Draw pictures (k, H, W, 3) uint8; label : before the row"""
+        """Draw pictures (k, H, W, 3) uint8; label : text before the row"""
         height = self.column_width * self.camera.height / self.camera.width
         axes = self._row(height)
         for k in range(self.columns):
@@ -255,8 +253,8 @@ class SheetFigure:
         self.top += height
 
     def captions(self, force: np.ndarray, *trust: np.ndarray) -> None:
-        """Write each column's force (k, 3) N and how far to trust it, and a key of the maps below.
-        trust : arrays (k,) of the first four arguments of `in_words`: confidence, flags, expected error m, dent m"""
+        """Write each column's force (k, 3) N and how far to trust it, and a key to the maps below.
+        trust : arrays (k,): confidence 0..1, flags, expected error m, dent m"""
         for k, (confidence, flags, error, dent) in enumerate(zip(*trust, strict=True)):
             words = in_words(confidence, flags, error, dent, force[k])
             lines = [f"force {np.linalg.norm(force[k]):.2f} N", *words.replace(", ", ",\n").split("\n")]
@@ -272,7 +270,7 @@ class SheetFigure:
         self._text(LEFT, 0.05, foot, size=7.5, color="0.35", va="center")
 
     def png(self) -> bytes:
-        """Return the figure as a file: equal figures make equal bytes."""
+        """Return the figure as the bytes of a PNG; equal figures make equal bytes."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         canvas = FigureCanvasAgg(self.figure)
@@ -281,13 +279,13 @@ class SheetFigure:
 
 
 def scale(*displacements: np.ndarray | None) -> float:
-    """Return the largest length, m, of displacements (k, n, 3) m, at least 1e-6; None counts as zero."""
+    """Return the largest length, m, among displacements (k, n, 3) m, at least 1e-6; None is skipped."""
     lengths = [np.linalg.norm(d, axis=-1).max(initial=0) for d in displacements if d is not None]
     return max(SMALLEST_SCALE, *lengths)
 
 
 def _shown(place: np.ndarray, beside: float) -> tuple[float, float]:
-    """Return the range, m, that a row shows along an axis: all nodes' place (n,) m and `beside` m, to 0.1 mm."""
+    """Return the range, m, that a row shows along an axis: all nodes' place (n,) m, and `beside` m more, to 0.1 mm."""
     low, high = np.round(1e4 * np.array([place.min() - beside, place.max() + beside])) / 1e4
     return float(low), float(high)
 

@@ -42,7 +42,7 @@ Value = float | str
 
 
 def combinations(words: Sequence[str]) -> list[dict[str, Value]]:
-    """List all combinations of the values in ``NAME=...`` words, each a dict by name; the last name changes fastest.
+    """Return all combinations of the values in ``NAME=...`` words, each name -> value; the last name changes fastest.
     Raises TactileError for bad or repeated words."""
     axes: dict[str, list[Value]] = {}
     for word in words:
@@ -88,8 +88,8 @@ def _number(word: str, text: str) -> float:
 
 
 def name_of(values: dict[str, Value]) -> str:
-    """Make a file name, of at most 80 characters, from the values: ``force_n-0.2_tilt_deg-10``; a text is its own name.
-    Without values: ``scene``."""
+    """Return a file name of at most 80 characters: ``force_n-0.2_tilt_deg-10``; a text value stands for itself.
+    Without values it is ``scene``."""
     parts = [
         f"{name.rpartition('.')[2]}-{value:g}" if isinstance(value, float) else value for name, value in values.items()
     ]
@@ -97,7 +97,7 @@ def name_of(values: dict[str, Value]) -> str:
 
 
 def with_values(scene: Scene, values: dict[str, Value], where: str) -> Scene:
-    """Return the scene with other values, name -> value as in a grid. Raises TactileError, of the file `where`, for an
+    """Return the scene with other values, name -> value as in a grid. Raises TactileError, on the file `where`, for an
     unknown field, or a value out of its range."""
     document = msgspec.to_builtins(scene)
     for name, value in values.items():
@@ -154,9 +154,9 @@ def simulate_grid(
     progress: Progress = lambda done, known: None,
     place: Callable[[Path], Place] = InProcess,
 ) -> None:
-    """Simulate all recordings of a `plan` into the folder ``out``; the job is in ``<out>.parts`` until all are done.
-    progress : (tasks done, known so far); place : function from the job's folder to the executor of tasks
-    Raises TactileError for what cannot be done."""
+    """Simulate all recordings of a job into the folder ``out``; the job is in ``<out>.parts`` until all are done.
+    progress : called with (tasks done, known so far); place : function from the job's folder to the executor of tasks
+    Raises TactileError for the first recording that cannot be simulated, and if the disk cannot be written."""
     for sensor in PAIR:
         compliance_of(sensor)  # built once here, not by every worker at the same time
     with runs.completed(Path(out), job, place, progress) as folder:
@@ -170,9 +170,9 @@ def plan(
     seed: int = 0,
     keep: Sequence[str] = DEFAULT,
 ) -> Job[Simulate]:
-    """Return the job: the [recording] of a scene for each combination of the values in ``grid``, words
-    such as ``force_n=0.2:2:5``.
-    seed : of the first recording, the next ones count on; keep : electrodes, displacement_<sensor>, traction_<sensor>
+    """Return the job that simulates the [recording] of a scene for each combination of values.
+    grid : words such as ``force_n=0.2:2:5``; seed : of the first recording, one more for each next one
+    keep : electrodes, displacement_<sensor>, traction_<sensor>
     Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)
     scene, _, inputs, files = read_scene(scene_path, [name_of(one) for one in values])
@@ -201,7 +201,7 @@ def prepare_input(folder: Path, job: Job[Simulate], index: int) -> tuple[int, bo
 
 
 def make(folder: Path, job: Job[Simulate], index: int, number: int) -> bool:
-    """Simulate recording `index`, unless its file is there; returns true if it was made."""
+    """Simulate recording `index`, unless its file is there; return true if it was simulated."""
     from ..simulation.scene_recording import simulate_recording
 
     one = job.inputs[index]

@@ -1,10 +1,10 @@
-"""Solve the contacts that the networks found, on the same or another gel, in place of the gel they translate.
+"""Solve the contacts that the networks found, on the same or another gel, in place of the gel that they translate.
 
 From the translation come the place of the dent, the size of the force, the direction in which the deepest node moves,
-and the curvature of the dented patch, unless the user knows what touched. Assumed is a ball that presses in along that
+and the curvature of the dented patch, unless the user knows what touched. A ball is assumed that presses in along that
 direction and sticks to that node, with the friction of all contacts here (0.78): flats, rings and edges come out round,
 as no network tells the object's outline. Place and force keep the networks' errors; the surface under that load has
-only the fast tier's own. Place, force and lean are of the plane that all gels share, so a contact found on the DIGIT is
+the fast tier's alone. Place, force and lean are of the plane that all gels share, so a contact found on the DIGIT is
 solved on any gel with a descriptor, without training."""
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ OUTWARD = np.array([0.0, -1.0, 0.0])  # of the gel, which is nearly flat
 
 
 def check_installed() -> None:
-    """Raise TactileError where scipy, which solving needs, is missing."""
+    """Raise TactileError if scipy is missing, which solving needs."""
     if importlib.util.find_spec("scipy") is None:
         raise TactileError("--gel solved", "scipy is not installed", "scipy", f"Install it: {advice('fem')}")
 
 
 def prepare(gel: str = TARGET) -> None:
-    """Read a gel's compliance, or build it (a minute, once), before a recording begins."""
+    """Read a gel's compliance, or build it (a minute, once), before a recording begins; TactileError without scipy."""
     check_installed()
     compliance_of(gel)
 
@@ -46,16 +46,15 @@ def prepare(gel: str = TARGET) -> None:
 def solved(
     arrays: dict[str, np.ndarray], gel: str = TARGET, found_on: str = TARGET, ball: float | None = None
 ) -> dict[str, np.ndarray]:
-    """Replace the gel displacements of translated frames by solved contacts, each frame by itself.
+    """Replace the gel displacements of translated frames by those of solved contacts, each frame by itself.
 
-    arrays : by the names of frames.h5, T first; frames without contact are unchanged
-    gel : the sensor that is solved; found_on : the one on which the networks find contacts
+    arrays : name -> (T, ...), by the names of frames.h5; frames without contact stay as they are
+    gel : name of the gel that is solved; found_on : that of the gel on which the networks find contacts
     ball : radius, m, of the ball that touched; None for one as curved as the dent
     Returns the arrays with ``traction_digit`` (T, M, 3) Pa added, zero in frames that were not solved. Under a known
     ball the expected error shrinks with the dent; its bound stays. A frame without a solution keeps the networks'
-    displacement and is flagged ``GEL_NOT_SOLVED``. Where `gel` differs from `found_on`,
-    a frame without a solution is at rest, contacts beside the gel are flagged as beyond it, the networks' latents are
-    left out, and errors, which are not known, are NaN."""
+    displacement and is flagged ``GEL_NOT_SOLVED``. If `gel` is not `found_on`, a frame without a solution is at rest,
+    contacts beside the gel are flagged as beyond it, latents are left out, and errors, which are unknown, are NaN."""
     moved, flags, center = arrays["displacement_digit"], arrays["flags"].copy(), arrays["contact_center"]
     own = gel == found_on
     found = moved.copy() if own else np.zeros((len(moved), len(sensors.sensor_surface(gel).rest), 3), moved.dtype)
@@ -78,7 +77,7 @@ def solved(
 def _contacts(
     moved: np.ndarray, center: np.ndarray, size: np.ndarray, gel: str, ball: float | None
 ) -> Iterator[tuple[int, BodyContact]]:
-    """Yield frames in contact with their contacts; moved : (T, n, 3) m; center : (T, 2) = (x, z) m; size : (T,) N
+    """Yield (frame, contact) for frames in contact. moved : (T, n, 3) m; center : (T, 2) = (x, z) m; size : (T,) N
     ball : radius, m, of the body; None for that of the dent"""
     surface = sensors.sensor_surface(gel)
     rest, normals, patches = surface.rest, node_normals(surface.rest, surface.faces), contact_patch(moved, surface)
@@ -92,7 +91,7 @@ def _contacts(
 
 
 def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray]:
-    """Remove values that hold for the networks' gel alone from arrays of frames solved on another; see `solved`."""
+    """Return arrays of frames solved on another gel without what holds for the networks' gel alone; see `solved`."""
     flags, (x, z) = arrays["flags"].copy(), arrays["contact_center"].T
     flags[sensors.shape_of(gel).outline_distance(x, z) <= 0] |= np.uint16(Flag.BEYOND_DIGIT)
     unknown = {name: np.full_like(arrays[name], np.nan) for name in ERRORS if name in arrays}
@@ -102,10 +101,10 @@ def _on_another(arrays: dict[str, np.ndarray], gel: str) -> dict[str, np.ndarray
 def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, np.ndarray]:
     """Return ``traction_digit`` (T, M, 3) Pa at M nodes, and its sum ``traction_force`` (T, 3) N, of translated frames.
 
-    arrays : by the names of frames.h5, T first. Solved frames bring their traction. For others in contact it is
+    arrays : name -> (T, ...), by the names of frames.h5. Solved frames have their traction. For others in contact it is
         derived: pattern and direction from the displacement, size from the networks' force, which is nearer the truth
         (on the gel a dent a tenth too shallow carries a fifth too little: docs/convert.md). It is zero elsewhere
-    gel : the gel's sensor, by name"""
+    gel : name of the gel's sensor"""
     displacement, touched = arrays["displacement_digit"], np.isfinite(arrays["contact_center"][:, 0])
     solved = arrays.get("traction_digit")
     traction = np.zeros(displacement.shape, np.float32) if solved is None else solved
@@ -121,8 +120,8 @@ def gel_traction(arrays: dict[str, np.ndarray], gel: str = TARGET) -> dict[str, 
 
 
 def describe_miss(total: np.ndarray, force: np.ndarray, solved: bool = False) -> str:
-    """Describe how far the magnitude of total (T, 3) N, sums of traction, is from that of the networks' force (T, 3) N.
-    Directions are not compared: the force is that on the finger, whose pad is curved.
+    """Return a sentence on how far the size of total (T, 3) N, sums of traction, is from that of force (T, 3) N, the
+    networks'. Directions are not compared: the force is that on the finger, whose pad is curved.
     solved : true if gels were solved under that force"""
     size, carried = accuracy.lengths(force), accuracy.lengths(total)
     pressed = size > 0

@@ -1,5 +1,5 @@
-"""Recordings to shards of translated frames: the recipe of such a job, and its tasks. Each recording's signals are
-prepared once, then its shards are made.
+"""Make shards of translated frames from recordings: the recipe of such a job, and its tasks. Each recording's signals
+are prepared once, then its shards are made.
 
 A shard is a checksummed HDF5 file in the layout of ``frames_file``, pictures included. Its attributes name the
 recording and its hash, the recipe's hash, its number and the number of shards; its rows are frames from `number *
@@ -46,9 +46,8 @@ def completed(
 ) -> Translate:
     """Return the recipe of a job on these recordings, with the hashes, source and variant that follow from its files.
 
-    wanted : what was asked for; its preset is empty for fast pictures, if any
-    say : called with sentences on approximations of the gel; weights, calibration : folder and file, None for those
-        that ship
+    wanted : what was asked for, its preset "" for fast pictures, if any; say : called with sentences on what is
+        approximated; weights : folder, calibration : file, None for those that ship
     Raises TactileError for options that do not go together, and for unknown names."""
     wanted.prepare.options().check()
     source = None if weights else readers.sensor_of_first(paths, wanted.prepare.columns)
@@ -87,14 +86,14 @@ def count(frames: int, job: Job[Translate]) -> int:
 
 
 def prepare_input(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
-    """Prepare a recording; returns the number of its shards, and true if it was prepared now."""
+    """Prepare a recording; return the number of its shards, and true if it was prepared now."""
     frames, made = prepared_signals.make(folder, job, index)
     return count(frames, job), made
 
 
 def make(folder: Path, job: Job[Translate], index: int, number: int) -> bool:
-    """Translate shard `number` of recording `index` unless it is whole; returns true if it was made. Raises
-    TactileError; OSError of the disk."""
+    """Translate shard `number` of recording `index` unless it is whole; return true if it was translated. Raises
+    TactileError, and OSError of the disk."""
     recipe, name = job.recipe, job.inputs[index].name
     pictures, pair = (job.calibration, recipe.preset, recipe.variant or None), (recipe.target, recipe.source)
     options = ToolOptions(job.weights, *pictures, recipe.answer, recipe.gel, *pair)
@@ -126,14 +125,14 @@ def is_of(file: Path, job: Job[Translate], index: int, number: int, frames: int)
 
 
 def _identity(job: Job[Translate], index: int, number: int, frames: int) -> dict[str, str | int]:
-    """Return the attributes that distinguish shard `number` of recording `index`, of so many frames, from others."""
+    """Return the attributes that tell shard `number` of recording `index`, of so many frames, from others."""
     return {
         "recording_sha256": job.inputs[index].sha256, "recipe": job.id, "shard": number, "shards": count(frames, job)
     }  # fmt: skip
 
 
 def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts | None:
-    """Return the facts of a prepared recording: shards, frames, warnings, bytes; None where it is not prepared."""
+    """Return the facts of a prepared recording: shards, frames, warnings, bytes; None if it is not prepared."""
     file = jobs.prepared_file(folder, job.inputs[index].name)
     _, frames = checksummed.stated(file)
     if frames is None:  # none yet, or a damaged one, which the next run makes again
@@ -145,7 +144,7 @@ def inspect_input(folder: Path, job: Job[Translate], index: int) -> InputFacts |
 
 @functools.lru_cache(maxsize=2)
 def _tools(options: ToolOptions, sha256: str, unit_sha256: str) -> Tools:
-    """Load the networks and the unit, once per process. Raises TactileError where they are not the job's."""
+    """Return networks and drawer, loaded once per process. Raises TactileError if they are not the job's."""
     check_unit(options.calibration, unit_sha256)
     tools = convert.load_tools(options)
     if tools.translator.sha256 != sha256:

@@ -121,8 +121,7 @@ class LiveSignals:
         return self._known
 
     def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
-        """Return the signals of electrodes (T, 19) and pdc (T,), as in the file or NaN; raises ValueError as
-        `known`."""
+        """Return the signals of electrodes (T, 19), pdc (T,), as in the file or NaN. Raises ValueError as `known`."""
         count, rest, kind = len(electrodes), self.known.rest, self.known.kind
         unheard = alike(electrodes) & (kind == "raw")
         flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)

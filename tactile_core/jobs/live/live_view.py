@@ -65,8 +65,7 @@ class View:
         self.latencies: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
 
     def show(self, rows: Recording, came: float) -> Shown | None:
-        """Translate and draw the last of rows that came at `came`, s of time.perf_counter; None before rest is
-        known."""
+        """Translate and draw the last of rows that came at `came`, s of perf_counter; None before rest is known."""
         began = time.thread_time()
         self.frames += len(rows)
         self._counts = _newest(rows.electrodes, self._counts)
