@@ -114,6 +114,10 @@ def _counted(recipe: Recipe, found: Collected) -> list[str]:
     if recipe.split.by and not splits[TEST]:
         wanted = f"values {', '.join(recipe.split.test)}" if recipe.split.test else "values one in five"
         lines.append(f"warning: nothing is held out for testing: no {recipe.split.by} among the {wanted}")
+    elif absent := sorted({*recipe.split.test} - {file.labels.get(recipe.split.by, "") for file in found.files}):
+        lines.append(f"warning: no recording has the {recipe.split.by} {', '.join(absent)}, which split.test holds out")
+    if not splits[TRAIN]:
+        lines.append("warning: nothing is left to train on: split.test names every recording")
     alike: dict[tuple[str, str], set[str]] = {}
     for name, text in (label for file in found.files for label in file.labels.items()):
         alike.setdefault((name, text.casefold()), set()).add(text)

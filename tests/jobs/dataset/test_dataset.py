@@ -188,6 +188,19 @@ def test_labels_that_differ_in_case_alone_are_named(recipe, tmp_path, capsys):
     assert "warning: object Ball, ball are taken for different ones: rename the files" in said
 
 
+@pytest.mark.parametrize(
+    ("sessions", "said"),
+    [("14", ["no recording has the session 5, which"]), ("45", ["nothing is left to train on"]), ("145", [])],
+)
+def test_a_split_that_holds_out_less_than_it_names_or_all_is_told(sessions, said, recipe, tmp_path, capsys):
+    (tmp_path / "in").mkdir()
+    for session in sessions:
+        (tmp_path / "in" / f"ball_{session}.npz").touch()
+    assert main(command(recipe, tmp_path / "in", tmp_path / "out")) == 2
+    warned = [line for line in capsys.readouterr().err.splitlines() if "session 5" in line or "left to train" in line]
+    assert len(warned) == len(said) and all(words in line for words, line in zip(said, warned, strict=True))
+
+
 @pytest.mark.parametrize(("name", "numbers"), [
     ("angle_1.5.csv", ["1.5"]), ("x_-10_y_0.6.csv", ["-10", "0.6"]), ("run.1.2.csv", ["1", "2"]),
     ("2024.01.05_a.csv", ["2024", "01", "05"]),
