@@ -103,7 +103,7 @@ def load_tools(options: ToolOptions) -> Tools:
 
 @dataclasses.dataclass(frozen=True)
 class Converted:
-    """A finished conversion. folder : of the result; warnings : sentences
+    """A finished conversion. folder : where the result is; warnings : sentences
     remark : sentence on how far the sum of kept traction differs from the force; "" if none is kept"""
 
     folder: Path

@@ -32,8 +32,8 @@ class MujocoGel:
 
     model : mujoco.MjModel, metres
     geom : name of the geom that stands for the gel in MuJoCo's contacts
-    site : name of a site whose frame is the sensor's: x along the finger, tip toward -x, y into the gel
-    sensor : "digit" or "biotac"; friction : of the gel, Coulomb's coefficient; preset : of its pictures
+    site : name of a site with the sensor's frame: x along the finger, tip toward -x, y into the gel
+    sensor : "digit" or "biotac"; friction : Coulomb's coefficient of the gel; preset : name of its pictures' preset
     gel : the `Gel` that pressed last, one per geom; None before the first contact
     Of several geoms that touch, the one with MuJoCo's largest force presses the gel; planes never do. Raises
     TactileError for names that the model lacks."""

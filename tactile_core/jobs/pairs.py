@@ -71,7 +71,7 @@ def plan(
     pair: tuple[str, str] = PAIR,
     keep: Sequence[str] = (),
 ) -> tuple[Job[Pairs], list[str], str]:
-    """Return the job, the indenters' names and the scene's TOML text; arguments and errors as of ``make_pairs``."""
+    """Return the job, the indenters' names and the scene's TOML text; parameters and errors: see ``make_pairs``."""
     source, target = pair
     of_kind(source, Fluid), of_kind(target, GelSensor)
     scene, text, inputs, files = read_scene(scene_path, ["presses"])

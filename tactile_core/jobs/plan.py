@@ -100,7 +100,8 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
 
 
 def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Return the cost of converting a number of frames. keep : words of --keep; preset : of the pictures"""
+    """Return the cost of converting a number of frames. keep : words of --keep; preset : name of the pictures'
+    preset"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]

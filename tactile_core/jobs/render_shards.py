@@ -1,6 +1,6 @@
 """Run `tactile render` in many processes: the same folder as from one process, but without timings.json.
 
-What jobs call is described in ``engine.recipes``."""
+``engine.recipes`` says what `prepare_input`, `make` and `inspect_input` are for."""
 
 from __future__ import annotations
 

@@ -171,7 +171,7 @@ def plan(
     keep: Sequence[str] = DEFAULT,
 ) -> Job[Simulate]:
     """Return the job that simulates the [recording] of a scene for each combination of values.
-    grid : words such as ``force_n=0.2:2:5``; seed : of the first recording, one more for each next one
+    grid : words such as ``force_n=0.2:2:5``; seed : random seed of the first recording, one more for each next one
     keep : electrodes, displacement_<sensor>, traction_<sensor>
     Raises TactileError for a bad scene, grid or place, before any work."""
     values = combinations(grid)

@@ -93,7 +93,7 @@ class Store:
         return self._loaded(name).astype(dtype, copy=False)
 
     def optional(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Return an array of numbers of a shape, None if the file has none of that name; raises as `array` does."""
+        """Return the array `name` by `array`, or None if the file has none of that name."""
         return self.array(name, shape) if name in self.shapes else None
 
     def _loaded(self, name: str) -> np.ndarray:

@@ -23,9 +23,9 @@ COARSE = 2.0  # counts between readings from which noise is lost in their steps,
 
 
 def averaged(recording: Recording, readings: np.ndarray, change: Framewise, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) uint16: OUT_OF_RANGE where readings that lack a finger's noise move within half a second, since
-    averages are wrong there; in all frames if no noise at all is left; 0 elsewhere.
-    readings : (T, e) counts; change : (T, e) counts against rest; warnings : list, extended if the noise is missing"""
+    """Return flags (T,) uint16. If readings lack a finger's noise, frames that move within half a second are
+    OUT_OF_RANGE, since averages are wrong there; all frames are if no noise at all is left.
+    readings : (T, e) counts; change : (T, e) counts against rest; warnings : list, extended if noise is missing"""
     flags = np.zeros(len(readings), np.uint16)
     if recording.simulated or not np.isfinite(recording.time).all():
         return flags

@@ -26,7 +26,7 @@ CONTEXT = 200  # frames that a part shares with the one before: glitches are loo
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """Part of a recording. repeated : number of frames at its start that the part before holds, too"""
+    """Part of a recording. repeated : number of frames at its start that the part before also holds"""
 
     recording: Recording
     repeated: int

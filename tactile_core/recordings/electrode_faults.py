@@ -107,7 +107,7 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _frozen(electrodes: np.ndarray, change: np.ndarray) -> np.ndarray:
-    """Return (T,) bool, true in runs of `FROZEN` and more frames without a change, if others are noisy.
+    """Return (T,) bool, true in runs of `FROZEN` and more frames without a change, if the other frames are noisy.
     electrodes : (T, e) readings; change : (T - 1, e) bool, true if a reading differs from that of the frame before"""
     still = np.r_[False, ~change.any(axis=1)]
     found = np.zeros(len(still), bool)
@@ -234,7 +234,7 @@ def strange_rest(rest: np.ndarray, sensor: str, warnings: list[str]) -> bool:
 
 
 def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) uint16: SATURATED where one of raw readings (T, 19) is at a range's end; extend warnings."""
+    """Return flags (T,) uint16: SATURATED if one of raw readings (T, 19) is at an end of 12 bits; extend warnings."""
     if kind != "raw":
         return np.zeros(len(readings), np.uint16)
     ends = (readings <= 0) | (readings >= COUNT_MAX)
@@ -248,7 +248,7 @@ def saturated(recording: Recording, readings: np.ndarray, kind: str, warnings: l
 
 
 def dead(recording: Recording, readings: np.ndarray, warnings: list[str]) -> np.ndarray:
-    """Return flags (T,) uint16: DEAD_CHANNEL where one of readings (T, 19) counts stands still; extend warnings."""
+    """Return flags (T,) uint16: DEAD_CHANNEL if one of readings (T, 19) counts stands still; extend warnings."""
     still = _still(readings)
     whole = still.all(axis=0)
     if whole.any():

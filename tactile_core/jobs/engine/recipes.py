@@ -94,7 +94,7 @@ class Pairs(msgspec.Struct, tag="pairs", tag_field="verb", forbid_unknown_fields
 
 class Simulate(msgspec.Struct, tag="simulate", tag_field="verb", forbid_unknown_fields=True, frozen=True):
     """Recipe from a scene to one recording for each input, each with its own values of the scene's parameters.
-    seed : of the first input, one more for each next one; values : one dict per input, name -> value
+    seed : random seed of the first input, one more for each next one; values : one dict per input, name -> value
     keep : electrodes, displacement_<sensor>, traction_<sensor>; files : SHA-256 of the scene's meshes"""
 
     seed: int

@@ -190,7 +190,7 @@ def begun(out: Path, job: Job) -> Iterator[Path]:
 
 
 def write(out: str | os.PathLike, job: Job) -> Path:
-    """Write the job of the result `out` alone, for `tactile batch --array`; return <out>.parts. Raises as `begun`."""
+    """Write the job of `out` alone, for `tactile batch --array`; return <out>.parts. TactileError for another job's."""
     with begun(Path(out), job) as folder:
         return folder
 

@@ -91,7 +91,7 @@ def _read(store: Store, name: str) -> np.ndarray:
 
 
 def labels_in(store: Store, frames: int) -> dict[str, np.ndarray]:
-    """Return labels, name -> (`frames`,) texts: of texts, and of numbers and attributes with a label's name."""
+    """Return labels, name -> (`frames`,) texts: arrays of texts; numbers and attributes with a label's usual name."""
     found = {
         name: np.full(frames, value, dtype=object)
         for name, value in store.attributes.items()

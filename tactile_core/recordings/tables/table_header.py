@@ -20,7 +20,7 @@ NUMBERED = "column{}"  # names of columns without a header, from 1
 
 @dataclass
 class Header:
-    """Header of a table. names : of the columns, in lower case; lines : number of lines up to it, with it
+    """Header of a table. names : the columns' names, in lower case; lines : number of lines up to the header, with it
     separator : character between cells; line : text of the header, "" if it is a comment or missing"""
 
     names: tuple[str, ...]

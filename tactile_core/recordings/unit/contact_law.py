@@ -111,7 +111,7 @@ def exchanged_share(change: np.ndarray, sensor: str = SOURCE) -> tuple[float, tu
 
 
 def apart(change: np.ndarray, sensor: str = SOURCE) -> int:
-    """Return the number of different contacts in change (n, 19) counts: dissimilar ones among the nearest simulated."""
+    """Return the number of different contacts in change (n, 19) counts: unlike each other by simulated ones."""
     known = patterns(sensor)
     near, counts = np.unique((unit(change[spread_out(len(change), MOST)]) @ known.T).argmax(axis=1), return_counts=True)
     kept: list[int] = []
