@@ -97,8 +97,8 @@ class BumpyCube(Indenter):
         return Box((self.size, self.size, 2 * self.size), self.edge), Pose(apex, np.eye(3))
 
     def _nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return, of points (n, 3), the nearest part (n,), its distance (n,) m, gradient (n, 3), points from their
-        bump."""
+        """Return the number (n,) of the part nearest to points (n, 3) m, its distance (n,) m and gradient (n, 3), and
+        the points (n, 3) m in the frame of the bump next to each."""
         outer = np.copysign(self.spacing, points[:, :2])
         outer[np.abs(points[:, 0]) + np.abs(points[:, 1]) <= self.spacing] = 0.0
         at_bump = points.copy()

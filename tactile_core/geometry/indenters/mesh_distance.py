@@ -55,8 +55,8 @@ class NearTriangles:
         return self._cell * np.sqrt(squares)
 
     def _by_tree(self, points: np.ndarray, bound: float) -> np.ndarray:
-        """Return ``distance`` of points, bound without numba: search ever more of the nearest pieces, to the
-        nearest."""
+        """Return what ``distance`` does, without numba, by searching ever more of the pieces nearest to each of points
+        until no other can be nearer than ``bound`` or what was found."""
         import scipy.spatial
         import trimesh
 

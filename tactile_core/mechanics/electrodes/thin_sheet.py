@@ -35,7 +35,7 @@ class ThinSheet:
 
     def potentials(self, film: np.ndarray, conductivity: float = 1.0) -> np.ndarray:
         """Return the mean potential (k, k) V of electrode i for 1 A into electrode j, up to a constant per column.
-        film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError where the film is not positive.
+        film : (n,) m, thickness at the nodes; conductivity : S/m. Raises ValueError unless the film is positive.
         Each current leaves at the first node, at 0 V: only sums of columns whose currents cancel have a meaning."""
         from ..solids.sparse_cholesky import factor
 

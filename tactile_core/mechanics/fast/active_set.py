@@ -19,7 +19,8 @@ _GAP_ROUNDING = 1e-10  # m: below what single precision of the compliance resolv
 
 
 class UnsolvedError(ArithmeticError):
-    """Error of a contact not found: no positive definite matrix, no node to carry the force, or endless iterations."""
+    """Error of a contact that is not found: its matrix is not positive definite, no node can carry the force, or
+    iterations do not end."""
 
 
 class ExhaustedError(UnsolvedError):
@@ -37,7 +38,7 @@ class Work:
         self.left -= float(unknowns) ** 3 * iterations
 
     def check(self) -> None:
-        """Raise ExhaustedError where nothing is left."""
+        """Raise ExhaustedError if nothing is left."""
         if self.left <= 0:
             raise ExhaustedError("too large a contact for the work it may cost")
 

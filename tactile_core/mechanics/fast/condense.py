@@ -38,7 +38,7 @@ class Half:
 
 
 def mirror_nodes(nodes: np.ndarray) -> np.ndarray:
-    """Return each node's image under z to -z, (n,), of nodes (n, 3) m. Raises ValueError where one has none."""
+    """Return each node's image under z to -z, (n,), of nodes (n, 3) m. Raises ValueError if one has none."""
     from scipy.spatial import cKDTree
 
     away, image = cKDTree(nodes).query(nodes * _MIRROR)
@@ -131,7 +131,8 @@ class _Elimination:
         return self.dof[full[local]], self.sign[full[local]], local
 
     def group(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return a group of cells' unknowns (n,) that others share or that are kept, and its stiffness (n, n)."""
+        """Return the unknowns (n,) of a group of ``cells`` that other cells share or that are kept, and the stiffness
+        (n, n) N/m that the group has among them."""
         if len(cells) <= _LEAF:
             parts = []
             for c in cells:
@@ -147,8 +148,8 @@ class _Elimination:
         return self._eliminate(cells, parts)
 
     def _eliminate(self, cells: np.ndarray, parts: list) -> tuple[np.ndarray, np.ndarray]:
-        """Add up the parts of a group of ``cells``, eliminate unknowns of no other cell (Schur complement); see
-        `group`."""
+        """Add up the parts of a group of ``cells`` and eliminate the unknowns that belong to no other cell (Schur
+        complement); return what ``group`` does."""
         from scipy.linalg import lapack, solve_triangular
 
         uses = np.zeros(self.free, int)

@@ -63,7 +63,7 @@ class ContactProblem:
         self._look_near(pose.moved(reach))
 
     def _resting(self) -> np.ndarray:
-        """Rest positions (m, 3) m of the touchable nodes."""
+        """Return rest positions (m, 3) m of the touchable nodes."""
         return self.compliance.surface.rest[self.compliance.touchable]
 
     def at_depth(self, depth: float, start: Contact | None = None) -> Contact:
@@ -188,7 +188,7 @@ class ContactProblem:
         return dataclasses.replace(contact, converged=False)
 
     def _iterate(self, pose, axial_force, before, moved, candidates, shift) -> Try | None:  # noqa: ANN001
-        """Solve for candidates, with friction or without; None where that fails. Arguments as in ``_rounds``."""
+        """Solve for candidates, with friction or without; None if that fails. Arguments as in ``_rounds``."""
         self.work.check()
         block = self._block
         if block is None or not (

@@ -181,8 +181,8 @@ class Candidates:
 
 
 def _meet(points: np.ndarray, first: np.ndarray, others: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the points (j, 3) m where two planes meet that are nearest to ``points``, in the first plane; ``others``
-    lie in the second. first, second : the planes' unit normals"""
+    """Return the points (j, 3) m on the lines where two planes meet that are nearest to ``points``, which lie in the
+    first plane; ``others`` (j, 3) m lie in the second. first, second : (j, 3), the planes' unit normals"""
     across = second - np.einsum("ai,ai->a", second, first)[:, None] * first
     way = np.einsum("ai,ai->a", others - points, second) / np.einsum("ai,ai->a", across, second)
     return points + way[:, None] * across

@@ -70,7 +70,8 @@ class ContactStiffness:
     def _change(
         self, block: ComplianceBlock, gone: np.ndarray, new: np.ndarray, at: np.ndarray, there: np.ndarray
     ) -> bool:
-        """Take rows ``gone`` (i,) out, add the block's unknowns ``new`` (m,) bool; false if rounding has added up.
+        """Take rows ``gone`` (i,) out, add the block's unknowns ``new`` (m,) bool; return false if rounding prevents
+        it.
 
         at : (j,), positions of the inverse's rows in the block; there : (j,) bool, which of them the block has
         """

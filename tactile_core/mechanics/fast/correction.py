@@ -247,7 +247,7 @@ def force_factor(compliance: Compliance, contact: Contact) -> float:
 
 
 def correct(compliance: Compliance, contact: Contact) -> Corrected:
-    """Correct a fast contact to the full tier's result at the same depth; unchanged without contact, or where no
+    """Correct a fast contact to the full tier's result at the same depth; unchanged without contact, or if no
     correction ships for the sensor."""
     parts = learned().get(compliance.name)
     if not len(contact.nodes) or parts is None:

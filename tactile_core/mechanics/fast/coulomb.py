@@ -181,7 +181,8 @@ def slipping_nodes(at, points, motion, curved, bend, friction):  # noqa: ANN001,
 
 @Loop
 def known_motion(points, motion, slipping, direction, columns):  # noqa: ANN001, ANN201
-    """Return the prescribed motion (3 k + c, columns) m of touching points; it is 0 along friction that slips.
+    """Return the prescribed motion (3 k + c, columns) m of touching points; not the slip along friction, which is
+    unknown.
     The first column closes gaps and takes sticking nodes back to their spots, the second is a metre of ``direction``.
     """
     k, normal, lean = len(motion.slip), points.normal, points.lean

@@ -80,7 +80,8 @@ class LoadPath:
         return found
 
     def _otherwise(self, step: Step, guess: float, failure: TactileError) -> Solution:
-        """Solve the step in ``to``'s other ways; guess : m. If all fail, raises failure, or the finer mesh's error."""
+        """Solve the step in ``to``'s other ways; guess : m. Raises ``failure``, or the finer mesh's error, if none
+        can."""
         if self.tier == "full" and self.spacing == 1:
             self._remake(_FINER)
             try:
