@@ -118,9 +118,9 @@ def read_photographs(
         raise TactileError(folder, f"no press in {len(pictures)} photographs", "photographs of a pressed ball", advice)
     untouched = tuple(name for name, press in tried.items() if press is None)
     every = Photographs(folder, presses, rest, background is None, untouched, measured_noise(presses, rest))
-    found = every if only is None else chosen(every, only)
-    _check_pictures(found)
-    return found
+    kept = every if only is None else chosen(every, only)
+    _check_pictures(kept)
+    return kept
 
 
 def _check_pictures(photographs: Photographs) -> None:
