@@ -156,7 +156,7 @@ class ContactProblem:
         return self._rounds(pose, axial_force, before, moved, candidates)
 
     def _overlaps_at_rest(self, pose: Pose) -> bool:
-        """Return true where an undeformed surface would touch the indenter."""
+        """Return true if the undeformed surface would touch the indenter."""
         return bool((self._distance(pose, self.near, np.zeros((len(self.near), 3)))[0] < 0).any())
 
     def _distance(self, pose: Pose, nodes: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

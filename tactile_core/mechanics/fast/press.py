@@ -50,7 +50,8 @@ class CorrectedPress:
     """An indenter in front of one sensor; solves contacts at depths or at corrected forces, each from the one before.
 
     pose : at first touch; limit : m, the greatest depth; friction : Coulomb's coefficient
-    work : effort that contacts may cost, None for no limit; a solve raises ExhaustedError once nothing is left
+    work : effort that contacts may cost, None for no limit; once nothing is left, ``at_depth`` raises ExhaustedError
+        and ``at_force`` returns None
     """
 
     @in_one_thread

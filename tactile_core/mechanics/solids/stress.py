@@ -13,7 +13,7 @@ _BATCH = 256  # cells at once: the law makes its tangent, too, 0.7 kB per point
 def cauchy(solid: FiniteStrainSolid, state: State) -> np.ndarray:
     """Return the Cauchy stress (n_cells, 27, 3, 3) Pa at the Gauss points, tension positive: P F^T / J.
 
-    P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError where a cell is
+    P is the law's first Piola-Kirchhoff stress with the cell's own pressure. Raises FloatingPointError if a cell is
     turned inside out.
     """
     f, j = solid.deformation(state.displacement)
