@@ -93,7 +93,7 @@ def new_folder(path: str | os.PathLike, *, overwrite: bool | None = None) -> Ite
 
 
 def sweep(folder: str | os.PathLike) -> None:
-    """Remove what killed writers of folders left in `folder`; what running writers and others made stays."""
+    """Remove from `folder` what is left of writers that were killed; files of running writers and of others stay."""
     for file in Path(folder).glob(".*.tactile-lock"):
         name = file.name.removeprefix(".").removesuffix(".tactile-lock")
         if name in ("", ".", "..") or file.is_symlink() or not file.is_file():

@@ -34,7 +34,7 @@ def checkout() -> Path | None:
 
 @contextmanager
 def needing(extra: str) -> Iterator[None]:
-    """Add a note on how to install the extra to a ModuleNotFoundError of the block."""
+    """If the block raises ModuleNotFoundError, add a note to it on how to install the extra that is missing."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -168,7 +168,7 @@ def _solve(
     where: str, indenter: Indenter, place: Placement, force: float, friction: float, used: Collection[Sensor],
     tiers: Mapping[Sensor, Tier],
 ) -> dict[Sensor, Solution]:  # fmt: skip
-    """Return the contacts of a frame by sensor under force, N; none if nothing presses.
+    """Return a frame's contact under a force, N, on each sensor; no entries if nothing presses.
     friction : coefficient; used : sensors to solve; where : the frame in words, for messages"""
     found = {}
     for sensor in used if force > 0 else ():

@@ -241,9 +241,9 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
         raise TactileError("adapt", f"{frames} frames in contact", f"at least {FEWEST_FRAMES}", advice)
     change = change[np.linspace(0, frames - 1, min(frames, MOST_FRAMES)).round().astype(int)]
     found = match(change, typical.typical, rectified)
-    if found.alike < FEWEST_CONTACTS:
+    if found.matched < FEWEST_CONTACTS:
         advice = "Touch more places, softly and hard"
-        raise TactileError("adapt", f"{found.alike} different contacts", f"at least {FEWEST_CONTACTS}", advice)
+        raise TactileError("adapt", f"{found.matched} different contacts", f"at least {FEWEST_CONTACTS}", advice)
     log_gain = found.log_gain - typical.bias(rectified) * found.contacts / (found.contacts + PRIOR)
     touched = (found.contacts >= TOUCHED) & (np.quantile(np.abs(change), 0.99, axis=0) >= MOVED)
     gain, fitted, warnings = _believable(np.exp(log_gain), touched, found)
@@ -251,8 +251,8 @@ def fit(change: np.ndarray, rectified: bool, typical: ReferenceSignals, note: st
     if (np.abs(found.offset) > LARGEST_OFFSET).any():
         warnings.append(f"{named_electrodes(np.abs(found.offset) > LARGEST_OFFSET)}: no believable offset; taken as 0")
     signs = "rectified, so no offsets" if rectified else "signed"
-    note = f"{note}; {frames} frames in contact ({signs}), {found.alike} different contacts"
-    uncertainty = _uncertainty(gain[fitted], found.alike)
+    note = f"{note}; {frames} frames in contact ({signs}), {found.matched} different contacts"
+    uncertainty = _uncertainty(gain[fitted], found.matched)
     if fitted.any():
         note += f"; gains to about {uncertainty:.0%}"
     sensor = ElectrodeGains(note, [round(g, 4) for g in gain.tolist()], [round(o, 4) for o in offset.tolist()])
@@ -270,9 +270,9 @@ def _believable(gain: np.ndarray, touched: np.ndarray, found: Match) -> tuple[np
     for electrode in np.flatnonzero(wild):
         outcome = f"outside {LEAST:g} to {MOST:g}; kept at 1 (a dead channel?)"
         warnings.append(f"E{electrode + 1}: gain {gain[electrode]:.2f} is {outcome}")
-    if found.alike < FEW_CONTACTS:
+    if found.matched < FEW_CONTACTS:
         warnings.append(
-            f"only {found.alike} different contacts: gains are uncertain; touch more places, softly and hard"
+            f"only {found.matched} different contacts: gains are uncertain; touch more places, softly and hard"
         )
     if not found.settled:
         warnings.append("the fit did not settle: gains are uncertain")

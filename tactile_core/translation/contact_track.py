@@ -207,7 +207,7 @@ def _step(seconds: np.ndarray | float, rectified: np.ndarray | bool) -> np.ndarr
 
 
 def _ratio_step(seconds: np.ndarray) -> np.ndarray:
-    """Return the variance (T,) of the change of `_log_ratio` within seconds (T,)."""
+    """Return the variance (T,) by which `_log_ratio`, of force to signal size, may change in seconds (T,)."""
     return RATIO_STEP**2 * seconds / FRAME
 
 

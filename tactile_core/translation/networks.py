@@ -91,7 +91,8 @@ class Networks:
         return Posterior(np.exp(weight) / np.exp(weight).sum(-1, keepdims=True), mean, spread)
 
     def given(self, latent_signal: np.ndarray, state: np.ndarray, rectified: np.ndarray | bool = False) -> np.ndarray:
-        """Return latent_source (T, L) by latent_signal (T, K), state (T, STATE); rectified : (T,) or one bool"""
+        """Return the latents (T, L) of the source's mesh, predicted from those of its signals, latent_signal (T, K),
+        and the contact's state (T, STATE): place, force, depth. rectified : (T,) bool or one, signals without signs"""
         return self._either("code", np.concatenate([latent_signal, state], -1), rectified)
 
     def m2m(self, latent_source: np.ndarray) -> np.ndarray:

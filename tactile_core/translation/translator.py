@@ -95,7 +95,8 @@ class Translator:
     options"""
 
     def __init__(self, nets: Networks, answer: Answer | None = None, patterns: Patterns | None = None) -> None:
-        """Store networks and options. patterns : simulated contacts of the source; None for a BioTac's, which ship."""
+        """Store the networks and the options of the estimate (``answer``; None for the defaults).
+        patterns : simulated contacts of the source sensor; None for those of a BioTac in the package"""
         self.nets, self.card, self.sha256 = nets, nets.card, nets.sha256
         self.source, self.target, self._patterns = nets.source, nets.target, patterns
         self.answer = answer or Answer()

@@ -49,7 +49,8 @@ def short(value: float | None) -> str:
 
 
 def plot(methods: Sequence[Method]) -> bytes:
-    """Return a PNG with a panel per stage: error over time, logarithmic; lines show the Pareto front, doing nothing."""
+    """Return a PNG with a panel for each stage of the translation: error over time, both axes logarithmic, a line for
+    the Pareto front and one for the error of doing nothing."""
     from matplotlib.figure import Figure
 
     panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]

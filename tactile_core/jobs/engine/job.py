@@ -30,8 +30,8 @@ R = TypeVar("R")
 
 
 class Job(msgspec.Struct, Generic[R], forbid_unknown_fields=True, frozen=True, dict=True):
-    """A job: what a recipe makes of inputs. weights, calibration : folder and file, None for those that ship
-    format : of job.json; versions : name -> version of Python, this package and libraries that made the job"""
+    """A job: a recipe and the inputs to run it on. weights, calibration : folder and file, None for the package's own
+    format : version of job.json's layout; versions : by name, of Python, this package and libraries that made it"""
 
     format: str
     inputs: list[Input]

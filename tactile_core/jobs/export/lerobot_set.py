@@ -64,7 +64,8 @@ class EpisodeStats:
                 self._pictures += len(values)
 
     def summarise(self) -> Stats:
-        """Return feature -> min, max, mean, std, q01, q10, q50, q90, q99 (k,), of pictures (3, 1, 1); count (1,)."""
+        """Return, for each feature, over all frames: min, max, mean, std, q01, q10, q50, q90, q99, each (k,) for
+        k values a frame or (3, 1, 1) for pictures, and count (1,)."""
         return {
             **{name: _of_numbers(np.concatenate(parts)) for name, parts in self._numbers.items()},
             **{name: _of_levels(counts, self._pictures) for name, counts in self._levels.items()},

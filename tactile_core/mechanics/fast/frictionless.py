@@ -208,10 +208,11 @@ class Frictionless:
         return Try(displacement, force, core_force, state.shift + solved.step, solved.active)
 
     def _turn(self, matrix, normal, solved: Pressing, travel, place, shift, threshold):  # noqa: ANN001, ANN202
-        """Return Newton's change of force (k, 3), (c,) N as normals turn with nodes; None if none turns enough.
-        With t a principal direction of the indenter's surface at a node, weighted by sqrt(force x curvature), the
-        turned force is p n + t y, where (1 - S) y = t . travel, and S is the compliance among the t, the gaps held
-        shut.
+        """Return the part of Newton's step that comes from normals turning as nodes move along the indenter: changes of
+        force (k, 3) N at nodes and (c,) N at the core; None if no normal turns enough to matter.
+        A node under force p with normal n gets the force p n + t y. Here t is a principal direction of the indenter's
+        surface there, scaled by sqrt(p x curvature); y solves (1 - S) y = t . travel; S is the compliance between all
+        these t while the gaps stay closed.
         """
         from scipy.linalg import lapack
 

@@ -93,7 +93,8 @@ def _consecutive(numbers: list[int]) -> list[tuple[int, int]]:
 
 
 def _beside(electrodes: tuple[str, ...], names: Collection[str]) -> ColumnMap:
-    """Return the map of the electrodes and of the columns called pdc, tac and tdc whose names are most like theirs."""
+    """Return the map of the electrodes and of pdc, tac and tdc: for each, of the columns so called, the one whose full
+    name is most like the electrodes'. names : of all columns"""
     like = next(filter(None, electrodes), "")
     channels: dict[str, Any] = {
         word: _nearest((name for name in names if _is_called(word, name)), like) for word in CHANNELS

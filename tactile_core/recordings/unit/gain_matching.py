@@ -25,12 +25,12 @@ PRIOR = 5.0
 class Match:
     """Fitted gains and offsets.
     log_gain : (19,) natural logarithm of the gain; offset : (19,) counts; contacts : (19,) number behind each gain
-    alike : number of different simulated signals that were matched; settled : true if the last turn changed none"""
+    matched : number of different simulated signals that were matched; settled : true if the last turn changed none"""
 
     log_gain: np.ndarray
     offset: np.ndarray
     contacts: np.ndarray
-    alike: int
+    matched: int
     settled: bool
 
 
