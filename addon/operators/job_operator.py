@@ -71,7 +71,7 @@ class JobOperator(TactileOperator):
                 over = self._job.poll()
                 share = round(100 * self._job.share)
                 context.window_manager.progress_update(share)
-                words = f"{self._job.stage}: {share} %"
+                words = f"{self._job.stage or 'Starting'}: {share} %"
                 if over and context.scene.session_uid != self._scene:
                     over, words = False, "Done, for the scene that it began in: go back to it"
                 context.workspace.status_text_set(f"{words}   (Esc stops)")

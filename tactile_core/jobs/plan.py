@@ -20,6 +20,7 @@ COSTS = shipped("costs.json")
 # files.
 BUILD_S, BUILD_MB, MATRICES_MB = {SOURCE: 8.2, TARGET: 4.9}, 700.0, {SOURCE: 342.0, TARGET: 151.0}
 TRACTION_MS, TRACTION_KB = 1.5, 0.7  # a frame of the shipped recording, measured on one core
+SOLVED_MS = 24.0  # a contact that is solved on the DIGIT (docs/convert.md)
 # Of memory more than the fast tier's, peak of the process (measured: scenes/press on the DIGIT, 147 contacts).
 TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
@@ -99,9 +100,9 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
     return Plan(parts)
 
 
-def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
-    """Return the cost of converting a number of frames. keep : words of --keep; preset : name of the pictures'
-    preset"""
+def of_frames(frames: int, keep: Collection[str], preset: str = "fast", *, solved: bool = False) -> Plan:
+    """Return the cost of converting a number of frames.
+    keep : words of --keep; preset : name of the pictures' preset; solved : true if the gel is solved"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
@@ -111,9 +112,13 @@ def of_frames(frames: int, keep: Collection[str], preset: str = "fast") -> Plan:
             beyond = {key: max(_part(f"convert_{word}")[key] - other[key], 0) for key in ("ms", "mb", "kb")}
             seconds, disk = (beyond["ms"] + ms) * frames / 1e3, beyond["kb"] * frames / 1e3
             parts.append(Part(what, f"{frames} frames", seconds, beyond["mb"], disk))
+    if solved or "traction" in keep:
+        parts.append(_matrices(TARGET))
+    if solved:
+        parts.append(Part("gel, solved", f"{frames} frames, if all are in contact", SOLVED_MS * frames / 1e3))
     if "traction" in keep:
         seconds, disk = TRACTION_MS * frames / 1e3, TRACTION_KB * frames / 1e3
-        parts += [_matrices(TARGET), Part("force field", f"{frames} frames", seconds, disk=disk)]
+        parts.append(Part("force field", f"{frames} frames", seconds, disk=disk))
     return Plan(parts)
 
 

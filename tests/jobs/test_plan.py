@@ -108,6 +108,7 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
     assert built(plan.of_frames(150, ("latent",))) == ["networks"]
     assert built(plan.of_frames(150, ("latent", "height", "image"))) == ["networks", "height maps", "pictures, fast"]
     assert {"force field", "DIGIT matrices"} <= set(built(plan.of_frames(10, ("traction",))))
+    assert {"gel, solved", "DIGIT matrices"} <= set(built(plan.of_frames(10, (), solved=True)))
     words = ["--out", str(tmp_path / "out"), "--keep", "latent", "--frames", ":100", "--plan"]
     assert main(["convert", str(slide_csv()), *words]) == 0 and not (tmp_path / "out").exists()
     said = capsys.readouterr().out

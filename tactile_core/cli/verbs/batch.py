@@ -101,9 +101,11 @@ def _say_cost(job: Job) -> None:
     """Print what 1,000 frames of a translation job take on one core, in time, memory and disk; reads no input."""
     from ...jobs import plan
     from ...jobs.engine.recipes import Translate
+    from ...jobs.results import TRANSLATED
 
     if isinstance(job.recipe, Translate):
-        for line in plan.of_frames(1000, job.recipe.keep, job.recipe.preset).lines():
+        solved = job.recipe.gel != TRANSLATED
+        for line in plan.of_frames(1000, job.recipe.keep, job.recipe.preset, solved=solved).lines():
             say(line)
 
 
