@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Sequence
 
@@ -156,7 +157,7 @@ def show(context: bpy.types.Context, things: list[bpy.types.Object], beside: Seq
     """
     for thing in context.view_layer.objects:
         thing.select_set(thing in things)
-    if things[0].name in context.view_layer.objects:  # no object of an excluded collection is
+    with contextlib.suppress(RuntimeError):  # an object of an excluded collection cannot be active
         context.view_layer.objects.active = things[0]
     for area, _ in _main_regions(context, "VIEW_3D"):
         if area.spaces.active.shading.color_type != "VERTEX":
