@@ -20,7 +20,7 @@ class JobOperator(TactileOperator):
     _job: Job | None = None
     _folder: JobFolder | None = None
     _timer: bpy.types.Timer | None = None
-    _scene = 0  # the session_uid of the one that it began in
+    _scene = 0  # session_uid of the scene that it began in
 
     def begin(self, context: bpy.types.Context) -> None:
         """Start the job: set ``_folder`` and ``_job``, or leave both None if no job is needed. Raises TactileError."""

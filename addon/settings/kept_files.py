@@ -130,7 +130,7 @@ def _find_again(*_: object) -> None:
 
 
 @persistent
-def _name_from_there(context: "bpy.types.BlendImportContext") -> None:
+def _name_from_there(context: "bpy.types.BlendImportContext") -> None:  # quoted: Blender 4.2 has no such type
     """Make appended objects' paths absolute: relative to this .blend, they could mean another file."""
     for item in context.import_items:
         if item.id_type == "OBJECT" and item.id is not None and item.id.library is None and item.source_library:

@@ -99,7 +99,8 @@ class SurfaceCodec:
 
     def _local(self, rows: np.ndarray) -> np.ndarray:
         """Return displacements (B, n, 3) float32 of contacts rows (B,), in ``unit`` m, in the nodes' own frames."""
-        values, turned = np.rint(self.frame.to_local(self.data[rows % len(self.data)])), rows >= len(self.data)
+        some, turned = self.data[rows % len(self.data)], rows >= len(self.data)
+        values = np.rint(self.frame.to_local(some)) if self.frame.turn.any() else some.astype(np.float32)
         if turned.any():
             values[turned] = across(values[turned][:, self._image])
         return values
