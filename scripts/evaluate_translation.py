@@ -23,11 +23,11 @@ from benchmarks.translation import body_rows, grips, made_up_units, sequence_row
 from benchmarks.translation.test_set import SEED, as_read
 
 from tactile_core import sensors
-from tactile_core.accuracy import Row
+from tactile_core.accuracy import Row, rms_in_contact
 from tactile_core.errors import TactileError
 from tactile_core.files import atomic
 from tactile_core.simulation.pairs_file import Pairs, read_pairs
-from tactile_core.training.step_errors import mesh_columns, our_bodies, true_displacement
+from tactile_core.training.step_errors import our_bodies, true_displacement
 from tactile_core.translation import translate
 from tactile_core.translation.translator import Translator
 
@@ -83,7 +83,7 @@ def on_recordings(network: Translator, options: argparse.Namespace) -> list[Row]
     """Return rows on real recordings: on grips of the PHAC set if the folder holds some, else on slides."""
     folder = Path(options.recordings)
     if grips.find(folder):
-        return grips.rows(folder, network, read_pairs(options.test_set))
+        return grips.rows(folder, network)
     as_asked = functools.partial(translate.translate, sensor=options.sensor, weights=options.weights)
     return slides.rows(folder, as_asked, QUICK if options.quick else None)
 
@@ -160,8 +160,8 @@ def _cases(translator: Translator, pairs: Pairs) -> bytes:
     change = as_read(pairs.signal, SEED)
     found = nets.decode_target(nets.likely_latents(nets.encode_signal(change))[1])
     true = true_displacement(pairs, "digit", np.arange(len(change)))
-    metrics = mesh_columns("chain", found, true) | mesh_columns("baseline", 0 * true, true)
-    share = np.where(true[..., 1].max(1) >= 1e-4, metrics["chain_rms_um"] / metrics["baseline_rms_um"], np.nan)
+    errors, nothing = (rms_in_contact(each, true) for each in (found, 0 * true))
+    share = np.where(true[..., 1].max(1) >= 1e-4, errors / nothing, np.nan)
     order = np.argsort(share)[: np.isfinite(share).sum()]
     names = pairs.indenter_names
     figure = Figure(figsize=(9, 9), layout="constrained")

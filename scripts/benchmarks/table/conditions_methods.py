@@ -7,7 +7,6 @@ tenth of the largest, mean over contacts. The forces' median error stands in a r
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -38,30 +37,24 @@ UNITS = {
 }  # how the finger is taken, and a number's unit of measurement
 TWO_BALLS = {"two_balls_read_as_one": 1, "two_balls": 2}  # contacts that are looked for
 NAMES = (*UNITS, "flat_bodies", *TWO_BALLS)
-
-
-@dataclass(frozen=True)
-class Condition:
-    """Contacts with their truth. gel : (C, M, 3) m, displacement; force : (C,) N, of all contacts of a frame together
-    translated : function that translates them, to compare and to time; of : names the contacts, a text"""
-
-    translated: Callable[[], Translation]
-    gel: np.ndarray
-    force: np.ndarray
-    of: str
+# What translates C contacts, to compare and to time; their gels (C, M, 3) m; force (C,) N, of all contacts of a frame
+# together; the contacts in words.
+Condition = tuple[Callable[[], Translation], np.ndarray, np.ndarray, str]
 
 
 def measure(name: str, quick: bool) -> Method:
     """Measure one condition, such as "unit_found": CPU time to prepare and translate a frame, and errors.
     quick : on fewer contacts"""
-    condition = _units(name, quick) if name in UNITS else _flat(quick) if name == "flat_bodies" else _two(name)
-    found = condition.translated()
-    ms = best_ms(condition.translated, len(condition.force), most=3)
+    translated, gel, true_force, of = (
+        _units(name, quick) if name in UNITS else _flat(quick) if name == "flat_bodies" else _two(name)
+    )
+    found = translated()
+    ms = best_ms(translated, len(true_force), most=3)
     force = lengths(found.force) + np.nan_to_num(lengths(found.second_force))
-    off = 100 * float(np.median(np.abs(force / condition.force - 1)))
-    more = row(f"conditions_{name}_force_error", off, "percent", baseline=100, of=condition.of)
-    left = float(left_of_nothing(found.displacement_digit, condition.gel).mean())
-    return Method("conditions", name, ms, None, left, "of no dent", 1.0, condition.of, (more,))
+    off = 100 * float(np.median(np.abs(force / true_force - 1)))
+    more = row(f"conditions_{name}_force_error", off, "percent", baseline=100, of=of)
+    left = float(left_of_nothing(found.displacement_digit, gel).mean())
+    return Method("conditions", name, ms, None, left, "of no dent", 1.0, of, (more,))
 
 
 def _units(name: str, quick: bool) -> Condition:
@@ -71,7 +64,7 @@ def _units(name: str, quick: bool) -> Condition:
     made = [made_up_units.played(number, unit, presses) for number, unit in enumerate(units)]
     gel, force = (np.concatenate([getattr(each, of) for each in made]) for of in ("gel", "force"))
     of = f"{len(force)} contacts, {len({*units})} made-up units" if len({*units}) > 1 else f"{len(force)} contacts"
-    return Condition(partial(made_up_units.translated_contacts, network, made, taken), gel, force, of)
+    return partial(made_up_units.translated_contacts, network, made, taken), gel, force, of
 
 
 def _flat(quick: bool) -> Condition:
@@ -79,11 +72,10 @@ def _flat(quick: bool) -> Condition:
     signals = plain_signals(as_read(pairs.signal, SEED))
     gel = true_displacement(pairs, "digit", slice(None))
     of = f"{len(gel)} contacts of large balls, a plate and a cylinder"
-    return Condition(partial(load_translator(), signals), gel, lengths(pairs.force), of)
+    return partial(load_translator(), signals), gel, lengths(pairs.force), of
 
 
 def _two(name: str) -> Condition:
-    double = two_contact_rows.double_contacts()
+    signal, gel, force = two_contact_rows.double_contacts()
     network = Translator(load_translator().nets, Answer(contacts=TWO_BALLS[name]))
-    signals = plain_signals(as_read(double.signal, SEED))
-    return Condition(partial(network, signals), double.gel, double.force, f"{len(double.force)} contacts of two balls")
+    return partial(network, plain_signals(as_read(signal, SEED))), gel, force, f"{len(force)} contacts of two balls"

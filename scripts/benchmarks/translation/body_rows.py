@@ -70,10 +70,10 @@ def pairs_of(scene: str, count: int) -> Pairs:
 
 
 def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bodies) -> list[Row]:
-    change, every = as_read(pairs.signal, SEED), slice(None)
+    change = as_read(pairs.signal, SEED)
     answer, nearest = network(plain_signals(change)), nearest_example(known, change)
-    errors = metrics("found", answer.displacement_digit, lengths(answer.force), pairs, every, bodies)
-    errors |= metrics("nearest", *nearest, pairs, every, bodies)
+    errors = metrics("found", answer.displacement_digit, lengths(answer.force), pairs, bodies)
+    errors |= metrics("nearest", *nearest, pairs, bodies)
     of = f"{len(change)} contacts of {name}"
     made = []
     for metric, unit in METRICS.items():
@@ -84,7 +84,7 @@ def _rows(name: str, network: Translator, pairs: Pairs, known: Pairs, bodies: Bo
         off, baseline = (float(np.median(errors[f"{who}_force_size_percent"][firm])) for who in ("found", "nearest"))
         over = f"{firm.sum()} over {FIRM:g} N of {of}"
         made.append(row("bodies_firm_force_percent", off, "%", baseline=baseline, of=over))
-    true = true_displacement(pairs, "digit", every)
+    true = true_displacement(pairs, "digit", slice(None))
     left, copied = (float(left_of_nothing(gel, true).mean()) for gel in (answer.displacement_digit, nearest[0]))
     return [*made, row("bodies_gel_left", left, "1", baseline=1.0, of=f"{of}; the nearest example: {copied:.2f}")]
 

@@ -14,9 +14,8 @@ from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
 from tactile_core.simulation.pairs_file import Pairs
-from tactile_core.training.step_errors import Bodies, Columns, digit_columns, joined, parts, true_displacement
+from tactile_core.training.step_errors import Bodies, Columns, digit_columns, true_displacement
 from tactile_core.translation.card import PLACE
-from tactile_core.translation.gel_place import on_gel
 from tactile_core.translation.networks import Networks
 from tactile_core.translation.posterior import FORCE_SCALE, Posterior, touches
 from tactile_core.translation.simulated_likeness import recovered
@@ -39,9 +38,9 @@ DRAWS = 200  # of each posterior: a share is known to .035 per contact, to .002 
 def answer_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> list[Row]:
     """Return rows of median errors of the three answers, beside the nearest example, on contacts that do not slide.
     change : (C, 19) counts, the pairs' signals as read; bodies : holds the gel's surface, for place and patch"""
-    answers = joined(_answers(nets, pairs, part, change[part], bodies) for part in parts(len(change)))
+    answers = _answers(nets, pairs, change, bodies)
     found, still = [], ~pairs.slide.any(-1)
-    answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, slice(None), bodies)
+    answers |= metrics("nearest", *nearest_example(pairs, change, pairs.press), pairs, bodies)
     for name, (least, most, targets) in SETS.items():
         inside = still & (pairs.depth_biotac >= least) & (pairs.depth_biotac < most)
         for metric in ("place_mm", "force_size_percent", "peak_percent", "iou"):
@@ -65,34 +64,28 @@ def rectified_rows(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bod
     Contacts that slide are left out. Baseline of the depth: the true one, which a translation should reach.
     change : (C, 19) counts, the pairs' signals as read, before they lose their sign"""
     folded, unsigned = recovered(np.abs(change), np.ones(len(change), bool))
-    columns: dict[str, list[np.ndarray]] = {"peak": [], "true": [], "place": [], "silent": []}
-    for part in parts(len(change)):
-        read = nets.encode_signal(folded[part], unsigned[part])
-        state = nets.posterior(read, unsigned[part]).likely
-        gel = nets.decode_target(nets.latents(read, state, unsigned[part])[1])
-        true = true_displacement(pairs, "digit", part)
-        columns["peak"].append(1e6 * accuracy.height(gel).max(1))
-        columns["true"].append(1e6 * accuracy.height(true).max(1))
-        places = digit_columns("read", gel, pairs.contact_patch_digit[part], bodies)
-        columns["place"].append(places["read_position_mm"])
-        columns["silent"].append(~touches(state))
+    read = nets.encode_signal(folded, unsigned)
+    state = nets.posterior(read, unsigned).likely
+    gel = nets.decode_target(nets.latents(read, state, unsigned)[1])
     still = ~pairs.slide.any(-1)
-    peak, true, place, silent = (np.concatenate(values)[still] for values in columns.values())
+    deep, truth = (
+        1e6 * float(np.median(accuracy.height(each).max(1)[still]))
+        for each in (gel, true_displacement(pairs, "digit", slice(None)))
+    )
+    place = digit_columns("read", gel, pairs.contact_patch_digit, bodies)["read_position_mm"]
     of = f"{still.sum()} contacts read without their signs"
-    deep, place_mm = float(np.median(peak)), _median(place)
-    truth = float(np.median(true))
     return [
         row("rectified_peak_um", deep, "um", RECTIFIED_PEAK * truth, baseline=truth,
             of=f"{of}; baseline: the true depth", at_least=True),
-        row("rectified_place_mm", place_mm, "mm", RECTIFIED_PLACE, of=of),
-        row("rectified_silent", float(silent.mean()), "1", RECTIFIED_SILENT, of=of),
+        row("rectified_place_mm", _median(place[still]), "mm", RECTIFIED_PLACE, of=of),
+        row("rectified_silent", float((~touches(state))[still].mean()), "1", RECTIFIED_SILENT, of=of),
     ]  # fmt: skip
 
 
 def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row]:
-    """Return rows of how many true places lie in the posterior's regions of 50 and 90 % probability, and of its energy
-    score beside that of a single answer. change : (C, 19) counts, the pairs' signals as read"""
-    true = np.concatenate([_true_place(nets, pairs, part) for part in parts(len(change))])
+    """Return rows of how many true places lie in the posterior's regions of 50 and 90 % probability.
+    change : (C, 19) counts, the pairs' signals as read"""
+    true = _true_place(nets, pairs)
     posterior = nets.posterior(nets.encode_signal(change))
     drawn = draw_places(posterior, DRAWS, np.random.default_rng(0))
     denser = _density(posterior, drawn) > _density(posterior, true[None])
@@ -101,18 +94,6 @@ def posterior_rows(nets: Networks, pairs: Pairs, change: np.ndarray) -> list[Row
         inside = float((denser.mean(0) < share).mean())
         one = row(f"place_in_{100 * share:g}_percent_region", inside, "1", high, of=f"{low:g} to {high:g} wanted")
         found.append(one | {"ok": bool(low <= inside <= high)})
-    frame = nets.frames["MVD"]
-    truth = 1e3 * on_gel(frame, true)
-    points = 1e3 * on_gel(frame, drawn.reshape(-1, PLACE)).reshape(*drawn.shape[:2], 2)
-    half = DRAWS // 2
-    score = accuracy.lengths(points - truth).mean(0) - 0.5 * accuracy.lengths(points[:half] - points[half:]).mean(0)
-    others = accuracy.lengths(truth[:, None] - truth).mean(0)
-    baseline = float((others - 0.5 * others.mean()).mean())
-    likely = 1e3 * on_gel(frame, posterior.likely[:, :PLACE])
-    of = "all test contacts; baseline: all their places alike"
-    found.append(row("place_energy_score", float(score.mean()), "mm", baseline=baseline, of=of))
-    alone = float(accuracy.lengths(likely - truth).mean())
-    found.append(row("place_energy_score_of_one_answer", alone, "mm", baseline=baseline, of=of))
     return found
 
 
@@ -132,12 +113,12 @@ def _density(posterior: Posterior, places: np.ndarray) -> np.ndarray:
     return (posterior.weight / spread.prod(-1) * np.exp(-0.5 * np.square(away).sum(-1))).sum(-1)
 
 
-def _true_place(nets: Networks, pairs: Pairs, part: slice) -> np.ndarray:
-    return nets.frames["MVD"].place(true_displacement(pairs, "digit", part))
+def _true_place(nets: Networks, pairs: Pairs) -> np.ndarray:
+    return nets.frames["MVD"].place(true_displacement(pairs, "digit", slice(None)))
 
 
-def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodies: Bodies) -> Columns:
-    """Return ``metrics`` of the likely, mean and solved answer to ``change`` (B, 19) counts of a ``part`` of pairs."""
+def _answers(nets: Networks, pairs: Pairs, change: np.ndarray, bodies: Bodies) -> Columns:
+    """Return ``metrics`` of the likely, mean and solved answer to ``change`` (C, 19) counts."""
     read = nets.encode_signal(change)
     posterior = nets.posterior(read)
     mean = (posterior.weight[:, :, None] * posterior.mean).sum(1)
@@ -145,28 +126,21 @@ def _answers(nets: Networks, pairs: Pairs, part: slice, change: np.ndarray, bodi
     for name, state in (("likely", posterior.likely), ("mean", mean)):
         skin, latent = nets.latents(read, state)
         gel, force = nets.decode_target(latent), FORCE_SCALE * np.sinh(state[:, PLACE])
-        found |= metrics(name, gel, force, pairs, part, bodies)
+        found |= metrics(name, gel, force, pairs, bodies)
         if name == "likely":
-            found |= metrics("solved", solved_gels(gel, nets.force_in(state, skin)), force, pairs, part, bodies)
+            arrays = {
+                "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
+                "force": nets.force_in(state, skin), "flags": np.zeros(len(gel), np.uint16),
+            }  # fmt: skip
+            found |= metrics("solved", solved_gel.solved(arrays)["displacement_digit"], force, pairs, bodies)
     return found
 
 
-def solved_gels(gel: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return displacements (B, M, 3) m of contacts solved on the DIGIT as found in translated ones.
-    gel : (B, M, 3) m, translated displacements; force : (B, 3) N, of each contact"""
-    arrays = {
-        "displacement_digit": gel, "contact_center": accuracy.dent_center(gel, sensors.digit_surface().rest),
-        "force": force, "flags": np.zeros(len(gel), np.uint16),
-    }  # fmt: skip
-    return solved_gel.solved(arrays)["displacement_digit"]
-
-
-def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, part: slice, bodies: Bodies) -> Columns:
-    """Return errors (B,) of answers to a ``part`` of the pairs: "NAME_place_mm", "NAME_iou" (an overlap),
-    "NAME_force_size_percent", "NAME_peak_percent".
-    gel : (B, M, 3) m; force : (B,) N, its size; bodies : holds the gel's surface"""
-    true, size = true_displacement(pairs, "digit", part), accuracy.lengths(pairs.force[part])
-    patches = digit_columns(name, gel, pairs.contact_patch_digit[part], bodies)
+def metrics(name: str, gel: np.ndarray, force: np.ndarray, pairs: Pairs, bodies: Bodies) -> Columns:
+    """Return errors (C,) of answers: "NAME_place_mm", "NAME_iou" (an overlap), "NAME_force_size_percent",
+    "NAME_peak_percent". gel : (C, M, 3) m; force : (C,) N, its size; bodies : holds the gel's surface"""
+    true, size = true_displacement(pairs, "digit", slice(None)), accuracy.lengths(pairs.force)
+    patches = digit_columns(name, gel, pairs.contact_patch_digit, bodies)
     return {
         f"{name}_place_mm": patches[f"{name}_position_mm"],
         f"{name}_iou": patches[f"{name}_iou"],

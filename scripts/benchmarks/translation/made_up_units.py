@@ -20,7 +20,7 @@ from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.errors import TactileError
 from tactile_core.geometry.indenters import Indenter
-from tactile_core.mechanics.electrodes.biotac_sheet import BiotacSheet, biotac_sheet
+from tactile_core.mechanics.electrodes.biotac_sheet import biotac_sheet
 from tactile_core.mechanics.fast.compliance import Compliance, compliance_of
 from tactile_core.mechanics.fast.contact_state import Contact
 from tactile_core.mechanics.fast.press import CorrectedPress
@@ -60,22 +60,12 @@ class Unit:
     conductivity: float = 1.0
     stiffness: float = 1.0
 
-    @property
-    def skin(self) -> Compliance:
-        """Compliance of the skin with the core as far below it as the unit's film is thick."""
-        return _skin(self.film)
-
-    @property
-    def sheet(self) -> BiotacSheet:
-        """Conducting sheet of the unit's film, at the typical conductivity."""
-        return dataclasses.replace(biotac_sheet(), film=self.film * biotac_sheet().film)
-
     def press(self, indenter: Indenter, place: Placement, friction: float) -> CorrectedPress:
         """Return the press of an indenter at a place on this finger. Its forces must be multiplied by the stiffness.
         friction : Coulomb's coefficient"""
         pose = pose_at(SOURCE, indenter, place)
         limit = DEPTH_LIMIT * thickness_under(SOURCE, indenter, pose)
-        return CorrectedPress(self.skin, indenter, pose, limit, friction)
+        return CorrectedPress(_skin(self.film), indenter, pose, limit, friction)
 
     def rest(self) -> np.ndarray:
         """Return the counts (19,) at rest."""
@@ -83,7 +73,8 @@ class Unit:
 
     def readings(self, contacts: Sequence[Contact]) -> np.ndarray:
         """Return the counts (T, 19), not rounded, that this finger reads in T contacts of ``press``."""
-        skin, sheet, typical = self.skin, self.sheet, biotac_sheet()
+        skin, typical = _skin(self.film), biotac_sheet()
+        sheet = dataclasses.replace(typical, film=self.film * typical.film)
         moved = ((each.sensing_gaps - skin.watch_gap)[skin.feet :] for each in contacts)
         found = np.stack([sheet.resistances(sheet.films_of(each)) for each in moved])
         return self._counts(found / typical.resistances(typical.film))
@@ -103,6 +94,7 @@ class Unit:
 
 @functools.cache
 def _skin(film: float) -> Compliance:
+    """Return the compliance of a skin with the core as far below it as a film is thick. film : over a typical one"""
     skin = compliance_of(SOURCE)
     return dataclasses.replace(skin, watch_gap=film * skin.watch_gap)
 

@@ -13,24 +13,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+import numpy as np
 
-import numpy as np  # noqa: E402
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
 
-from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
-from tactile_core import accuracy  # noqa: E402
-from tactile_core.accuracy import Row, row  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.recordings import Recording, electrode_gains, read  # noqa: E402
-from tactile_core.sensors import COUNT_MAX  # noqa: E402
-from tactile_core.translation.translate import translate  # noqa: E402
-from tactile_core.translation.translator import Translation  # noqa: E402
-from tactile_core.translation.trust_words import is_guess  # noqa: E402
+from benchmarks.measured_rows import finished, parser_of, printed
+from tactile_core import accuracy
+from tactile_core.accuracy import Row, row
+from tactile_core.errors import TactileError
+from tactile_core.recordings import Recording, electrode_gains, read
+from tactile_core.sensors import COUNT_MAX
+from tactile_core.translation.translate import translate
+from tactile_core.translation.translator import Translation
+from tactile_core.translation.trust_words import is_guess
 
-SHIPPED = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
+SHIPPED = Path(__file__).resolve().parents[3] / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 QUIET = 50  # frames at the shipped recording's start without contact
 NOTHING, HALF = 0.05, 0.5  # N; share of the force
 TARGET, TRIALS = 2.0, ("01", "02", "03")  # % of the frames; of PHAC, those to choose by
@@ -59,8 +59,8 @@ class Base:
             return None
 
 
-def _from(electrodes: np.ndarray, share: float = 0.3) -> slice:
-    return slice(int(share * len(electrodes)), None)
+def _from(electrodes: np.ndarray) -> slice:
+    return slice(int(0.3 * len(electrodes)), None)
 
 
 def _drawn(electrodes: np.ndarray, random: Rng, count: int) -> np.ndarray:
@@ -81,34 +81,23 @@ def dead(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     return electrodes
 
 
-def stepped(count: int, by: float) -> Fault:
-    """Return a fault, called as ``stuck`` is: ``count`` electrodes jump by ``by`` counts after 30 % of the frames."""
-
-    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by
-        return electrodes
-
-    return broken
+def stepped(electrodes: np.ndarray, rest: np.ndarray, random: Rng, count: int, by: float) -> np.ndarray:
+    """Let ``count`` of the electrodes (T, 19) jump by ``by`` counts after 30 % of the frames. rest : not used"""
+    electrodes[_from(electrodes), _drawn(electrodes, random, count)[:, None]] += by
+    return electrodes
 
 
-def drifting(count: int, by: float) -> Fault:
-    """Return a fault: ``count`` electrodes drift evenly, from 0 to ``by`` counts at the end."""
-
-    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[:, _drawn(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
-        return electrodes
-
-    return broken
+def drifting(electrodes: np.ndarray, rest: np.ndarray, random: Rng, count: int, by: float) -> np.ndarray:
+    """Let ``count`` of the electrodes (T, 19) drift evenly, from 0 to ``by`` counts at the end. rest : not used"""
+    electrodes[:, _drawn(electrodes, random, count)] += by * np.linspace(0, 1, len(electrodes))[:, None]
+    return electrodes
 
 
-def noisy(count: int, counts: float) -> Fault:
-    """Return a fault: ``count`` electrodes get Gaussian noise with a standard deviation of ``counts`` counts."""
-
-    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        electrodes[:, _drawn(electrodes, random, count)] += counts * random.standard_normal((len(electrodes), count))
-        return electrodes
-
-    return broken
+def noisy(electrodes: np.ndarray, rest: np.ndarray, random: Rng, count: int, by: float) -> np.ndarray:
+    """Add Gaussian noise with a standard deviation of ``by`` counts to ``count`` of the electrodes (T, 19). rest : not
+    used"""
+    electrodes[:, _drawn(electrodes, random, count)] += by * random.standard_normal((len(electrodes), count))
+    return electrodes
 
 
 def clipped(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
@@ -145,29 +134,21 @@ def hum(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
     return electrodes + 5 * np.sin(2 * np.pi * 50 * np.arange(len(electrodes)) / 100.3)[:, None]
 
 
-def held(share: float) -> Fault:
-    """Return a fault: a ``share`` of the rows, in bursts of one to eight, are lost: the row before is repeated."""
-
-    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        lost = np.zeros(len(electrodes), bool)
-        while lost.mean() < share:
-            start = random.integers(1, len(lost))
-            lost[start : start + random.integers(1, 9)] = True
-        last = np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))
-        return electrodes[last]
-
-    return broken
+def held(electrodes: np.ndarray, rest: np.ndarray, random: Rng, share: float) -> np.ndarray:
+    """Lose a ``share`` of the rows of electrodes (T, 19), in bursts of one to eight; the row before is repeated.
+    rest : not used"""
+    lost = np.zeros(len(electrodes), bool)
+    while lost.mean() < share:
+        start = random.integers(1, len(lost))
+        lost[start : start + random.integers(1, 9)] = True
+    return electrodes[np.maximum.accumulate(np.where(lost, 0, np.arange(len(lost))))]
 
 
-def frozen(frames: int) -> Fault:
-    """Return a fault: the row of the largest change is held for ``frames`` frames."""
-
-    def broken(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
-        first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
-        electrodes[first : first + frames] = electrodes[first]
-        return electrodes
-
-    return broken
+def frozen(electrodes: np.ndarray, rest: np.ndarray, random: Rng, frames: int) -> np.ndarray:
+    """Hold the row of electrodes (T, 19) with the largest change from rest (19,) for ``frames`` frames."""
+    first = int(np.abs(electrodes - rest).sum(axis=1).argmax())
+    electrodes[first : first + frames] = electrodes[first]
+    return electrodes
 
 
 def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
@@ -175,9 +156,9 @@ def duplicated(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndar
     return electrodes[np.arange(len(electrodes)) // 2 * 2]
 
 
-def bits(by: float) -> Fault:
-    """Return a fault: readings are ``by`` times as large, whole and clipped, like those of an ADC of other bits."""
-    return lambda electrodes, rest, random: np.clip(np.floor(electrodes * by), 0, COUNT_MAX)
+def bits(electrodes: np.ndarray, rest: np.ndarray, random: Rng, by: float) -> np.ndarray:
+    """Make electrodes (T, 19) ``by`` times as large, whole and clipped, as by an ADC of other bits. rest : not used"""
+    return np.clip(np.floor(electrodes * by), 0, COUNT_MAX)
 
 
 def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarray:
@@ -187,8 +168,8 @@ def under_load(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndar
     if change.max() < LEAST_LOAD:
         return electrodes
     first = int(change.sum(axis=1).argmax())
-    electrodes[:QUIET] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
-    electrodes[-QUIET:] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
+    for rows in slice(QUIET), slice(-QUIET, None):
+        electrodes[rows] = electrodes[first] + random.normal(0, 1, (QUIET, electrodes.shape[1]))
     return electrodes
 
 
@@ -198,12 +179,15 @@ def inverted(electrodes: np.ndarray, rest: np.ndarray, random: Rng) -> np.ndarra
 
 
 FAULTS: dict[str, Fault] = {
-    "stuck": stuck, "dead": dead, "one_low": stepped(1, -25), "three_low": stepped(3, -30), "one_high": stepped(1, 25),
-    "drift_one": drifting(1, 60), "drift_all": drifting(19, -20), "noise_one": noisy(1, 15), "noise_all": noisy(19, 6),
-    "clipped": clipped, "swapped": swapped, "gains_doubled": louder, "creep": creeping, "hum": hum,
-    "held_tenth": held(0.1), "held_third": held(0.3), "frozen_short": frozen(30), "frozen_long": frozen(500),
-    "duplicated": duplicated, "ten_bits": bits(0.25), "half_gain": bits(0.5), "rest_off": stepped(19, 40),
-    "rest_under_load": under_load, "inverted": inverted,
+    "stuck": stuck, "dead": dead, "one_low": partial(stepped, count=1, by=-25),
+    "three_low": partial(stepped, count=3, by=-30), "one_high": partial(stepped, count=1, by=25),
+    "drift_one": partial(drifting, count=1, by=60), "drift_all": partial(drifting, count=19, by=-20),
+    "noise_one": partial(noisy, count=1, by=15), "noise_all": partial(noisy, count=19, by=6), "clipped": clipped,
+    "swapped": swapped, "gains_doubled": louder, "creep": creeping, "hum": hum, "held_tenth": partial(held, share=0.1),
+    "held_third": partial(held, share=0.3), "frozen_short": partial(frozen, frames=30),
+    "frozen_long": partial(frozen, frames=500), "duplicated": duplicated, "ten_bits": partial(bits, by=0.25),
+    "half_gain": partial(bits, by=0.5), "rest_off": partial(stepped, count=19, by=40), "rest_under_load": under_load,
+    "inverted": inverted,
 }  # fmt: skip
 
 

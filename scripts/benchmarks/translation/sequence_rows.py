@@ -14,7 +14,7 @@ from benchmarks.table.translation_methods import plain_signals
 from tactile_core import accuracy, sensors
 from tactile_core.accuracy import Row, row
 from tactile_core.sensors import SAMPLE_RATE
-from tactile_core.training.step_errors import LEAST_PATCH
+from tactile_core.training.step_errors import LEAST_PATCH, joined
 from tactile_core.translation.gel_place import contact_patch
 from tactile_core.translation.translate import pass_over
 from tactile_core.translation.translator import Translation, Translator
@@ -37,25 +37,25 @@ def rows(network: Translator, file: Path = FILE, every: int = 1) -> list[Row]:
     """Return rows of median errors over frames above 0.1 N: of all sequences, of each motion, and with a wrong rest.
     file : the test set; every : take one sequence in ``every``"""
     truth = {name: values[::every] for name, values in read(file).items()}
-    number = len(truth["motion"])
-    followed, alone = both = measured(network, truth)
     kind = np.repeat(truth["motion"], (truth["force"] > TOUCHED).sum(axis=1))
+    number, everything = len(truth["motion"]), slice(None)
+    whole = f"{len(kind)} frames of {number} sequences; baseline: each frame alone"
+    motions = {name: kind == which for which, name in enumerate(MOTIONS)}
+    off = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
     found = []
-    for metric, unit in UNITS.items():
-        of = f"{len(kind)} frames of {number} sequences; baseline: each frame alone"
-        found.append(_row(f"sequence_{metric}", metric, both, slice(None), of, unit, TARGETS[metric]))
-        for which, name in enumerate(MOTIONS):
-            found.append(_row(f"sequence_{metric}", metric, both, kind == which, name, unit))
-    value, baseline = (quantile(each["place"], 90) for each in (followed, alone))
-    found.append(row("sequence_place_90", value, "mm", baseline=baseline, of=f"{len(kind)} frames"))
-    of = f"{number} sequences, rest up to {REST_OFF:g} counts off; baseline: each frame alone"
-    both = measured(network, truth, REST_OFF)
-    for metric, unit in UNITS.items():
-        found.append(_row(f"sequence_rest_off_{metric}", metric, both, slice(None), of, unit))
+    for name, rest_off, parts in (
+        ("sequence", 0.0, {whole: everything, **motions}), ("sequence_rest_off", REST_OFF, {off: everything}),
+    ):  # fmt: skip
+        both = measured(network, truth, rest_off)
+        for metric, unit in UNITS.items():
+            for of, part in parts.items():
+                value, baseline = (median(each[metric][part]) for each in both)
+                target, larger = TARGETS[metric] if of == whole else None, metric == "iou"
+                found.append(row(f"{name}_{metric}", value, unit, target, baseline=baseline, of=of, at_least=larger))
     return found
 
 
-def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[Errors, Errors]:
+def measured(network: Translator, truth: Truth, rest_off: float) -> tuple[Errors, Errors]:
     """Return the errors of all sequences with contacts followed, then with each frame translated alone.
     rest_off : counts, largest error of the rest"""
     time = np.arange(truth["force"].shape[1]) / SAMPLE_RATE
@@ -65,7 +65,7 @@ def measured(network: Translator, truth: Truth, rest_off: float = 0.0) -> tuple[
         one = {name: values[number] for name, values in truth.items()}
         followed.append(judged(pass_over(network, signals, time)(np.arange(len(time))).translation, one))
         alone.append(judged(network(signals), one))
-    return _joined(followed), _joined(alone)
+    return joined(iter(followed)), joined(iter(alone))
 
 
 def read(file: Path = FILE) -> Truth:
@@ -100,19 +100,7 @@ def judged(found: Translation, truth: Truth) -> Errors:
     }
 
 
-def _joined(parts: list[Errors]) -> Errors:
-    return {name: np.concatenate([part[name] for part in parts]) for name in UNITS}
-
-
-def _row(
-    name: str, metric: str, both: tuple[Errors, Errors], some: np.ndarray | slice, of: str, unit: str,
-    target: float | None = None,
-) -> Row:  # fmt: skip
-    value, baseline = (quantile(each[metric][some], 50) for each in both)
-    return row(name, value, unit, target, baseline=baseline, of=of, at_least=metric == "iou")
-
-
-def quantile(values: np.ndarray, level: int) -> float | None:
-    """Return the ``level`` per cent quantile of values (n,) without NaN; None if it is infinite, a lost contact."""
-    found = float(np.nanpercentile(values, level, method="higher"))
+def median(values: np.ndarray) -> float | None:
+    """Return the median of values (n,) without NaN; None if it is infinite, a lost contact."""
+    found = float(np.nanpercentile(values, 50, method="higher"))
     return found if np.isfinite(found) else None

@@ -11,10 +11,8 @@ from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import (
     Bodies,
     error_columns,
-    joined,
     metric_row,
     metric_rows,
-    parts,
     slices,
     translation_metrics,
 )
@@ -22,7 +20,6 @@ from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translator import Translator
 
 from .contact_rows import answer_rows, posterior_rows, rectified_rows
-from .slides import rank_correlation
 
 # Targets (docs/sources.md, Targets), without shear, depth bins and indenters alike.
 TARGETS = {
@@ -38,7 +35,7 @@ GAIN = 0.1  # standard deviation per channel (assumed: docs/sources.md, BioTac r
 
 
 def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
-    """Return rows on all contacts: metrics with targets, metrics of subsets, and how good expected errors are.
+    """Return rows on all contacts: metrics with targets, and metrics of subsets.
     bodies : the gel's surface and the skin's unrolled places, by ``our_bodies``"""
     rows = np.arange(len(pairs.press))
     change = as_read(pairs.signal, SEED)
@@ -58,7 +55,7 @@ def seen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]
         at = pairs.indenter == number
         each = {metric: np.where(at, columns[metric], np.nan) for metric in (*EACH_INDENTER, *BASELINE_METRICS)}
         found += [one for one in metric_rows(each, pairs, rows, name, {}) if one["value"] is not None]
-    return [*found, *expected_error_rows(translator, pairs, rows, change, bodies, "seen indenters")]
+    return found
 
 
 def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Row]:
@@ -84,32 +81,18 @@ def unseen_rows(translator: Translator, pairs: Pairs, bodies: Bodies) -> list[Ro
 def expected_error_rows(
     translator: Translator, pairs: Pairs, rows: np.ndarray, change: np.ndarray, bodies: Bodies, name: str
 ) -> list[Row]:
-    """Return rows of the rank correlation of expected and true largest errors, of the share below the bound, and of the
-    share out of range. rows : (C,), indices of pairs; change : (C, 19) counts, signals as read; name : the set's"""
-    nets, silent = translator.nets, translator.silent("digit_m")
-    columns = joined(error_columns(nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows)))
+    """Return rows of the share of contacts whose largest error is below its bound, of those or flagged, and flagged.
+    rows : (C,), indices of pairs; change : (C, 19) counts, signals as read; name : the set's"""
+    columns = error_columns(translator.nets, pairs, rows, change, bodies, translator.silent("digit_m"))
     flagged = translator.out_of_range(change)
-    seen = name.startswith("seen")
     found = []
     for surface in SURFACES:
-        expected, true = columns[f"{surface}_expected_m"], columns[f"{surface}_max_m"]
-        covered = true <= translator.bound(expected, columns["x_m"], surface)
-        rank = rank_correlation(expected, true)
-        found.append(_share_row(f"{surface}_error_rank", rank, 0.6 if seen else None, None, name))
-        low, high = (0.9, 0.98) if seen else (None, None)
-        found.append(_share_row(f"{surface}_error_covered", float(covered.mean()), low, high, name))
-        if not seen:
-            either = float((covered | flagged).mean())
-            found.append(_share_row(f"{surface}_error_covered_or_flagged", either, 0.85, None, name))
-    found.append(_share_row("frames_flagged", float(flagged.mean()), None, 0.1 if seen else None, name))
-    return found
-
-
-def _share_row(name: str, value: float, low: float | None, high: float | None, set_name: str) -> Row:
-    """Return a row of a share, ``value``, whose target is ``low`` or more and ``high`` or less, None for no such limit.
-    set_name : what data it is of"""
-    found = row(name, value, "1", high if low is None else low, of=set_name, at_least=low is not None)
-    return found if None in (low, high) else found | {"ok": bool(low <= value <= high)}
+        bound = translator.bound(columns[f"{surface}_expected_m"], columns["x_m"], surface)
+        covered = columns[f"{surface}_max_m"] <= bound
+        either = float((covered | flagged).mean())
+        found.append(row(f"{surface}_error_covered", float(covered.mean()), "1", of=name))
+        found.append(row(f"{surface}_error_covered_or_flagged", either, "1", 0.85, of=name, at_least=True))
+    return [*found, row("frames_flagged", float(flagged.mean()), "1", of=name)]
 
 
 def as_read(change: np.ndarray, seed: int) -> np.ndarray:

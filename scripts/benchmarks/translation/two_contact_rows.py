@@ -6,7 +6,6 @@ them. To translate, two balls were solved at once (``benchmarks/make/make_double
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from benchmarks.table.translation_methods import plain_signals
 from tactile_core.accuracy import Row, lengths, row
 from tactile_core.recordings.polarity import TOUCHING
 from tactile_core.simulation.pairs_file import Pairs
+from tactile_core.training.step_errors import true_displacement
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.simulated_likeness import residual_shares, two_contacts
 from tactile_core.translation.translator import Translation, Translator
@@ -65,38 +65,25 @@ def _marked(change: np.ndarray) -> np.ndarray:
     return two_contacts(residual_shares(as_read(change, SEED), np.zeros(len(change), bool)))
 
 
-@dataclass(frozen=True)
-class DoubleContacts:
-    """Contacts of two balls at once. signal : (C, 19) counts; gel : (C, M, 3) m; force : (C,) N, of both balls"""
-
-    signal: np.ndarray
-    gel: np.ndarray
-    force: np.ndarray
-
-
-def double_contacts(file: Path = DOUBLE) -> DoubleContacts:
-    """Read contacts that ``make_double_contacts.py`` solved."""
-    with np.load(file, allow_pickle=False) as found:
-        gel = _meters(found["displacement_digit"], found["scale"])
-        return DoubleContacts(found["signal"], gel, lengths(found["force"]))
+def double_contacts() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Read contacts of two balls at once that ``make_double_contacts.py`` solved: signals (C, 19) counts, gels
+    (C, M, 3) m, force (C,) N, of both balls."""
+    with np.load(DOUBLE, allow_pickle=False) as found:
+        gel = found["displacement_digit"].astype(np.float32) * np.float32(found["scale"])
+        return found["signal"], gel, lengths(found["force"])
 
 
-def _meters(displacement: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    return displacement.astype(np.float32) * np.float32(scale)
-
-
-def translated_rows(network: Translator, pairs: Pairs, file: Path = DOUBLE) -> list[Row]:
+def translated_rows(network: Translator, pairs: Pairs) -> list[Row]:
     """Return rows on double and on single contacts, with two contacts looked for; baseline: with one looked for.
 
     split: share taken for two; gel: rms error over that of no displacement; overlap: of the nodes deeper than half the
     deepest; force: median error of both contacts' together"""
-    double = double_contacts(file)
-    force = np.concatenate([double.force, lengths(pairs.force)])
-    gel = np.concatenate([double.gel, _meters(pairs.displacement_digit, pairs.scale_digit)])
-    signals = plain_signals(as_read(np.concatenate([double.signal, pairs.signal]), SEED))
+    single = pairs.signal, true_displacement(pairs, "digit", slice(None)), lengths(pairs.force)
+    signal, gel, force = map(np.concatenate, zip(double_contacts(), single, strict=True))
+    signals = plain_signals(as_read(signal, SEED))
     answers = (Translator(network.nets, Answer(contacts=count))(signals) for count in (2, 1))
     two, one = (_errors(answer, gel, force) for answer in answers)
-    doubles = len(double.force)
+    doubles = len(force) - len(pairs.force)
     found = []
     for of, part in (("two balls", slice(doubles)), ("single contacts", slice(doubles, None))):
         for name, middle, unit in METRICS:

@@ -66,5 +66,5 @@ def test_a_unit_whose_rest_is_off_keeps_its_gains_and_noise(truth):
 
 
 def test_lost_contacts_have_no_median():
-    assert sequence_rows.quantile(np.array([1.0, np.inf, np.inf]), 50) is None
-    assert sequence_rows.quantile(np.array([1.0, 2.0, np.inf]), 50) == 2.0
+    assert sequence_rows.median(np.array([1.0, np.inf, np.inf])) is None
+    assert sequence_rows.median(np.array([1.0, 2.0, np.inf])) == 2.0
