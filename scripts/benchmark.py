@@ -14,7 +14,6 @@ extras [fem] and [render].
 
 from __future__ import annotations
 
-import argparse
 import concurrent.futures
 import importlib
 import multiprocessing
@@ -24,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from benchmarks.measured_rows import finished, parser_of, printed
 from benchmarks.table.method import ROOT, Method
@@ -49,7 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault(compiled.SWITCH, "1")  # loops at their first call: what is timed is warm
     missing: dict[str, str] = {}
     try:
-        methods = list(all_measured(options, missing))
+        methods = list(all_measured(options.only, options.quick, missing))
         rows = [each for method in methods for each in method.rows()]
         if not options.only:
             from benchmarks.table.promised import promised
@@ -69,46 +69,35 @@ def main(arguments: list[str] | None = None) -> int:
     return finished(rows, options.json)
 
 
-def stage_measured(
-    stage: str, quick: bool, file: str, missing: dict[str, str], only: Sequence[str] = ()
-) -> Iterator[Method]:
-    """Measure every method of a stage, each in a process of its own. quick : on less data
+def all_measured(only: Sequence[str], quick: bool, missing: dict[str, str]) -> Iterator[Method]:
+    """Measure the methods of all stages, each in a process of its own. quick : on less data
 
-    file : to which the first method of pictures and of chain writes the truth for the other methods
-    missing : gets method -> reason for each that cannot run
-    only : texts that name a stage, or a stage and a method; none for all"""
-    names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
-    wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
-    if wanted and stage in LEAVE_TRUTH:
-        wanted = list(dict.fromkeys([names[0], *wanted]))
-    for name in wanted:
-        began = time.perf_counter()
-        with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
-            try:
-                found = pool.submit(one_measured, stage, name, quick, file).result()
-            except ModuleNotFoundError as error:
-                missing[f"{stage} {name}"] = f"no {error.name}"
-                continue
-        print(f"{stage} {name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
-        if found is not None:
-            yield found
-
-
-def one_measured(stage: str, name: str, quick: bool, file: str) -> Method | None:
-    """Measure one method of a stage in the present process; None for a method that only writes the truth for the others
-    to ``file``. quick : on less data"""
-    measure = importlib.import_module(f"benchmarks.table.{stage}_methods").measure
-    return measure(name, quick, file) if stage in LEAVE_TRUTH else measure(name, quick)
-
-
-def all_measured(options: argparse.Namespace, missing: dict[str, str]) -> list[Method]:
-    """Measure every method that the command line's options ask for; missing : gets method -> why it could not run"""
-    methods = []
+    only : texts that name a stage, or a stage and a method; none for all
+    missing : gets method -> reason for each that cannot run"""
     with tempfile.TemporaryDirectory() as scratch:
         for stage in STAGES:
-            file = str(Path(scratch) / f"{stage}.npz")
-            methods += stage_measured(stage, options.quick, file, missing, options.only)
-    return methods
+            names = importlib.import_module(f"benchmarks.table.{stage}_methods").NAMES
+            wanted = [name for name in names if not only or stage in only or f"{stage} {name}" in only]
+            file = (str(Path(scratch) / f"{stage}.npz"),) if stage in LEAVE_TRUTH else ()
+            if wanted and file:
+                wanted = list(dict.fromkeys([names[0], *wanted]))
+            for name in wanted:
+                began = time.perf_counter()
+                with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+                    try:
+                        found = pool.submit(one_measured, stage, name, quick, *file).result()
+                    except ModuleNotFoundError as error:
+                        missing[f"{stage} {name}"] = f"no {error.name}"
+                        continue
+                print(f"{stage} {name}: {time.perf_counter() - began:.0f} s", file=sys.stderr, flush=True)
+                if found is not None:
+                    yield found
+
+
+def one_measured(stage: str, *options: Any) -> Method | None:
+    """Measure one method of a stage in the present process; None for one that only writes the truth for the others.
+    options : name of the method, whether on less data, and the file of the truth where the stage has one"""
+    return importlib.import_module(f"benchmarks.table.{stage}_methods").measure(*options)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Measure what a simulator's loop asks for: contacts, alone and along paths, pictures, whole steps of a ``Gel``.
 
-    python scripts/benchmarks/measure_loop.py --count 500 --json FILE   docs/in_the_loop.md's
-    python scripts/benchmarks/measure_loop.py --count 18                                  a quick look
+    python scripts/benchmarks/measure_loop.py               docs/in_the_loop.md's table
+    python scripts/benchmarks/measure_loop.py --count 18    a quick look
 
 Random contacts of nine indenters on each sensor, with friction. Alone: each is solved without one before. On a path:
 the same depth is reached in ten steps, the first untimed. Step and picture: a ``Gel`` of the DIGIT goes down in five
@@ -22,30 +22,23 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+import numpy as np
 
-from benchmarks.measured_rows import finished, parser_of, printed  # noqa: E402
-from tactile_core.files.threads import one_thread  # noqa: E402
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-one_thread()  # before numpy is imported: the times are those of one core
-os.environ.setdefault("TACTILE_COMPILED", "1")  # loops at their first call: what is timed is warm
-
-import numpy as np  # noqa: E402
-
-from benchmarks.mechanics.random_contacts import RandomContact, random_contacts  # noqa: E402
-from tactile_core.accuracy import Row, row  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.files import compiled  # noqa: E402
-from tactile_core.geometry.indenters import Box, Cylinder, Indenter, MeshIndenter, Sphere  # noqa: E402
-from tactile_core.jobs.gel import Gel  # noqa: E402
-from tactile_core.mechanics.error_estimate import measured  # noqa: E402
-from tactile_core.mechanics.fast.active_set import UnsolvedError  # noqa: E402
-from tactile_core.mechanics.fast.compliance import compliance_of  # noqa: E402
-from tactile_core.mechanics.fast.press import CorrectedPress, FastContact  # noqa: E402
-from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under  # noqa: E402
-from tactile_core.pictures.height_map import folds_counted, gel_mapper  # noqa: E402
-from tactile_core.pictures.renderer import Renderer  # noqa: E402
+from benchmarks.measured_rows import parser_of
+from benchmarks.mechanics.random_contacts import RandomContact, random_contacts
+from tactile_core.errors import TactileError
+from tactile_core.files import compiled, threads
+from tactile_core.geometry.indenters import Box, Cylinder, Indenter, MeshIndenter, Sphere
+from tactile_core.jobs.gel import Gel
+from tactile_core.mechanics.error_estimate import measured
+from tactile_core.mechanics.fast.active_set import UnsolvedError
+from tactile_core.mechanics.fast.compliance import compliance_of
+from tactile_core.mechanics.fast.press import CorrectedPress, FastContact
+from tactile_core.mechanics.placement import DEPTH_LIMIT, FRICTION, pose_at, thickness_under
+from tactile_core.pictures.height_map import folds_counted, gel_mapper
+from tactile_core.pictures.renderer import Renderer
 
 STEPS, SEED = 10, 20261125
 SLIDE = 0.1e-3  # m per step
@@ -55,21 +48,19 @@ Times = list[tuple[float, float]]  # CPU and wall, ms
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print and write the results; returns the exit status."""
-    parser = parser_of(__doc__)
+    """Measure and print the table; returns the exit status."""
+    parser = parser_of(__doc__, json=False)
     parser.add_argument("--count", type=int, default=500, help="contacts a sensor, alone and on paths (%(default)s)")
     options = parser.parse_args(arguments)
     if not compiled.available():
         print("measure_loop: numba is not installed (extra [fem]), or switched off", file=sys.stderr)
         return 2
-    rows: list[Row] = []
-    table = [f"| | CPU ms: {LEVELS_SHOWN} | wall ms: {LEVELS_SHOWN} | error |", "|---|---|---|---|---|---|---|---|"]
+    threads.one_thread()  # the times are those of one core
+    os.environ.setdefault(compiled.SWITCH, "1")  # loops at their first call: what is timed is warm
+    print(f"| | CPU ms: {LEVELS_SHOWN} | wall ms: {LEVELS_SHOWN} | error |\n|---|---|---|---|---|---|---|---|")
     for name, times, error in all_measured(options.count):
-        table.append(f"| {name} | {' | '.join(f'{each:.3g}' for each in quantiles(times))} | {error} |")
-        rows += as_rows(name, times, error)
-    printed(rows)
-    print("\n".join(table))
-    return finished(rows, options.json)
+        print(f"| {name} | {' | '.join(f'{each:.3g}' for each in quantiles(times))} | {error} |", flush=True)
+    return 0
 
 
 def quantiles(times: Times) -> list[float]:
@@ -77,33 +68,19 @@ def quantiles(times: Times) -> list[float]:
     return [float(np.quantile(each, level)) for each in np.array(times).T for level in LEVELS]
 
 
-def as_rows(name: str, times: Times, error: str) -> list[Row]:
-    """Return six rows, the ``quantiles`` of times. name : what was timed; error : text, of what was timed"""
-    of = f"{len(times)} contacts, one core; error {error}"
-    labels = [f"{kind}{level}" for kind in ("cpu", "wall") for level in ("", "_95", "_99")]
-    key = f"loop_{name.replace(', ', '_').replace(' ', '_')}"
-    return [row(f"{key}_{label}", value, "ms", of=of) for label, value in zip(labels, quantiles(times), strict=True)]
-
-
 def all_measured(count: int) -> Iterator[tuple[str, Times, str]]:
     """Yield name, times and a text on the error of each thing that is measured; count : contacts per sensor"""
     for sensor in ("digit", "biotac"):
-        for name, times, error, last in of_sensor(sensor, count):
-            yield name, times, error
-            if sensor == "digit" and name.endswith("path"):
-                yield from pictures(last)
+        tier = measured()["tiers"]["fast"][sensor]["bins"][1]
+        stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
+        for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
+            times, last = measure(sensor, steps, contacts)
+            settled = [each for each in last if each is not None]
+            yield f"{sensor}, {name}", times, f"{stated}; {len(settled) / len(last):.1%} of paths settled"
+            if sensor == "digit" and steps > 1:
+                yield from pictures(settled)
     yield "digit, step and picture", gel_steps(count), "see above"
     yield from meshes(count)
-
-
-def of_sensor(sensor: str, count: int) -> Iterator[tuple[str, Times, str, list[FastContact]]]:
-    """Yield name, times, a text on the error, and the deepest contacts, of ``count`` contacts alone, then on paths."""
-    tier = measured()["tiers"]["fast"][sensor]["bins"][1]
-    stated = f"{tier['shape_um']:.2g} um, {100 * tier['force']:.2g} % of force from the full tier"
-    for name, steps, contacts in (("alone", 1, count), ("on a path", STEPS, -(-count // STEPS))):
-        times, last = measure(sensor, steps, contacts)
-        settled = sum(each is not None for each in last) / len(last)
-        yield f"{sensor}, {name}", times, f"{stated}; {settled:.1%} of paths settled", list(filter(None, last))
 
 
 def measure(sensor: str, steps: int, count: int) -> tuple[Times, list[FastContact | None]]:

@@ -18,7 +18,7 @@ import dataclasses
 import sys
 import time
 import timeit
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -61,12 +61,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="two fields, the small size")
     parser.add_argument("--fields", type=int, default=FIELDS, metavar="N", help="contacts to draw")
-    parser.add_argument("--calibration", metavar="FILE", help="another than the shipped one")
     options = parser.parse_args(arguments)
-    unit = load_calibration(options.calibration)
     count = 2 if options.quick else options.fields
-    rows = printed(measure(unit, count, options.quick))
-    if not (options.quick or options.calibration):
+    rows = printed(measure(load_calibration(), count, options.quick))
+    if not options.quick:
         atomic.write_json(TABLE, table(rows, count))
     return finished(rows, options.json)
 
@@ -125,20 +123,21 @@ def errors(unit: Calibration, heights: list[np.ndarray], variant: str, truth: Pr
     """Yield every preset's errors on heights (H, W) m, against converged direct light and against the full model.
     variant : of Mitsuba; truth : preset of the full model. Baseline: the background alone."""
     renderers = {name: Renderer(unit, name, variant) for name in NAMES[:-1]}
-    of, levels = f"{len(heights)} fields", renderers[FAST].in_levels
-    changes = {
-        name: [levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
-        for name, renderer in renderers.items()
-    }
+    of = f"{len(heights)} fields"
+    drawn = {name: changes(renderer, heights) for name, renderer in renderers.items()}
     converged, full = zip(*converge(unit, heights, variant, truth, seed=0), strict=True)
-    for name, change in changes.items():
+    for name, change in drawn.items():
         yield row(f"{name}_error_direct", rms(change, converged), "levels", DIRECT_TARGET.get(name),
                   baseline=rms(converged), of=of)  # fmt: skip
         yield row(f"{name}_error", rms(change, full), "levels", FULL_TARGET.get(name), baseline=rms(full), of=of)
-    paths = Renderer(unit, REFERENCE.name, variant)
-    drawn = [levels(paths.radiance(height) - paths.rest_radiance) for height in heights[:2]]
-    yield row(f"{REFERENCE.name}_error", rms(drawn, full[:2]), "levels", baseline=rms(full[:2]),
+    paths = changes(Renderer(unit, REFERENCE.name, variant), heights[:2])
+    yield row(f"{REFERENCE.name}_error", rms(paths, full[:2]), "levels", baseline=rms(full[:2]),
               of="2 fields, by LLVM the noise of its 256 paths a pixel and what they differ by")  # fmt: skip
+
+
+def changes(renderer: Renderer, heights: Iterable[np.ndarray]) -> list[np.ndarray]:
+    """Return the change from rest, levels (H, W, 3), of the picture of each of heights (H, W) m, before rounding."""
+    return [renderer.in_levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
 
 
 def converge(
@@ -163,7 +162,7 @@ def spread_in_levels(unit: Calibration) -> Callable[[np.ndarray], np.ndarray]:
     return lambda radiance: in_levels(np.moveaxis(spread(np.moveaxis(radiance, -1, 0)), 0, -1))
 
 
-def rms(pictures: list[np.ndarray], others: list[np.ndarray] | None = None) -> float:
+def rms(pictures: Sequence[np.ndarray], others: Sequence[np.ndarray] | None = None) -> float:
     """Return the root mean square of all pictures' numbers, or of their differences from ``others`` of equal shapes."""
     difference = np.asarray(pictures) - (0 if others is None else np.asarray(others))
     return float(np.sqrt(np.mean(np.square(difference, dtype=float))))

@@ -18,7 +18,6 @@ import re
 import sys
 import tempfile
 from collections.abc import Iterator
-from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +42,6 @@ SEED = 20261122  # of the random contacts: the correction has learned from those
 # Random contacts: one of each indenter, five on the BioTac, whose full tier finds deep edges sooner; the first three.
 FULL, REFERENCE = {"digit": 9, "biotac": 45}, 3
 QUICK = 3
-REPEATS = {"fast": 3, "full": 1, "reference": 1}  # of a solve, the fastest counts: the first may read and compile
 FAST_EDGES, FULL_EDGES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6), (0.2, 0.6)  # of the bins of depth over thickness
 SAYS = {
     "fast": "linear with a learned correction; its error against the full tier",
@@ -108,8 +106,7 @@ def keep(work: Path, sensor: Sensor, tier: Tier, number: int, contact: RandomCon
     path = work / f"{sensor}_{tier}_{SEED}_{number:03d}.npz"
     if tier == "fast" or not path.exists():
         try:
-            tries = (solved(sensor, contact, tier) for _ in range(REPEATS[tier]))
-            found, share, seconds = min(tries, key=itemgetter(2))
+            found, share, seconds = solved(sensor, contact, tier)
         except TactileError as error:
             print(f"{path.stem}, {contact.name}: {error}", file=sys.stderr)
             return {}

@@ -18,10 +18,11 @@ from tactile_core.files import atomic, threads
 COLUMNS = ("name", "value", "unit", "target", "baseline", "set", "ok")
 
 
-def parser_of(about: str | None) -> argparse.ArgumentParser:
-    """Make the parser of a script that measures; about : the script's docstring."""
+def parser_of(about: str | None, json: bool = True) -> argparse.ArgumentParser:
+    """Make the parser of a script; about : the script's docstring; json : true if the script has ``--json FILE``"""
     parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the rows here")
+    if json:
+        parser.add_argument("--json", type=Path, metavar="FILE", help="write what was measured here")
     return parser
 
 

@@ -33,11 +33,10 @@ def test_a_stage_runs_and_its_rows_can_be_read(script, tmp_path):
 
 
 def test_the_front_holds_what_nothing_beats_in_both(script):
-    from benchmarks.table.benchmark_page import pareto, steps
+    from benchmarks.table.benchmark_page import pareto
 
     front = pareto([(3, 1.0), (1, 4.0), (2, 5.0), (2.5, 2.0), (9, 1.0)])
     assert front == [(1, 4.0), (2.5, 2.0), (3, 1.0)]
-    assert steps(front) == [(1, 4.0), (2.5, 4.0), (2.5, 2.0), (3, 2.0), (3, 1.0)]
 
 
 def test_a_promise_counts_what_stayed_below(script):

@@ -74,7 +74,7 @@ def split(stage: str, methods: Sequence[Method]) -> list[list[Method]]:
 def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
     """Draw one panel: each method's error over its time, the Pareto front, and the error of doing nothing."""
     front = pareto([(each.ms, each.error) for each in methods])
-    axes.plot(*zip(*steps(front), strict=True), color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
+    axes.step(*zip(*front, strict=True), where="post", color="tab:orange", linewidth=1, zorder=1, label="Pareto front")
     baselines = {each.baseline for each in methods if each.baseline}
     axes.axhline(max(baselines), color="grey", linestyle="--", linewidth=1, label="doing nothing")
     for number, each in enumerate(sorted(methods, key=lambda one: one.ms)):
@@ -106,11 +106,3 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
         if not front or point[1] < front[-1][1]:
             front.append(point)
     return front
-
-
-def steps(front: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return the points (time, error) of a Pareto front with a corner between each two, so that it is a staircase."""
-    corners = [front[0]]
-    for point in front[1:]:
-        corners += [(point[0], corners[-1][1]), point]
-    return corners

@@ -6,19 +6,19 @@ import dataclasses
 
 import numpy as np
 
-from benchmarks.measure_presets import QUICK_PASSES, converge, one_thread, rms
+from benchmarks.measure_presets import QUICK_PASSES, changes, converge, one_thread, rms
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.jobs.frame_pass import CHUNK
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE
-from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors.calibration_file import load_calibration
-from tactile_core.simulation.pairs_file import Pairs, read_pairs
+from tactile_core.simulation.pairs_file import Pairs
 from tactile_core.training.step_errors import true_displacement
 from tactile_core.translation.translate import load_translator
 
-from .method import TEST_SET, Method, best_ms, peak_mb
+from .method import Method, best_ms, peak_mb, test_contacts
+from .pictures_methods import of_preset
 from .translation_methods import plain_signals
 
 NAMES = ("truth", FAST, "standard", "quality")
@@ -37,9 +37,7 @@ def measure(name: str, quick: bool, truth: str) -> Method | None:
     if name == "truth":
         _draw_truth(unit, mapper, pairs, QUICK_PASSES if quick else PASSES, truth)
         return None
-    translator, renderer = load_translator(), Renderer(unit, name)
-    if renderer.variant:
-        one_thread(renderer.variant)
+    translator, (renderer, label) = load_translator(), of_preset(unit, name)
     change = as_read(pairs.signal, SEED)
     frames = np.resize(change, (CHUNK, change.shape[1]))
     found = translator(plain_signals(change)).displacement_digit
@@ -47,17 +45,15 @@ def measure(name: str, quick: bool, truth: str) -> Method | None:
     ms = best_ms(lambda: translator(plain_signals(frames)), CHUNK)
     ms += best_ms(lambda: mapper(found[0])) + best_ms(lambda: renderer(height))
     mb = peak_mb()
-    levels = [renderer.in_levels(renderer.radiance(each) - renderer.rest_radiance) for each in mapper(found)]
     with np.load(truth, allow_pickle=False) as file:
-        true = list(file["pictures"])
+        true = file["pictures"]
     of = f"{len(true)} test contacts, signal to picture, against the reference picture of the true deformation"
-    label = name if name == FAST else f"{name}_{renderer.variant}"
-    return Method("chain", label, ms, mb, rms(levels, true), "levels", rms(true), of)
+    return Method("chain", label, ms, mb, rms(changes(renderer, mapper(found)), true), "levels", rms(true), of)
 
 
 def _contacts(count: int) -> Pairs:
     """Return ``count`` test contacts in the camera's view, the same ones in every run."""
-    pairs, camera = read_pairs(TEST_SET), load_calibration().camera
+    pairs, camera = test_contacts(quick=False), load_calibration().camera
     deep = np.abs(pairs.displacement_digit[..., 1]).max(axis=1) * pairs.scale_digit > LEAST
     row, column = camera.to_pixel(pairs.contact_center[:, 0], pairs.contact_center[:, 1])
     seen = deep & (row >= 0) & (row < camera.height) & (column >= 0) & (column < camera.width)

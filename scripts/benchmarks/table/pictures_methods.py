@@ -7,8 +7,7 @@ import time
 
 import numpy as np
 
-from benchmarks.measure_presets import QUICK_PASSES, converge, fields, one_thread, rms
-from tactile_core.accuracy import row
+from benchmarks.measure_presets import QUICK_PASSES, changes, converge, fields, one_thread, rms
 from tactile_core.pictures.mitsuba.variant import choose_variant
 from tactile_core.pictures.presets import FAST, REFERENCE, preset_named
 from tactile_core.pictures.renderer import Renderer
@@ -31,19 +30,19 @@ def measure(name: str, quick: bool, truth: str) -> Method:
     heights = fields(unit, QUICK_FIELDS if quick else FIELDS, OF_FIELDS)
     if name == REFERENCE.name:
         return _reference(unit, heights, quick, truth)
-    renderer = Renderer(unit, name)
-    if renderer.variant:
-        one_thread(renderer.variant)
+    renderer, label = of_preset(unit, name)
     ms, mb = best_ms(lambda: renderer(heights[0])), peak_mb()
     with np.load(truth, allow_pickle=False) as file:
         true, of = file["pictures"], str(file["of"])
-    levels = [renderer.in_levels(renderer.radiance(height) - renderer.rest_radiance) for height in heights]
-    label = name if name == FAST else f"{name}_{renderer.variant}"
-    more = [
-        row(f"pictures_{label}_field_{number}", rms([found], [each]), "levels", baseline=rms([each]), of="one field")
-        for number, (found, each) in enumerate(zip(levels, true, strict=True), 1)
-    ]
-    return Method("pictures", label, ms, mb, rms(levels, list(true)), "levels", rms(list(true)), of, tuple(more))
+    return Method("pictures", label, ms, mb, rms(changes(renderer, heights), true), "levels", rms(true), of)
+
+
+def of_preset(unit: Calibration, name: str) -> tuple[Renderer, str]:
+    """Return a preset's renderer, on one thread, and its name in the table, which ends in Mitsuba's variant, if any."""
+    renderer = Renderer(unit, name)
+    if renderer.variant:
+        one_thread(renderer.variant)
+    return renderer, name if name == FAST else f"{name}_{renderer.variant}"
 
 
 def _reference(unit: Calibration, heights: list[np.ndarray], quick: bool, truth: str) -> Method:

@@ -11,14 +11,12 @@ from benchmarks.measure_tiers import FAST_EDGES
 from benchmarks.mechanics.contact_tiers import SENSORS, by_depth, fast_misses
 from benchmarks.translation.test_set import SEED, as_read
 from tactile_core.accuracy import Row, row
-from tactile_core.simulation.pairs_file import read_pairs
 from tactile_core.simulation.scene import load_scene
-from tactile_core.training.step_errors import error_columns, joined, our_bodies, parts
+from tactile_core.training.step_errors import error_columns, our_bodies
 from tactile_core.translation.card import SURFACES
 from tactile_core.translation.translate import load_translator
 
-from .mechanics_methods import EVERY
-from .method import TEST_SET, TRAINING
+from .method import EVERY, TRAINING, test_contacts
 
 COVER = 0.9, 0.98  # least and largest share of contacts below a right bound of 95 % (assumed)
 FEWEST = 200  # contacts for a target: with fewer the share is 1.5 % off and more by chance
@@ -45,17 +43,15 @@ class Promise:
 
     def row(self) -> Row:
         """Return a report row of the share of contacts within their bounds, with a target if there are enough."""
-        share = self.covered()
-        if len(self.found) < FEWEST:
-            return row(f"promised_{self.name}_covered", share, "1", of=self.of)
-        return row(f"promised_{self.name}_covered", share, "1", COVER[0], of=self.of, at_least=True) | {
-            "ok": COVER[0] <= share <= COVER[1]
-        }
+        share, enough = self.covered(), len(self.found) >= FEWEST
+        least = COVER[0] if enough else None
+        found = row(f"promised_{self.name}_covered", share, "1", least, of=self.of, at_least=True)
+        return found | {"ok": COVER[0] <= share <= COVER[1]} if enough else found
 
     def lines(self) -> Iterator[str]:
         """Yield a Markdown table's rows: all contacts, then each group."""
         names = np.array(self.groups)
-        for name in ["all", *dict.fromkeys(self.groups)]:
+        for name in ["all", *sorted(set(self.groups))]:
             here = np.ones(len(names), bool) if name == "all" else names == name
             bound, found = (f"{np.median(values[here]):.3g} {self.unit}" for values in (self.bound, self.found))
             yield f"| {self.name} | {name} | {here.sum()} | {bound} | {found} | {self.covered(here):.1%} |"
@@ -70,9 +66,7 @@ def promised(quick: bool) -> tuple[list[Row], dict[str, list[str]]]:
 
 def of_mechanics(quick: bool) -> Iterator[Promise]:
     """Yield a ``Promise`` for the fast tier's shape and one for its force, of each sensor. quick : fewer contacts"""
-    pairs, (scene, _) = read_pairs(TEST_SET), load_scene(TRAINING)
-    if quick:
-        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
+    pairs, (scene, _) = test_contacts(quick), load_scene(TRAINING)
     for sensor in SENSORS:
         misses = list(fast_misses(sensor, pairs, scene))
         bounds = np.empty((len(misses), 2))
@@ -84,30 +78,19 @@ def of_mechanics(quick: bool) -> Iterator[Promise]:
                     bounds[number] = entry["shape_95_um"], 100 * entry["force_95"]
         edges = [next(edge for edge in FAST_EDGES if each.share <= edge + 1e-6) for each in misses]
         depths = [f"to {edge:g} of the thickness" for edge in edges]
-        order = np.argsort(edges, kind="stable")
-        for what, unit, found, bound in (
-            ("shape", "um", [1e6 * each.shape for each in misses], bounds[:, 0]),
-            ("force", "%", [100 * each.force for each in misses], bounds[:, 1]),
-        ):
-            groups = [depths[number] for number in order]
-            of = f"{len(misses)} test contacts, five folds by press"
-            yield Promise(f"fast_{sensor}_{what}", unit, bound[order], np.array(found)[order], groups, of)
+        of = f"{len(misses)} test contacts, five folds by press"
+        found = np.array([(1e6 * each.shape, 100 * each.force) for each in misses])
+        for k, (what, unit) in enumerate((("shape", "um"), ("force", "%"))):
+            yield Promise(f"fast_{sensor}_{what}", unit, bounds[:, k], found[:, k], depths, of)
 
 
 def of_translation(quick: bool) -> Iterator[Promise]:
     """Yield a ``Promise`` for the largest node error of translations, of each surface. quick : fewer contacts"""
-    pairs, translator = read_pairs(TEST_SET), load_translator()
-    if quick:
-        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
+    pairs, translator = test_contacts(quick), load_translator()
     change, rows = as_read(pairs.signal, SEED), np.arange(len(pairs.press))
-    silent, bodies = translator.silent("digit_m"), our_bodies()
-    columns = joined(
-        error_columns(translator.nets, pairs, rows[part], change[part], bodies, silent) for part in parts(len(rows))
-    )
+    columns = error_columns(translator.nets, pairs, rows, change, our_bodies(), translator.silent("digit_m"))
     names = [pairs.indenter_names[number] for number in pairs.indenter]
-    order = np.argsort(names, kind="stable")
+    of = f"{len(rows)} test contacts, largest node error"
     for surface in SURFACES:
         bound = translator.bound(columns[f"{surface}_expected_m"], columns["x_m"], surface)
-        found, groups = columns[f"{surface}_max_m"], [names[number] for number in order]
-        of = f"{len(rows)} test contacts, largest node error"
-        yield Promise(f"translation_{surface}", "um", 1e6 * bound[order], 1e6 * found[order], groups, of)
+        yield Promise(f"translation_{surface}", "um", 1e6 * bound, 1e6 * columns[f"{surface}_max_m"], names, of)

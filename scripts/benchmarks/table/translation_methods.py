@@ -3,85 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.translation.test_set import SEED, as_read
-from tactile_core import accuracy
-from tactile_core.accuracy import Row, row
 from tactile_core.jobs import solved_gel
-from tactile_core.simulation.pairs_file import Pairs, read_pairs
-from tactile_core.training.step_errors import joined, mesh_columns, metric_rows, parts, true_displacement
+from tactile_core.training.step_errors import mesh_columns, metric_rows, true_displacement
 from tactile_core.translation.translate import load_translator
 
-from .method import TEST_SET, Method, best_ms, peak_mb
+from .method import Method, best_ms, peak_mb, test_contacts
 
 BATCHES = 1, 500  # frames per call
 NAMES = (*(f"{kind}_{batch}" for kind in ("numpy", "numpy_confidence") for batch in BATCHES), "numpy_solved_100")
-EVERY = 3  # one test press in so many, in a quick run; prime to how box, ring and others take turns
-Change = np.ndarray  # (B, 19) counts
-Surfaces = Callable[[Change], tuple[np.ndarray, np.ndarray]]
+Gels = Callable[[np.ndarray], np.ndarray]  # change (B, 19) counts -> displacement of the gel (B, M, 3) m
 
 
 def measure(name: str, quick: bool) -> Method:
     """Measure a translation named like "numpy_solved_1": a key of KINDS, and the frames per call. quick : on fewer"""
     kind, batch = name.rsplit("_", 1)
-    pairs = read_pairs(TEST_SET)
-    if quick:
-        pairs = pairs.select_rows(np.flatnonzero(pairs.press % EVERY == 0))
+    pairs = test_contacts(quick)
     change = as_read(pairs.signal, SEED)
     work = KINDS[kind]()
     some = np.resize(change, (int(batch), change.shape[1]))
     ms, mb = best_ms(lambda: work(some), int(batch), most=200), peak_mb()
-    found = {each["name"]: each for each in _errors(work, pairs, change)}
-    of = f"{len(pairs.press)} test contacts, signal to DIGIT"
-    chain, skin = found["chain_rms_um"], found["S2MPN_rms_um"]
-    more = row(
-        f"translation_{name}_biotac_error",
-        skin["value"],
-        "um",
-        baseline=skin["baseline"],
-        of=of.replace("DIGIT", "BioTac"),
-    )
-    return Method("translation", name, ms, mb, chain["value"], "um", chain["baseline"], of, (more,))
+    gel = true_displacement(pairs, "digit", slice(None))
+    columns = mesh_columns("baseline_digit", 0 * gel, gel) | mesh_columns("chain", work(change), gel)
+    rows = metric_rows(columns, pairs, np.arange(len(gel)), "seen indenters", {})
+    chain = next(each for each in rows if each["name"] == "chain_rms_um")
+    of = f"{len(gel)} test contacts, signal to DIGIT"
+    return Method("translation", name, ms, mb, chain["value"], "um", chain["baseline"], of)
 
 
-def _numpy() -> Surfaces:
+def _numpy() -> Gels:
+    """Return a function that translates by the networks alone, to both surfaces."""
     nets = load_translator().nets
 
-    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
+    def gels(change: np.ndarray) -> np.ndarray:
         biotac, digit = nets.likely_latents(nets.encode_signal(change))
-        return nets.decode_source(biotac), nets.decode_target(digit)
+        nets.decode_source(biotac)
+        return nets.decode_target(digit)
 
-    return surfaces
+    return gels
 
 
-def _numpy_solved() -> Surfaces:
+def _numpy_solved() -> Gels:
     """Return a function that translates and then solves the found contact on the DIGIT, as ``convert --gel solved``."""
     translator = load_translator()
+    names = "displacement_digit", "contact_center", "force", "flags"
 
-    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
+    def gels(change: np.ndarray) -> np.ndarray:
         found = translator(plain_signals(change))
-        arrays = {name: getattr(found, name) for name in ("displacement_digit", "contact_center", "force", "flags")}
-        return found.displacement_biotac, solved_gel.solved(arrays)["displacement_digit"]
+        return solved_gel.solved({name: getattr(found, name) for name in names})["displacement_digit"]
 
-    return surfaces
+    return gels
 
 
-def _numpy_confidence() -> Surfaces:
+def _numpy_confidence() -> Gels:
     """Return a function that translates with all that `tactile convert` computes: force, errors, confidence, flags."""
     translator = load_translator()
-
-    def surfaces(change: Change) -> tuple[np.ndarray, np.ndarray]:
-        found = translator(plain_signals(change))
-        return found.displacement_biotac, found.displacement_digit
-
-    return surfaces
+    return lambda change: translator(plain_signals(change)).displacement_digit
 
 
-def plain_signals(change: Change) -> Any:
+def plain_signals(change: np.ndarray) -> Any:
     """Return signals with the changes (T, 19) counts, as of a tared recording without flags or warnings."""
     from tactile_core.recordings import Signals
 
@@ -94,20 +78,3 @@ def plain_signals(change: Change) -> Any:
 
 
 KINDS = {"numpy": _numpy, "numpy_confidence": _numpy_confidence, "numpy_solved": _numpy_solved}
-
-
-def _errors(work: Surfaces, pairs: Pairs, change: Change) -> list[Row]:
-    rows = np.arange(len(pairs.press))
-    columns = joined(map(partial(_columns, work, pairs, change), parts(len(rows))))
-    return metric_rows(columns, pairs, rows, "seen indenters", {})
-
-
-def _columns(work: Surfaces, pairs: Pairs, change: Change, part: slice) -> dict[str, np.ndarray]:
-    rows = np.arange(len(pairs.press))[part]
-    skin, gel = (true_displacement(pairs, sensor, rows) for sensor in ("biotac", "digit"))
-    on_skin, on_gel = work(change[part])
-    return {
-        **mesh_columns("baseline_biotac", 0 * skin, skin, accuracy.lengths),
-        **mesh_columns("baseline_digit", 0 * gel, gel),
-        **mesh_columns("S2MPN", on_skin, skin, accuracy.lengths), **mesh_columns("chain", on_gel, gel),
-    }  # fmt: skip
