@@ -19,21 +19,7 @@ from tactile_core.mechanics.fast import correction
 from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.fast.contact_state import Contact
-from tactile_core.mechanics.fast.correction import (
-    ALL,
-    ESSENTIAL,
-    LINES,
-    MIRRORED,
-    Correction,
-    Learned,
-    PatchFrame,
-    alike,
-    features,
-    frame,
-    kernel,
-    rubs,
-    squares,
-)
+from tactile_core.mechanics.fast.correction import ALL, ESSENTIAL, LINES, MIRRORED, Correction, Learned, PatchFrame
 from tactile_core.mechanics.fast.edge_contact import EdgeContactProblem
 from tactile_core.mechanics.finite_strain.body import ONE_STEP, Sensor, graded_body
 from tactile_core.mechanics.placement import depth_at, pose_at
@@ -54,6 +40,7 @@ SHARES = 0.4, 0.7, 1.0  # of a press's depth, at which it is sampled
 _RUBBING_STEP = 0.5e-3
 _FOLDS = 5
 _BINS = 0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 2.0  # depth over thickness, of which errors are trusted and reported
+_LEAST = 8  # fewest contacts of a bin
 _SIGNIFICANT = 10e-6  # m, nodes that move less do not count: they belong to no contact
 
 
@@ -89,7 +76,7 @@ class Choice(NamedTuple):
     def near(self, a: np.ndarray, b: np.ndarray, a_rubs: np.ndarray, b_rubs: np.ndarray) -> np.ndarray:
         """Return the kernel (n, m) between contacts a and b, scaled features a (n, j), b (m, j); a_rubs (n,), b_rubs
         (m,) : whether each has friction"""
-        return kernel(a, b, squares(b), self.width) * alike(a_rubs[:, None], b_rubs)
+        return correction.kernel(a, b, correction.squares(b), self.width) * correction.alike(a_rubs[:, None], b_rubs)
 
     def weights(self, scaled: np.ndarray, rubbing: np.ndarray, goals: np.ndarray) -> np.ndarray:
         """Return the weights (n, k) of n contacts that fit goals (n, k).
@@ -106,9 +93,10 @@ def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> 
     fields = np.concatenate([known.fields, mirrored(known.fields)])
     log_ratio = np.clip(np.tile(known.log_ratio, 2), -MOST, MOST)
     shift, scale = x.mean(axis=0) * (MIRRORED > 0), x.std(axis=0) + 1e-9
-    scaled, rubbing = (x - shift) / scale, rubs(x)
+    scaled, rubbing = (x - shift) / scale, correction.rubs(x)
     flat = fields.reshape(len(fields), -1)
-    _, _, basis = np.linalg.svd(flat, full_matrices=False) if len(flat) < flat.shape[1] else _by_covariance(flat)
+    few_samples = len(flat) < flat.shape[1]  # else the covariance is smaller; its vectors come by growing value
+    basis = np.linalg.svd(flat, full_matrices=False)[2] if few_samples else np.linalg.eigh(flat.T @ flat)[1][:, ::-1].T
     basis = basis[:FIELDS]
     few = scaled[:, ESSENTIAL]
     return Learned(
@@ -118,11 +106,6 @@ def fit(known: Known, for_force: Choice, by_few: Choice, for_fields: Choice) -> 
         for_fields.weights(scaled, rubbing, flat @ basis.T).astype(np.float32),
         basis.reshape(len(basis), LINES * LINES, 3).astype(np.float16), WHOLE,
     )  # fmt: skip
-
-
-def _by_covariance(flat: np.ndarray) -> tuple[None, None, np.ndarray]:
-    values, vectors = np.linalg.eigh(flat.T @ flat)
-    return None, None, vectors[:, np.argsort(values)[::-1]].T
 
 
 def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
@@ -142,7 +125,7 @@ def choices(known: Known, kind: bool) -> tuple[Choice, Choice, Choice]:
 def _fold_errors(known: Known, kind: bool, parts: slice | np.ndarray, goals: np.ndarray, choice: Choice) -> np.ndarray:
     """Return errors (m, k) of predicted goals of the m samples of one kind, each predicted from the other folds.
     kind : true for those with friction; parts : slice or indices of the features to use; goals : (n, k), of all"""
-    error, rubbing = np.zeros_like(goals), rubs(known.x)
+    error, rubbing = np.zeros_like(goals), correction.rubs(known.x)
     for f in np.unique(known.fold):
         rest, held = known.fold != f, (known.fold == f) & (known.rubbing == kind)
         scaled = ((known.x - known.x[rest].mean(axis=0)) / (known.x[rest].std(axis=0) + 1e-9))[:, parts]
@@ -178,8 +161,8 @@ class Sample:
 def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[str, np.ndarray]:
     """Solve a press in the full tier at ``SHARES`` of its depth, until one does not converge; return arrays by name.
 
-    depths (k,) m; of the first c <= k, which converged: displacement (c, n, 3) float32 m, force (c, 3) N,
-    iterations (c,), steps (c,) of load, seconds (c,) of CPU. friction : Coulomb's coefficient"""
+    depths (k,) m; of the first c <= k, which converged: displacement (c, n, 3) float32 m, force (c, 3) N, seconds (c,)
+    of CPU. friction : Coulomb's coefficient"""
     pose = pose_at(sensor, press.indenter, press.place)
     deepest = depth_at(press.depth, sensor, press.indenter, pose)
     body = graded_body(sensor, press.indenter, pose, deepest)
@@ -193,12 +176,9 @@ def full_press(sensor: Sensor, press: RandomContact, friction: float) -> dict[st
         except TactileError as error:
             log.info("%s: %s", press.name, error)
             break
-        took = time.process_time() - began
-        found.append((body.displacement(touch).astype(np.float32), touch.force, touch.iterations, touch.steps, took))
-    names = ("displacement", "force", "iterations", "steps", "seconds")
-    columns = zip(*found, strict=True) if found else [[]] * len(names)
-    arrays = {name: np.array(values) for name, values in zip(names, columns, strict=True)}
-    return {"depths": np.array(SHARES) * deepest, **arrays}
+        found.append((body.displacement(touch).astype(np.float32), touch.force, time.process_time() - began))
+    moved, force, seconds = (np.array(values) for values in (zip(*found, strict=True) if found else [[]] * 3))
+    return {"depths": np.array(SHARES) * deepest, "displacement": moved, "force": force, "seconds": seconds}
 
 
 def paired(
@@ -217,10 +197,10 @@ def paired(
         along = float(force @ pose.direction)
         if not _holds(problem, contact) or contact.axial_force <= 0 or along <= 0:
             continue
-        at = frame(compliance, contact)
+        at = correction.frame(compliance, contact)
         yield Sample(
-            number, friction, features(compliance, contact, at), at, float(depth), along / contact.axial_force,
-            contact.displacement, moved,
+            number, friction, correction.features(compliance, contact, at), at, float(depth),
+            along / contact.axial_force, contact.displacement, moved,
         )  # fmt: skip
 
 
@@ -333,6 +313,3 @@ def _rows(sensor: str, friction: float, depth: np.ndarray, errors: np.ndarray) -
             name = f"{sensor}_friction_{friction:g}_corrected_{low:g}_to_{high:g}_{what}"
             of = f"{here.sum()} contacts of held-out presses, median; baseline: uncorrected"
             yield row(name, value, unit, baseline=baseline, of=of)
-
-
-_LEAST = 8  # fewest contacts of a bin

@@ -15,14 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT)]
-
-from tactile_core.files import atomic  # noqa: E402
-from tactile_core.mechanics.fast import compliance  # noqa: E402
-from tactile_core.mechanics.fast.compact_halves import BLOCK, PARITIES, Basis, Segment, turn  # noqa: E402
-from tactile_core.mechanics.fast.condense import Half, axes_of  # noqa: E402
-from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes  # noqa: E402
+from tactile_core.files import atomic
+from tactile_core.mechanics.fast import compliance
+from tactile_core.mechanics.fast.compact_halves import BLOCK, PARITIES, Basis, Segment, turn
+from tactile_core.mechanics.fast.condense import Half, axes_of
+from tactile_core.mechanics.fast.sensing_points import electrode_feet, sensing_nodes
 
 # Rounding step of an entry, m/N: most contacts then move by less than 0.1 um rms (random ones, docs/lean.md).
 STEP = {"digit": 3e-7, "biotac": 1e-7}

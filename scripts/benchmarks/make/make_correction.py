@@ -16,15 +16,15 @@ import sys
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "scripts")]
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
 
-from benchmarks.make import learn_correction  # noqa: E402
-from benchmarks.measured_rows import in_processes, parser_of  # noqa: E402
-from benchmarks.mechanics.random_contacts import random_contacts  # noqa: E402
-from tactile_core.files import atomic  # noqa: E402
-from tactile_core.mechanics.fast import correction  # noqa: E402
-from tactile_core.mechanics.placement import FRICTION  # noqa: E402
+from benchmarks.make import learn_correction
+from benchmarks.measured_rows import in_processes, parser_of
+from benchmarks.mechanics.random_contacts import random_contacts
+from tactile_core.files import atomic
+from tactile_core.files.shipped import shipped
+from tactile_core.mechanics.fast import correction
+from tactile_core.mechanics.placement import FRICTION
 
 SENSORS = "digit", "biotac"
 
@@ -73,7 +73,7 @@ def learn_all(arguments: argparse.Namespace) -> list[dict]:
         rows += found
         for kind, parts in vars(learned).items():
             arrays |= {f"{sensor}_{kind}_{name}": values for name, values in vars(parts).items()}
-    path = ROOT / "tactile_core" / "data" / correction.FILE
+    path = shipped(correction.FILE)
     with atomic.new_file(path) as partial, open(partial, "wb") as file:
         np.savez_compressed(file, **arrays)
     print(f"{path}: {path.stat().st_size / 1e6:.2f} MB")

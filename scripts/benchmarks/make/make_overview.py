@@ -16,12 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
+import tactile_core as tactile
+from tactile_core import sensors
+
 ROOT = Path(__file__).parents[3]
-sys.path.insert(0, str(ROOT))
-
-import tactile_core as tactile  # noqa: E402
-from tactile_core import sensors  # noqa: E402
-
 RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 VIEW = {"elev": 38, "azim": -60}  # degrees
 MAGNIFIED = 2.0  # displacement is drawn this many times, so that a dent of half a millimetre shows at this size

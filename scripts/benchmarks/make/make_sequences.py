@@ -20,20 +20,19 @@ import sys
 
 import numpy as np
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT))
+from tactile_core import accuracy, sensors
+from tactile_core.errors import TactileError
+from tactile_core.files import atomic
+from tactile_core.mechanics.electrodes.biotac_sheet import signal_of
+from tactile_core.mechanics.placement import Placement
+from tactile_core.mechanics.solution import Solution, Step
+from tactile_core.mechanics.solve import solve, solve_path
+from tactile_core.simulation.pair_sampling import draw_place
+from tactile_core.simulation.scene import Scene, load_scene
 
-from tactile_core import accuracy, sensors  # noqa: E402
-from tactile_core.errors import TactileError  # noqa: E402
-from tactile_core.files import atomic  # noqa: E402
-from tactile_core.mechanics.electrodes.biotac_sheet import signal_of  # noqa: E402
-from tactile_core.mechanics.placement import Placement  # noqa: E402
-from tactile_core.mechanics.solution import Solution, Step  # noqa: E402
-from tactile_core.mechanics.solve import solve, solve_path  # noqa: E402
-from tactile_core.simulation.pair_sampling import draw_place  # noqa: E402
-from tactile_core.simulation.scene import Scene, load_scene  # noqa: E402
-
-OUT = ROOT / "scenes" / "training" / "test_sequences.npz"
+TRAINING = pathlib.Path(__file__).resolve().parents[3] / "scenes" / "training"
+OUT = TRAINING / "test_sequences.npz"
+SENSORS = ("biotac", "digit")
 MOTIONS = ("press", "roll", "slide")
 REST, RISE, HOLD, FALL, AFTER = 4, 8, 20, 6, 2  # frames
 FORCES = 0.2, 2.0  # N, log-uniform
@@ -50,7 +49,7 @@ def main() -> int:
     parser.add_argument("--each", type=int, default=20, help="sequences of each motion (20)")
     parser.add_argument("--seed", type=int, default=3, help="of the draws (3; training has 0, the test contacts 1)")
     arguments = parser.parse_args()
-    scene, _ = load_scene(ROOT / "scenes" / "training")
+    scene, _ = load_scene(TRAINING)
     rows = []
     for number in range(arguments.each * len(MOTIONS)):
         motion = MOTIONS[number % len(MOTIONS)]
@@ -58,14 +57,10 @@ def main() -> int:
         rows.append(sequence(scene, motion, random))
         print(f"{number + 1}: {motion}, {rows[-1]['force'].max():.2f} N", flush=True)
     content = io.BytesIO()
-    np.savez_compressed(content, motion=np.arange(len(rows)) % len(MOTIONS), **stacked(rows))
+    arrays = {name: np.stack([row[name] for row in rows]) for name in rows[0]}  # (sequences, 40, ...)
+    np.savez_compressed(content, motion=np.arange(len(rows)) % len(MOTIONS), **arrays)
     atomic.write_bytes(arguments.out, content.getvalue())
     return 0
-
-
-def stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
-    """Stack the arrays of S sequences: return name -> array (S, 40, ...). rows : name -> array (40, ...) of each"""
-    return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 
 def sequence(scene: Scene, motion: str, random: np.random.Generator) -> dict[str, np.ndarray]:
@@ -90,9 +85,6 @@ def sequence(scene: Scene, motion: str, random: np.random.Generator) -> dict[str
             continue
         if all(found.converged and found.contact_patch.any() for both in contacts for found in both):
             return described(contacts)
-
-
-SENSORS = ("biotac", "digit")
 
 
 def rolled(indenter, place: Placement, forces, moved, ahead, friction: float) -> list[Contact]:  # noqa: ANN001

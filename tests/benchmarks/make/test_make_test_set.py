@@ -8,8 +8,8 @@ import h5py
 import msgspec
 import numpy as np
 import pytest
-from benchmarks.make import full_pairs, make_test_set
-from benchmarks.make.full_pairs import REGION_X, draw_press, full_rows
+from benchmarks.make import make_test_set
+from benchmarks.make.make_test_set import REGION_X, draw_press, full_rows
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
@@ -42,7 +42,7 @@ def smooth(scene):
 
 @pytest.fixture(scope="module")
 def ball_press():
-    return full_pairs.TestPress(6, 1, BALL, PLACE, 0.2e-3, np.array([0.1e-3, 0.05e-3]))
+    return make_test_set.TestPress(6, 1, BALL, PLACE, 0.2e-3, np.array([0.1e-3, 0.05e-3]))
 
 
 def in_the_fast_tier(solve_path):
@@ -53,7 +53,7 @@ def in_the_fast_tier(solve_path):
 @pytest.fixture(scope="module")
 def solved(smooth, ball_press):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(full_pairs, "solve_path", in_the_fast_tier(full_pairs.solve_path))
+        patch.setattr(make_test_set, "solve_path", in_the_fast_tier(make_test_set.solve_path))
         return full_rows(smooth, ball_press)
 
 
@@ -96,7 +96,7 @@ def test_both_sensors_bear_the_same_force(solved, ball_press):
         assert along[1] == pytest.approx(along[0], rel=FORCE_TOLERANCE + 1e-6)  # and single precision
     np.testing.assert_array_equal([row["slide"].any() for row in rows], [False, False, False, True])
     shares = [row["depth_biotac"] / ball_press.depth for row in rows[:3]]
-    np.testing.assert_allclose(shares, full_pairs.SHARES, rtol=1e-6)
+    np.testing.assert_allclose(shares, make_test_set.SHARES, rtol=1e-6)
 
 
 @pytest.mark.parametrize("sensor", ["biotac", "digit"])
@@ -138,14 +138,14 @@ def test_the_signal_grows_with_the_press_and_is_like_one_over_the_film(solved):
 
 @pytest.fixture
 def quickly(monkeypatch):
-    monkeypatch.setattr(full_pairs, "solve_path", in_the_fast_tier(full_pairs.solve_path))
+    monkeypatch.setattr(make_test_set, "solve_path", in_the_fast_tier(make_test_set.solve_path))
 
 
 @pytest.mark.usefixtures("quickly")
 def test_what_the_gel_cannot_bear_ends_the_press(monkeypatch, smooth, ball_press):
-    depth_at = full_pairs.depth_at
-    monkeypatch.setattr(full_pairs, "depth_at", lambda share, *rest: depth_at(share / 15, *rest))
-    monkeypatch.setattr(full_pairs, "SHARES", (0.25, 1.0))
+    depth_at = make_test_set.depth_at
+    monkeypatch.setattr(make_test_set, "depth_at", lambda share, *rest: depth_at(share / 15, *rest))
+    monkeypatch.setattr(make_test_set, "SHARES", (0.25, 1.0))
     rows, said = full_rows(smooth, dataclasses.replace(ball_press, slide=None))
     assert len(rows) == 1 and said["wanted"] == 2
     assert "60% of the thickness" in str(said["lost"])
@@ -155,10 +155,10 @@ def test_what_the_gel_cannot_bear_ends_the_press(monkeypatch, smooth, ball_press
 def script(monkeypatch, smooth, ball_press, quickly):
     """``scripts/benchmarks/make/make_test_set.py`` on one contact of the small press."""
     monkeypatch.setattr(
-        full_pairs, "draw_press", lambda scene, seed, number: dataclasses.replace(ball_press, slide=None)
+        make_test_set, "draw_press", lambda scene, seed, number: dataclasses.replace(ball_press, slide=None)
     )
-    monkeypatch.setattr(full_pairs, "SHARES", (1.0,))
-    monkeypatch.setattr(full_pairs, "full_rows", lambda scene, press, solve=full_rows: solve(smooth, press))
+    monkeypatch.setattr(make_test_set, "SHARES", (1.0,))
+    monkeypatch.setattr(make_test_set, "full_rows", lambda scene, press, solve=full_rows: solve(smooth, press))
     return make_test_set
 
 
