@@ -1,7 +1,7 @@
 """Measure the cost of each part of a simulation, a conversion and a rendering, for `--plan`.
 
     python scripts/benchmarks/measure_costs.py                       writes data/costs.json, about five minutes
-    python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes rows alone
+    python scripts/benchmarks/measure_costs.py --quick --json FILE   one sensor, and writes FILE alone
 
 Each command runs in a process of its own on few and on many frames; a straight line through both gives the cost at the
 start and per frame. Times are CPU time of one thread; memory is peak resident; sizes are those of the files written.
@@ -18,9 +18,8 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # `benchmarks` is no package that is installed
 
-from benchmarks.measured_rows import finished, parser_of, printed
+from benchmarks.measured_rows import parser_of
 from benchmarks.profile_verbs import RECORDING, Case, run, write_scene
-from tactile_core.accuracy import Row, row
 from tactile_core.files import atomic, provenance
 from tactile_core.files.shipped import shipped
 from tactile_core.geometry.indenters import Sphere
@@ -47,7 +46,7 @@ class Part(NamedTuple):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Measure, print and write the results; returns the exit status."""
+    """Measure and write the costs; returns the exit status."""
     parser = parser_of(__doc__)
     parser.add_argument("--quick", action="store_true", help="the DIGIT alone, and leave the table as it is")
     options = parser.parse_args(arguments)
@@ -57,15 +56,17 @@ def main(arguments: list[str] | None = None) -> int:
         if not options.quick:
             parts["simulate_nothing"] = simulate(folder, SETS["digit"], force=0.0)
             parts |= conversions(folder)
-        full = {} if options.quick else full_tier()
-    rows = as_rows(parts, full)
-    printed(rows)
+    found = {
+        "how": "scripts/benchmarks/measure_costs.py: CPU s of one thread, MB resident, kB a frame on disk",
+        "machine": provenance.machine(), "versions": provenance.versions(),
+        "parts": {name: part._asdict() for name, part in parts.items()},
+        "full_ms": {} if options.quick else full_tier(),
+    }  # fmt: skip
+    if options.json:
+        atomic.write_json(options.json, found)
     if not options.quick:
-        how = "scripts/benchmarks/measure_costs.py: CPU s of one thread, MB resident, kB a frame on disk"
-        named = {name: part._asdict() for name, part in parts.items()}
-        about = {"how": how, "machine": provenance.machine(), "versions": provenance.versions()}
-        atomic.write_json(TABLE, about | {"parts": named, "full_ms": full})
-    return finished(rows, options.json)
+        atomic.write_json(TABLE, found)
+    return 0
 
 
 def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, float]]:
@@ -73,9 +74,14 @@ def ball_way(contacts: int, force: float) -> list[tuple[float, float, float, flo
     return [(0.0, -10.0, -2.0, 0.0), (0.01, -10.0, -2.0, force), (contacts / 100, -6.0, 2.0, force)]
 
 
-def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
-    """Return a part's cost at its start and per frame, by a straight line through two runs.
-    costs, sizes (bytes), frames : pairs, of a run on few frames and of one on many"""
+def between(folder: Path, name: str, commands: list[str], frames: tuple[int, int]) -> Part:
+    """Return a part's cost at its start and per frame, by a straight line through two runs, on few frames and on many.
+    commands : one for each, which write to "out" in the scratch ``folder``; name : of the part"""
+    costs, sizes, out = [], [], folder / "out"
+    for command in commands:
+        costs.append(run(Case(name, command), folder))
+        sizes.append(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
+        shutil.rmtree(out)
     few, many = frames
     ms = 1e3 * (costs[1].cpu - costs[0].cpu) / (many - few)
     return Part(max(costs[0].cpu - few * ms / 1e3, 0.0), ms, costs[1].peak, (sizes[1] - sizes[0]) / (many - few) / 1e3)
@@ -83,32 +89,23 @@ def between(costs: list, sizes: list[float], frames: tuple[int, int]) -> Part:
 
 def simulate(folder: Path, keep: str, force: float = 0.3) -> Part:
     """Measure the cost of `tactile simulate --keep KEEP` under a ball; folder : for scratch files; force : N"""
-    costs, sizes = [], []
-    scene, out = folder / "scene", folder / "out.h5"
-    scene.mkdir(exist_ok=True)
+    commands = []
     for contacts in (FEW, MANY):
+        scene = folder / f"scene_{contacts}"
+        scene.mkdir(exist_ok=True)
         write_scene(scene, *ball_way(contacts, force))
-        costs.append(run(Case("simulate", f"simulate {scene} --keep {keep} --out {out}"), folder))
-        sizes.append(out.stat().st_size)
-        out.unlink()
-    return between(costs, sizes, (FEW, MANY))
+        commands.append(f"simulate {scene} --keep {keep} --out {folder}/out/touch.h5")
+    return between(folder, "simulate", commands, (FEW, MANY))
 
 
 def conversions(folder: Path) -> dict[str, Part]:
     """Measure `convert --keep` for each kind of output ("convert_latent", ...) and the fast picture ("render_fast"), on
     the numbers of frames `FRAMES`; return name -> cost. folder : for scratch files"""
-    found = {}
     keeps = "latent", "displacement", "height", "image"
     words = {f"convert_{keep}": f"convert {RECORDING} --keep {keep}" for keep in keeps}
-    for name, command in (words | {"render_fast": f"render {RECORDING} --preset fast"}).items():
-        costs, sizes = [], []
-        for frames in FRAMES:
-            out = folder / "out"
-            costs.append(run(Case(name, f"{command} --out {out} --frames 40:{40 + frames}"), folder))
-            sizes.append(sum(file.stat().st_size for file in out.rglob("*") if file.is_file()))
-            shutil.rmtree(out)
-        found[name] = between(costs, sizes, FRAMES)
-    return found
+    words["render_fast"] = f"render {RECORDING} --preset fast"
+    ends = [f"--out {folder}/out --frames 40:{40 + frames}" for frames in FRAMES]
+    return {name: between(folder, name, [f"{each} {end}" for end in ends], FRAMES) for name, each in words.items()}
 
 
 def full_tier() -> dict[str, dict[str, float]]:
@@ -124,18 +121,6 @@ def contact_ms(sensor: Sensor, friction: float) -> float:
     for force in FORCES:
         solve(sensor, Sphere(3.5e-3), Placement(-8e-3, 0.0, 0.0), force=force, tier="full", friction=friction)
     return 1e3 * (time.process_time() - began) / len(FORCES)
-
-
-def as_rows(parts: dict[str, Part], full: dict[str, dict[str, float]]) -> list[Row]:
-    """Return report rows: ms per frame and MB of each part, and each time, ms, in ``full``, by ``full_tier``."""
-    rows = []
-    for name, part in parts.items():
-        rows.append(row(f"cost_{name}", part.ms, "ms", of=f"a frame; {part.start:.2f} s before the first"))
-        rows.append(row(f"memory_{name}", part.mb, "MB", of=f"peak resident; {part.kb:.1f} kB a frame on disk"))
-    for sensor, cost in full.items():
-        for name, ms in cost.items():
-            rows.append(row(f"cost_full_{sensor}_{name}", ms, "ms", of="a contact at a force"))
-    return rows
 
 
 if __name__ == "__main__":

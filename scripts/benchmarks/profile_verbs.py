@@ -1,6 +1,6 @@
 """Measure the cost of each verb of ``tactile``, in its own process: time, memory, and the heavy libraries it loads.
 
-    python scripts/benchmarks/profile_verbs.py --json FILE   also convert 700 frames, stage by stage
+    python scripts/benchmarks/profile_verbs.py --json FILE   also convert 700 frames
     python scripts/benchmarks/profile_verbs.py --quick --json FILE  each verb on as little as it takes, about a minute
 
 CPU time is user and system together, on one thread; a machine's load changes it less than wall time. The cases and
@@ -12,7 +12,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import os
-import re
 import subprocess
 import sys
 import tempfile
@@ -97,12 +96,11 @@ CASES = (
 
 
 class Cost(NamedTuple):
-    """Cost of one run. status : exit status; cpu, wall, imports : s; peak : MB of memory; loaded : of HEAVY"""
+    """Cost of one run. status : exit status; cpu, wall : s; peak : MB of memory; loaded : of HEAVY"""
 
     status: int
     cpu: float
     wall: float
-    imports: float
     peak: float
     loaded: set[str]
 
@@ -131,22 +129,14 @@ def write_inputs(folder: Path) -> None:
 
 def write_scene(folder: Path, *points: tuple[float, float, float, float]) -> None:
     """Write scene.toml of a 7 mm ball into ``folder``; points : of the ball's path, (time s, x mm, z mm, force N)"""
-    lines = ["    {{ time_s = {}, x_mm = {}, z_mm = {}, force_n = {} }},\n".format(*point) for point in points]
-    (folder / "scene.toml").write_text(
-        f"""format = "tactile-scene-1"
+    way = ", ".join("{{time_s = {}, x_mm = {}, z_mm = {}, force_n = {}}}".format(*point) for point in points)
+    text = f"""format = "tactile-scene-1"
 name = "ball"
 description = "A ball."
-[[indenters]]
-kind = "sphere"
-name = "ball"
-radius_mm = 3.5
-[recording]
-indenter = "ball"
-points = [
-{"".join(lines)}]
-""",
-        encoding="utf-8",
-    )
+indenters = [{{kind = "sphere", name = "ball", radius_mm = 3.5}}]
+recording = {{indenter = "ball", points = [{way}]}}
+"""
+    (folder / "scene.toml").write_text(text, encoding="utf-8")
 
 
 def run(case: Case, folder: Path) -> Cost:
@@ -156,16 +146,15 @@ def run(case: Case, folder: Path) -> Cost:
     words = [word.replace("{}", str(folder)) for word in case.words.split()]
     began = time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", CHILD, str(file), *words], capture_output=True, text=True,
+        [sys.executable, "-c", CHILD, str(file), *words], capture_output=True, text=True,
         env={**os.environ, **threads.ONE, "PYTHONPATH": str(ROOT)}, cwd=ROOT, timeout=300,
     )  # fmt: skip
     wall = time.perf_counter() - began
     if not file.exists():
         raise AssertionError(f"{case.name}: {done.stderr[-1000:]}")
     result = json.loads(file.read_text())
-    imports = sum(int(own) for own in re.findall(r"^import time: +(\d+) \|", done.stderr, re.MULTILINE)) / 1e6
     loaded = {name.partition(".")[0] for name in result["modules"]} & set(HEAVY)
-    return Cost(result["status"], result["cpu"], wall, imports, result["peak"], loaded)
+    return Cost(result["status"], result["cpu"], wall, result["peak"], loaded)
 
 
 def verbs(folder: Path) -> list[Row]:
@@ -177,7 +166,7 @@ def verbs(folder: Path) -> list[Row]:
             yield row(f"{case.name}_failed", cost.status, "status", of=case.words)
             continue
         loads = " ".join(sorted(cost.loaded)) or "-"
-        of = f"{cost.wall:.2f} s on the wall, imports {cost.imports:.2f} s; loads {loads}"
+        of = f"{cost.wall:.2f} s on the wall; loads {loads}"
         # 0.15 s: a target (one does not notice it); Python alone takes 0.02 s of it.
         yield row(f"{case.name}_cpu", cost.cpu, "s", 0.15 if case.name == "help" else None, of=of)
         yield row(f"{case.name}_memory", cost.peak, "MB", of="peak resident")
@@ -195,15 +184,12 @@ def write_long(path: Path) -> None:
 
 
 def long_conversion(folder: Path) -> list[Row]:
-    """Yield rows of what `convert` of a long recording costs, in all and by stage; folder : for scratch files"""
+    """Yield rows of what `convert` of a long recording costs; folder : for scratch files"""
     write_long(folder / "long.h5")
     cost = run(Case("long", "convert {}/long.h5 --out {}/whole"), folder)
     of = f"{LONG} frames, {cost.wall:.1f} s on the wall, load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
     yield row("convert_700_cpu", cost.cpu, "s", 12.0, of=of)
     yield row("convert_700_memory", cost.peak, "MB", of="peak resident")
-    timings = json.loads((folder / "whole" / "long" / "timings.json").read_text(encoding="utf-8"))
-    for stage, each in timings["ms_a_frame"].items():
-        yield row(f"convert_700_{stage}", each, "ms", of="a frame, on the wall")
 
 
 if __name__ == "__main__":

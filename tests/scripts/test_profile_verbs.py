@@ -70,9 +70,9 @@ def test_what_plans_are_read_from_is_measured(tmp_path):
     """A short run leaves the table that ships as it is."""
     tables = sorted((ROOT / "tactile_core" / "data").glob("*.json"))
     before = [table.read_bytes() for table in tables]
-    out = tmp_path / "rows.json"
+    out = tmp_path / "costs.json"
     command = [sys.executable, str(ROOT / "scripts" / "benchmarks" / "measure_costs.py"), "--quick", "--json", str(out)]
     subprocess.run(command, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True, timeout=300)
-    rows = {row["name"]: row["value"] for row in json.loads(out.read_text(encoding="utf-8"))}
+    (cost,) = json.loads(out.read_text(encoding="utf-8"))["parts"].values()
     assert [table.read_bytes() for table in tables] == before
-    assert rows["cost_simulate_digit"] > 0 and 50 < rows["memory_simulate_digit"] < 1000
+    assert cost["ms"] > 0 and 50 < cost["mb"] < 1000
