@@ -78,17 +78,12 @@ def measure(unit: Calibration, count: int, quick: bool) -> Iterator[Row]:
     yield from errors(unit, heights, best, dataclasses.replace(REFERENCE, passes=QUICK_PASSES) if quick else REFERENCE)
     if len(variants) == 2:
         yield from agreement(unit, heights[0])
-    for variant in variants:
-        for name in NAMES:
-            slow = name == REFERENCE.name and (quick or variant != best)
-            if not slow and (name != FAST or variant == best):
-                yield speed(unit, name, variant, heights, quick)
-    if not quick:
-        large = unit.at_size(*LARGE)
-        large_heights = fields(large, 2)
+    large = unit.at_size(*LARGE)
+    for sized, maps in [(unit, heights)] if quick else [(unit, heights), (large, fields(large, 2))]:
         for variant in variants:
             for name in NAMES if variant == best else NAMES[1:-1]:
-                yield speed(large, name, variant, large_heights, quick)
+                if name != REFERENCE.name or not quick:
+                    yield speed(sized, name, variant, maps, quick)
 
 
 def fields(unit: Calibration, count: int, seed: int = SEED) -> list[np.ndarray]:

@@ -19,7 +19,7 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2]))  # `benchmarks` is no package that is installed
 
 from benchmarks.make import learn_correction
-from benchmarks.measured_rows import in_processes, parser_of
+from benchmarks.measured_rows import finished, in_processes, parser_of, printed
 from benchmarks.mechanics.random_contacts import random_contacts
 from tactile_core.files import atomic
 from tactile_core.files.shipped import shipped
@@ -97,12 +97,7 @@ def main() -> int:
         for sensor in SENSORS
     ]
     in_processes(solve_one, jobs, arguments.workers)
-    rows = learn_all(arguments)
-    for row in rows:
-        print(f"{row['name']}: {row['value']:.3g} {row['unit']} (uncorrected {row['baseline']:.3g}), {row['set']}")
-    if arguments.json:
-        atomic.write_json(arguments.json, rows)
-    return 0
+    return finished(printed(learn_all(arguments)), arguments.json)
 
 
 if __name__ == "__main__":
