@@ -66,7 +66,7 @@ def _numpy_confidence() -> Gels:
 
 
 def plain_signals(change: np.ndarray) -> Any:
-    """Return signals with the changes (T, 19) counts, as of a tared recording without flags or warnings."""
+    """Return signals of ``change`` (T, 19) counts, as of a tared recording without flags or warnings."""
     from tactile_core.recordings import Signals
 
     count = len(change)
