@@ -17,7 +17,7 @@ from ..sensors.fluid_sensor import Fluid
 from .electrode_faults import without_absent
 from .flags import Flag
 from .recording import Recording, Truth
-from .time_stamps import clock_of
+from .time_stamps import seconds_of, tell_rate, time_jumps
 
 MAX_FRAMES = 2_000_000  # 5.5 hours at 100 Hz; bounds the memory that a file can ask for (assumed enough)
 MAX_BAD_SHARE = 0.2  # of the rows; with more, interpolation would make up the recording (assumed)
@@ -128,7 +128,8 @@ def assemble(
         _refuse_mirrored(path, np.where(absent, np.nan, np.median(readings, axis=0)), sensor)
     if not snapshots:
         _refuse_turns(path, readings)
-    seconds, start, jumps, of_clock = clock_of(stamps, rows, row_word)
+    seconds, start, of_stamps = seconds_of(stamps)
+    jumps, of_jumps = time_jumps(seconds, rows, row_word)
     clean: dict[str, Any] = {key: _finite(value) for key, value in channels.items() if value is not None}
     return Recording(
         name=Path(path).stem,
@@ -139,7 +140,7 @@ def assemble(
         electrodes=electrodes,
         rows=rows,
         flags=_flags(bad, problems, jumps) | np.uint16(Flag.DEAD_CHANNEL if absent.any() else 0),
-        warnings=(*notes, *tell_problems(problems, row_word), *of_clock),
+        warnings=(*notes, *tell_problems(problems, row_word), *of_stamps, *tell_rate(seconds), *of_jumps),
         simulated=simulated,
         truth=truth,
         about=about or {},

@@ -276,17 +276,13 @@ def _still(readings: np.ndarray) -> np.ndarray:
             continue
         for run in runs:
             first, last = bounds[run], bounds[run + 1]
-            if last - first == len(readings) or _moves(readings[first:last]):
+            others_move = np.median(np.ptp(readings[first:last], axis=0)) > STEADY
+            if last - first == len(readings) or others_move:
                 still[first:last, j] = True
         moving = ~still[1:, j]
         if moving.any() and change[moving].mean() < NOISY:
             still[:, j] = False
     return still
-
-
-def _moves(readings: np.ndarray) -> bool:
-    """Return true if half of the electrodes in readings (T, 19) counts span more than `STEADY` counts."""
-    return bool(np.median(np.ptp(readings, axis=0)) > STEADY)
 
 
 def named_electrodes(mask: np.ndarray | np.bool) -> str:

@@ -14,11 +14,10 @@ from typing import BinaryIO, NamedTuple
 from ..errors import TactileError
 from ..files import outside
 from ..files.hdf5_checked import SIGNATURE
-from .array_store import NPY
+from .array_store import MATLAB, MATLAB_73, NPY
 from .bags.bag import START_BYTES, is_bag_folder, kind_of
 from .recording import split
 from .tables.json_table import is_json
-from .tables.matlab import START, START_OF_HDF5
 from .tables.table import MAX_BYTES
 
 FOLDER_ENDINGS = (".csv", ".h5", ".hdf5", ".npz", ".bag", ".mcap", ".db3", ".mat")  # of what is taken from a folder
@@ -109,9 +108,9 @@ def _container(start: bytes) -> str:
     """Return the container of a file that starts with these bytes; "csv" if they are no known signature."""
     if kind_of(start) is not None:
         return "bag"
-    if start.startswith(START):
+    if start.startswith(MATLAB):
         return "mat"
-    if start.startswith((SIGNATURE, START_OF_HDF5)):
+    if start.startswith((SIGNATURE, MATLAB_73)):
         return "hdf5"
     if start.startswith((*ZIP_STARTS, NPY)):
         return "npz"

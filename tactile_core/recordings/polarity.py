@@ -172,16 +172,15 @@ def spread_out(count: int, most: int) -> np.ndarray:
 
 
 def _decided(changes: np.ndarray, what: str, sensor: str) -> Polarity:
+    """Return the polarity by which changes (n, 19) counts, called `what`, are more like simulated contacts; assumed
+    unless its likeness, a cosine, is clearly larger than that of the other."""
     falls, rises = likeness(changes, sensor), likeness(-changes, sensor)
     name = FALLS if falls >= rises else RISES
     evidence = f"{what} is like simulated contacts by {falls:.2f} if counts fall, by {rises:.2f} if they rise"
-    sure = max(falls, rises) >= LIKE and _apart(min(falls, rises), max(falls, rises))
+    less, more = sorted((falls, rises))
+    apart = more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
+    sure = more >= LIKE and apart
     return Polarity(name, evidence, Basis.SURE if sure else Basis.ASSUMED)
-
-
-def _apart(less: float, more: float) -> bool:
-    """Return true if the likeness (a cosine) of one sign, `more`, is clearly larger than that of the other, `less`."""
-    return more - less >= MARGIN or np.sqrt((1 - more**2) / max(1 - less**2, 1e-12)) <= LEFT
 
 
 def likeness(changes: np.ndarray, sensor: str = SOURCE) -> float:

@@ -20,9 +20,9 @@ from .quiet import TARED_PDC, Quiet, calmest, find_quiet, tare_frames, window_fr
 from .recording import Recording
 from .repair import fill, smooth
 from .rest_level import Baseline, Changes, Framewise, baseline, level, pressure_rest
-from .signal_kind import detect, full_scale
+from .signal_kind import detect, full_scale, in_counts
 from .signals import EVERY, PrepareOptions, Rest, Signals, typical
-from .unit import contact_law, film, pressure_counts
+from .unit import contact_law, film
 from .unit.contact_law import as_contact
 
 # Frames to smooth over where the user gives none. Rectified signals need it: folded noise does not average out in the
@@ -45,7 +45,7 @@ def prepare_all(recording: Recording, options: PrepareOptions, frames: slice | n
         if options.kind is None and kind == "scaled" and detect(readings)[0] == "raw":
             kind, evidence = detect(readings)
     if kind == "raw" and recording.pdc is not None:
-        recording = replace(recording, pdc=pressure_counts.in_counts(recording.pdc, unit, recording.sensor, warnings))
+        recording = replace(recording, pdc=in_counts(recording.pdc, unit, recording.sensor, warnings))
     readings, flags, repaired = mended(recording, readings, flags, warnings, kind, repair=options.repair)
     if kind == "rectified":
         flags |= np.uint16(Flag.RECTIFIED)

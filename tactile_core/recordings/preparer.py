@@ -79,11 +79,6 @@ def _prepare_answers(recording: Recording, options: PrepareOptions, silent: np.n
     return dataclasses.replace(found, **spread, report=report, warnings=(warning, *found.warnings))
 
 
-def unanswered(signals: Signals) -> np.ndarray:
-    """Return (T,) bool, true for frames of prepared signals in which the finger did not respond."""
-    return (signals.flags & Flag.DEAD_CHANNEL > 0) & ~signals.change.any(axis=1)
-
-
 def _renumbered(recording: Recording, options: PrepareOptions, silent: np.ndarray) -> PrepareOptions:
     """Return the options, the tare counted in frames not silent (T,) bool. Raises TactileError if none is left."""
     if options.tare in (None, "none"):
@@ -179,7 +174,8 @@ class Preparer:
         if given and signals.report["film"] is not None:  # its rest was not known there
             found, change = self._of_typical_film(change, rest, part.time[rows], part.sensor)
             thickness, warnings = found.thickness, (*warnings, *found.warnings)
-        change = np.where(unanswered(signals)[:, None], 0.0, change)
+        unanswered = (signals.flags & Flag.DEAD_CHANNEL > 0) & ~signals.change.any(axis=1)
+        change = np.where(unanswered[:, None], 0.0, change)
         pdc = signals.pdc + _rest_pdc(part, signals, rows) - self._rest_pdc
         drift = np.zeros_like(signals.drift)
         return dataclasses.replace(

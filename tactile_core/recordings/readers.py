@@ -179,7 +179,9 @@ def each_finger(path: str | os.PathLike[str], columns: ColumnMap | None = None) 
             return [path]
         known: tuple[int, ...] = ()
         if container == "csv":
-            known = _fingers_of_table(read_header(path, file))
+            header = read_header(path, file)
+            hands = [each for each in layouts() if _holds_hands(each) and each.score(header) >= RECOGNISED]
+            known = hands[0].fingers(header) if hands else ()
         if container == "mat":
             with open_store(path, container, file) as store:
                 known = layout_of(path, container, store.shapes).fingers(store.shapes)
@@ -196,12 +198,6 @@ def list_fingers(paths: Iterable[str | os.PathLike[str]], columns: ColumnMap | N
         except TactileError:
             found.append(os.fspath(path))
     return found
-
-
-def _fingers_of_table(header: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the numbers of the fingers in a CSV file, by its header; () if its layout holds no hands."""
-    known = [layout for layout in layouts() if _holds_hands(layout) and layout.score(header) >= RECOGNISED]
-    return known[0].fingers(header) if known else ()
 
 
 def _holds_hands(layout: ModuleType) -> bool:

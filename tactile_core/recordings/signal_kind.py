@@ -1,10 +1,13 @@
-"""Detect how counts were processed before they were written: raw, tared, tared and scaled, or rectified."""
+"""Detect how counts were processed before they were written: raw, tared, tared and scaled, or rectified; and the unit
+of measurement of raw electrodes and PDC."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ..sensors import COUNT_MAX
+from ..sensors.descriptor import of_kind
+from ..sensors.fluid_sensor import Fluid
 
 KINDS = ("raw", "tared", "scaled", "rectified")
 RAW_LEVEL = 500.0  # counts; rest is near 3,300 (slide set) or 2,600-2,700 (Ruppel), changes stay below (assumed)
@@ -22,6 +25,15 @@ AT_REST = 0.55, 0.97  # shares of the range between which a unit's electrodes re
 BEYOND = 1.01  # times the range, that no reading exceeds but by noise (assumed)
 LEAST_RAW = 0.3  # share of the range below which raw readings of an electrode do not fall (assumed)
 MOST_OF = 2 / 3  # of the electrodes, that have to agree: some may be dead (assumed)
+PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "psi": 6894.757}  # Pa
+# For pressures converted from counts: how well readings lie on steps of one count (1: all do), and steps they span.
+ON_STEPS, FEWEST_STEPS = 0.8, 4.0  # assumed
+PDC_AT_REST = (
+    800.0,
+    3000.0,
+)  # counts between which untared PDC rests: 915 to 2,405 in three fingers (assumed)
+PDC_NOISE, LEAST_PDC_NOISE = 4.0, 0.2  # counts, limits of the neighbours' median difference; below, averaged (assumed)
+MOST_PDC = 1.01 * COUNT_MAX
 
 
 def counted(columns: np.ndarray) -> np.ndarray | None:
@@ -94,3 +106,48 @@ def detect(electrodes: np.ndarray) -> tuple[str, str]:
     if negative > NEGATIVE_SHARE:
         return "tared", f"{span}; {negative:.0%} of the samples are negative"
     return "rectified", f"{span}: changes without a sign (tared ones have both, raw counts lie in the thousands)"
+
+
+def in_counts(pdc: np.ndarray, unit: float, sensor: str, warnings: list[str]) -> np.ndarray | None:
+    """Return pdc (T,), as a file has it, in counts; None if its unit of measurement cannot be found.
+    unit : counts that 1 means in the file's electrodes; warnings : list, extended by what was assumed"""
+    if not pdc.any():
+        warnings.append("PDC is 0 in all frames: taken as not recorded")
+        return None
+    factor, words = counts_a_unit(pdc, unit, sensor)
+    if not factor:
+        warnings.append("PDC goes beyond 12 bit, and is no pressure in Pa, hPa, kPa or psi: taken as not recorded")
+        return None
+    if words:
+        warnings.append(f"PDC is taken as {words}: {factor:.4g} counts a unit")
+    return factor * pdc
+
+
+def counts_a_unit(pdc: np.ndarray, unit: float, sensor: str) -> tuple[float, str]:
+    """Return how many counts 1 in pdc (T,) means, 0 if unknown, and the name of its unit of pressure, "" for counts.
+    unit : counts that 1 means in the file's electrodes"""
+    known = pdc[np.isfinite(pdc)]
+    values = np.unique(known)
+    if not len(values):
+        return unit, ""
+    parts = np.append(values - np.rint(values), 0.0 if len(values) == 1 else [])  # of one value alone it has to be 0
+    whole, within = np.ptp(parts) < 1e-6, np.percentile(known, 99) <= MOST_PDC
+    of_electrodes = values[-1] > COUNT_MAX if unit < 1 else unit > 1 and whole and values[-1] > 0
+    if of_electrodes and values[-1] <= MOST_PDC / unit:
+        return unit, ""
+    factors = {words: pascal / of_kind(sensor, Fluid).readout.pressure for words, pascal in PRESSURES.items()}
+    gap = np.diff(values).min() if len(values) > 1 else 1.0
+    if whole and within and gap * factors["Pa"] < 0.9:  # else Pa in whole numbers, a count apart
+        return 1.0, ""
+    for words, factor in factors.items():  # the finest first: the steps of others are multiples of its
+        steps = abs(np.exp(2j * np.pi * factor * values).mean())
+        if steps > ON_STEPS and factor * np.ptp(values) >= FEWEST_STEPS and factor * values[-1] <= MOST_PDC:
+            return factor, words
+    del factors["hPa"]  # averaged counts rest there, too
+    noise = np.median(np.abs(np.diff(known, prepend=known[0])))
+    low, high = np.percentile(known, 5), max(values[-1], noise * MOST_PDC / PDC_NOISE)
+    for words, factor in factors.items():  # rounded, or at rest throughout: by its level, if it has a count's noise
+        averaged = 0 < factor * noise < LEAST_PDC_NOISE
+        if PDC_AT_REST[0] <= factor * low <= PDC_AT_REST[1] and factor * high <= MOST_PDC and not averaged:
+            return factor, words
+    return float(within), ""

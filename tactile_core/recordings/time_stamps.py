@@ -21,15 +21,6 @@ OTHER_RATE = 1.6  # times the usual rate, or a share of it, from which on it is 
 MAX_STAMP = 1e19  # the year 2286 in nanoseconds
 
 
-def clock_of(stamps: np.ndarray, rows: np.ndarray, row_word: str) -> tuple[np.ndarray, float, np.ndarray, list[str]]:
-    """Return time (T,) s from the first frame, its unix time, s (0.0 if unknown), indices (n,) of the frames before
-    which time jumps, and sentences for the user. stamps : (T,) as in the file, s to ns
-    rows : (T,) int, the frames' rows in the file, which the sentences call row_word"""
-    seconds, start, notes = seconds_of(stamps)
-    jumps, found = time_jumps(seconds, rows, row_word)
-    return seconds, start, jumps, [*notes, *tell_rate(seconds), *found]
-
-
 def seconds_of(stamps: np.ndarray) -> tuple[np.ndarray, float, list[str]]:
     """Return time (T,) s from the first frame, its unix time, s (0: unknown), warnings; stamps : (T,) s to ns"""
     stamps = np.where(np.abs(stamps) <= MAX_STAMP, stamps, np.nan)

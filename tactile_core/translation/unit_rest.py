@@ -13,10 +13,9 @@ from ..recordings.polarity import spread_out
 from ..recordings.quiet import TARED_PDC, window_frames
 from ..recordings.repair import fill
 from ..recordings.rest_level import level
-from ..recordings.signal_kind import detect
+from ..recordings.signal_kind import detect, in_counts
 from ..recordings.signals import UNIT_DRIFT
 from ..recordings.tables.column_map import ColumnMap
-from ..recordings.unit.pressure_counts import in_counts
 from ..sensors import COUNT_MAX, divider
 
 FEWEST = 3  # recordings: of fewer nothing says how far a grip is from rest (assumed)

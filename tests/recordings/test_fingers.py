@@ -11,10 +11,9 @@ from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert
-from tactile_core.recordings import assemble
+from tactile_core.recordings import array_store, assemble
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.recording import name_of
-from tactile_core.recordings.tables import matlab
 
 savemat = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]").savemat
 
@@ -120,6 +119,6 @@ def test_variables_that_are_there_twice_complex_or_huge_are_refused(tmp_path, pr
 
 def test_what_unpacks_to_more_than_its_share_is_refused(tmp_path, press, monkeypatch):
     savemat(tmp_path / "a.mat", {"F0Electrodes": press.electrodes.T}, do_compression=True)
-    monkeypatch.setattr(matlab, "MOST_UNPACKED", 10_000)
+    monkeypatch.setattr(array_store, "MOST_UNPACKED", 10_000)
     with pytest.raises(TactileError, match="unpacks to more than 0 MB"):
         recordings.read(tmp_path / "a.mat")

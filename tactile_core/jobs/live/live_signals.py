@@ -14,10 +14,9 @@ from ...recordings.preparer import DOUBTS, prepare
 from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
 from ...recordings.rest_level import Baseline, Changes
-from ...recordings.signal_kind import full_scale
+from ...recordings.signal_kind import counts_a_unit, full_scale
 from ...recordings.signals import EVERY, PrepareOptions, Signals
 from ...recordings.unit import film
-from ...recordings.unit.pressure_counts import counts_a_unit
 from ...sensors import SAMPLE_RATE, SOURCE
 from ...sensors.descriptor import of_kind
 from ...sensors.fluid_sensor import FALLS, POLARITIES, Fluid

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from functools import partial
 
 from ...sensors import ELECTRODES
 from ..assemble import check_electrodes
@@ -15,10 +15,7 @@ NAME = "CSV with timestamp, tdc, tac, pdc, pac1..22, ele1..19"
 PAC = [f"pac{i}" for i in range(1, 23)]
 ELECTRODE_NAMES = [f"ele{i}" for i in range(1, ELECTRODES + 1)]
 
-
-def score(keys: Collection[str]) -> float:
-    """Return the share of the time and the electrodes among keys, the columns' names."""
-    return share(keys, ["timestamp", *ELECTRODE_NAMES])
+score = partial(share, wanted=["timestamp", *ELECTRODE_NAMES])
 
 
 def read(table: Table) -> Recording:

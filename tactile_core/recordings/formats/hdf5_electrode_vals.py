@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from functools import partial
 
 import numpy as np
 
@@ -11,16 +11,13 @@ from ...errors import TactileError
 from ..array_store import Store
 from ..assemble import assemble
 from ..recording import Recording
-from . import electrodes_of
+from . import electrodes_of, share
 
 CONTAINER = "hdf5"
 ELECTRODES_NAME = "electrode_vals/data"
 NAME = "HDF5 with electrode_vals/data, contact_loc/data, force_vec/data, indenter_type/data"
 
-
-def score(keys: Collection[str]) -> float:
-    """Return 1 if the electrodes' array is among keys, the arrays' names, else 0."""
-    return float(ELECTRODES_NAME in keys)
+score = partial(share, wanted=[ELECTRODES_NAME])
 
 
 def read(store: Store) -> Recording:

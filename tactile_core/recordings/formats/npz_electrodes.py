@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from functools import partial
 from typing import Any
 
 from ..array_store import Store
 from ..assemble import assemble
 from ..recording import Recording
-from . import electrodes_of
+from . import electrodes_of, share
 
 CONTAINER = "npz"
 NAME = "NPZ with electrodes (T, 19), optional time, pdc, tac, tdc, pac, position, force"
 
-
-def score(keys: Collection[str]) -> float:
-    """Return 1 if the electrodes' array is among keys, the arrays' names, else 0."""
-    return float("electrodes" in keys)
+score = partial(share, wanted=["electrodes"])
 
 
 def read(store: Store) -> Recording:

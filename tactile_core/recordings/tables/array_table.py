@@ -27,9 +27,13 @@ def names_of(store: Store) -> dict[str, int]:
     for name, (shape, kind) in store.shapes.items():
         rows, inner = _rows(shape)
         if rows > 1 and kind.kind in "iufb" and len(found) + prod(inner) <= MAX_COLUMNS:
-            for index in product(*map(range, inner)):
-                found[name.lower() + "".join(f"[{place}]" for place in index)] = rows
+            found |= dict.fromkeys(_indexed(name, inner), rows)
     return found
+
+
+def _indexed(name: str, inner: tuple[int, ...]) -> list[str]:
+    """Return the names of an array's columns, in lower case; inner : shape of one of its rows"""
+    return [name.lower() + "".join(f"[{at}]" for at in index) for index in product(*map(range, inner))]
 
 
 def _rows(shape: tuple[int, ...]) -> tuple[int, tuple[int, ...]]:
@@ -60,7 +64,8 @@ def table_of(store: Store, wanted: Iterable[str]) -> Table:
             raise TactileError(f"{store.path}, {name}", "this array is missing", expected, "Change the map")
         if array not in held:
             held[array] = _read(store, array)
-        columns |= _columns_of(array.lower(), held[array])
+        values = held[array]
+        columns |= zip(_indexed(array, values.shape[1:]), values.reshape(len(values), -1).T, strict=True)
     lengths = {name: len(values) for name, values in held.items()}
     frames = next(iter(lengths.values()), 0)
     for name, length in lengths.items():
@@ -70,12 +75,6 @@ def table_of(store: Store, wanted: Iterable[str]) -> Table:
     labels = labels_in(store, frames)
     values = np.column_stack(list(columns.values())) if columns else np.empty((0, 0))
     return Table(store.path, tuple(columns), values, np.arange(frames), (), texts=labels)
-
-
-def _columns_of(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
-    columns = values.reshape(len(values), -1)
-    inner = product(*map(range, values.shape[1:]))
-    return {name + "".join(f"[{at}]" for at in index): columns[:, place] for place, index in enumerate(inner)}
 
 
 def _read(store: Store, name: str) -> np.ndarray:

@@ -6,6 +6,7 @@ import json
 import os
 from array import array
 from collections.abc import Iterator
+from itertools import chain, islice
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -91,17 +92,14 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 def _of_object(path: str, whole: dict[str, Any]) -> Table:
     """Return a table of a file's single object, `whole`: of its first list of records, or of its lists of numbers."""
     lists = dict(_lists("", whole))
-    constants = {name: str(value) for name, value in _flat("", {k: v for k, v in whole.items() if _plain(v)})}
+    plain = {key: value for key, value in whole.items() if isinstance(value, str | int | float)}
+    constants = {name: str(value) for name, value in _flat("", plain)}
     records = next((each for each in lists.values() if all(isinstance(one, dict) for one in each)), None)
     if records is None:
         longest = max(map(len, lists.values()), default=0)
         columns = {name: each for name, each in lists.items() if len(each) == longest}
         records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     return _of_records(path, records, iter(()), constants)
-
-
-def _plain(value: Any) -> bool:
-    return isinstance(value, str | int | float)
 
 
 def _lists(name: str, value: dict[str, Any]) -> Iterator[tuple[str, list[Any]]]:
@@ -115,32 +113,20 @@ def _lists(name: str, value: dict[str, Any]) -> Iterator[tuple[str, list[Any]]]:
 
 def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dict[str, str] | None = None) -> Table:
     """Return a table of records, begin then more, NaN for missing fields; constants : name -> text, made labels"""
-    begin = [dict(_flat("", record)) for record in begin if isinstance(record, dict | list)]
-    for record in more:
-        if len(begin) >= LOOKED_AT:
-            break
-        begin.append(dict(_flat("", record)))
-    else:
-        record = None
-    names = list(dict.fromkeys(name for each in begin[:LOOKED_AT] for name in each))
+    records = chain((record for record in begin if isinstance(record, dict | list)), more)
+    rows = (dict(_flat("", record)) for record in records)
+    first = list(islice(rows, LOOKED_AT))
+    names = list(dict.fromkeys(name for each in first for name in each))
     if not names or len(names) > MAX_COLUMNS:
         found = f"{len(names):,} fields" if names else "no records"
         advice = "Export the frames of the recording"
         raise TactileError(path, found, f"records of up to {MAX_COLUMNS:,} fields", advice)
-    rows = [[_text(each.get(name)) for name in names] for each in begin[:LOOKED_AT]]
-    cells, values = Cells(names, rows), array("d")
-
-    def add(each: dict[str, Any]) -> None:
-        values.extend(_value(cells, place, each.get(name)) for place, name in enumerate(names))
+    cells, values = Cells(names, [[_text(each.get(name)) for name in names] for each in first]), array("d")
+    for each in chain(first, rows):
+        numbers = (cells.value(place, _text(each.get(name))) for place, name in enumerate(names))
+        values.extend(np.nan if value is None else value for value in numbers)
         if len(values) > MAX_FRAMES * len(names):
             raise TactileError(path, f"over {MAX_FRAMES:,} records", "fewer", "Split the recording")
-
-    for each in begin:
-        add(each)
-    if record is not None:
-        add(dict(_flat("", record)))
-    for each in more:
-        add(dict(_flat("", each)))
     grid = np.frombuffer(values, float).reshape(-1, len(names))
     told = {
         name: np.full(len(grid), text, dtype=object)
@@ -152,8 +138,3 @@ def _of_records(path: str, begin: list[Any], more: Iterator[Any], constants: dic
 
 def _text(value: Any) -> str:
     return "" if value is None else str(value)
-
-
-def _value(cells: Cells, place: int, value: Any) -> float:
-    found = cells.value(place, _text(value))
-    return np.nan if found is None else found

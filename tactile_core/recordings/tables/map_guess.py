@@ -134,13 +134,10 @@ def _timed(columns: ColumnMap, names: Collection[str], table: Table | None) -> C
     timed = [name for name in names if is_time(name) and name not in taken]
     if table is not None:
         timed = [name for name in timed if all(map(CLOCK_LIKE.search, table.words.get(name, ())))]  # the reader says it
-        timed += [name for name in names if name.startswith("column") and name not in taken and _rises(table, name)]
+        unnamed = [name for name in names if name.startswith("column") and name not in (*taken, *table.words)]
+        timed += [name for name in unnamed if is_likely(table.column(name))]
     found = replace(columns, time=_nearest(timed, like))
     return with_unit(found, table) if found.time and table is not None and found.time not in table.words else found
-
-
-def _rises(table: Table, name: str) -> bool:
-    return name not in table.words and is_likely(table.column(name))
 
 
 def _long(table: Table) -> list[ColumnMap]:
@@ -158,14 +155,11 @@ def _long(table: Table) -> list[ColumnMap]:
             word: next((each for each in held if word in each), "") for word in CHANNELS
         }
         values = [each for each in table.header if VALUE.search(each) and each not in table.words and each != name]
-        values = values or [each for each in table.header[place + 1 :] if _is_raw(table, each)]
+        values = values or [
+            each for each in table.header[place + 1 :] if RAW < np.nanmedian(table.column(each)) <= COUNT_MAX
+        ]
         return [ColumnMap(series[0], channel=name, value=value, **channels) for value in values]
     return []
-
-
-def _is_raw(table: Table, name: str) -> bool:
-    values = table.column(name)
-    return bool(RAW < np.nanmedian(values) <= COUNT_MAX)
 
 
 def _by_values(table: Table) -> list[ColumnMap]:

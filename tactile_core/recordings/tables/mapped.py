@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import TactileError
 from ...sensors import ELECTRODES, SAMPLE_RATE, SP, electrode_count
-from ..array_store import Store, open_hdf5, open_npz
+from ..array_store import Store, open_hdf5, open_matlab, open_npz
 from ..assemble import assemble, check_electrodes
 from ..recording import Recording
 from ..time_stamps import SECONDS
@@ -20,7 +20,6 @@ from .array_table import names_of, table_of
 from .column_map import CHANNELS, ColumnMap, refuse_bag
 from .json_table import read_json
 from .map_guess import NUMBERED, guess, with_unit
-from .matlab import open_matlab
 from .table import Table, read_header, read_table, read_tables
 
 TITLES = {"csv": "CSV", "json": "JSON", "hdf5": "HDF5", "npz": "NPZ", "mat": "MATLAB"}

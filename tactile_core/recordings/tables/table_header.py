@@ -70,14 +70,11 @@ def _first_row(lines: Sequence[str]) -> tuple[int | None, int | None]:
     if first is None:
         return (filled[0] if filled else None), None
     comment = max((place for place in filled if place < first), default=None)
-    widths = {place: _width(lines[place]) for place in filled if first <= place <= first + LOOKED_AT}
+    near = ((place, lines[place]) for place in filled if first <= place <= first + LOOKED_AT)
+    widths = {place: len(_cells(line, _separator(line))) for place, line in near}
     # Lines before one that is twice as wide are a title.
     wide = (place for place, width in widths.items() if width >= max(MANY, 2 * widths[first] + 1))
     return next(wide, first), comment
-
-
-def _width(line: str) -> int:
-    return len(_cells(line, _separator(line)))
 
 
 def _separator(line: str) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tactile_core.recordings.preparer import Preparer
-from tactile_core.recordings.unit.pressure_counts import PRESSURES, counts_a_unit, in_counts
+from tactile_core.recordings.signal_kind import PRESSURES, counts_a_unit, in_counts
 
 COUNT = 36.5  # Pa
 RNG = np.random.default_rng(0)
