@@ -19,6 +19,7 @@ from ..sensors import title
 from ..translation.card import doubt
 from ..translation.simulated_likeness import contradicted
 from ..translation.trust_words import DENIED, FIRM, LOW_CONFIDENCE, SENTENCES, TOO_FIRM
+from .drawer import describe_gel
 from .frame_pass import FramePass, Tools
 from .frames_file import described
 from .sheet_figure import FRAMES, SheetFigure, scale
@@ -81,7 +82,8 @@ class ConversionReport:
     def _of_recording(self) -> list[str]:
         """Return warnings on recording, gel and frames in the order of the steps: single samples first, frames last."""
         translator, drawer = self._tools.translator, self._tools.drawer
-        found = [*self._rows.signals.warnings, *translator.answer.describe_shift(), *drawer.describe_gel()]
+        told = describe_gel(drawer.target, drawer.found_on)
+        found = [*self._rows.signals.warnings, *translator.answer.describe_shift(), *told]
         for flag, words in SENTENCES.items():
             name = str(flag.name).lower()
             denied = self._denied if flag is flags.Flag.UNEXPLAINED else 0

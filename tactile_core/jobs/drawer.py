@@ -64,10 +64,6 @@ class Drawer:
             raise TactileError("--keep marker_motion", found, "a gel with dots printed on it", advice)
         return self.dots
 
-    def describe_gel(self) -> tuple[str, ...]:
-        """Return a tuple of a sentence if contacts are solved on another gel than the networks', else ()."""
-        return describe_gel(self.target, self.found_on)
-
 
 def describe_gel(target: str, found_on: str) -> tuple[str, ...]:
     """Return a tuple of a sentence if contacts found_on one gel are solved on another, the target, else ()."""

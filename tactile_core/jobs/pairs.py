@@ -91,7 +91,7 @@ def plan(
 def prepare_input(folder: Path, job: Job[Pairs], index: int) -> tuple[int, bool]:
     """Return the number of blocks that the job needs, by the contacts made so far, and False: nothing is prepared."""
     _scene(job.inputs[index], tuple(job.recipe.files))
-    return wanted(_counts(folder, job, index), job.recipe.count, job.inputs[index].path), False
+    return _wanted(folder, job), False
 
 
 def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
@@ -114,16 +114,17 @@ def make(folder: Path, job: Job[Pairs], index: int, number: int) -> bool:
 
 def inspect_input(folder: Path, job: Job[Pairs], index: int) -> InputFacts | None:
     """Return the number of blocks needed in all, by the contacts made so far; None before the first block."""
-    counts = _counts(folder, job, index)
-    if not counts:
-        return None
-    return InputFacts(wanted(counts, job.recipe.count, job.inputs[index].path))
+    return InputFacts(_wanted(folder, job)) if _counts(folder, job) else None
 
 
 def blocks(folder: Path, job: Job[Pairs]) -> list[Path]:
     """Return the files of the blocks, in order, that hold the contacts of a finished job."""
-    count = wanted(_counts(folder, job, 0), job.recipe.count, job.inputs[0].path)
-    return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(count)]
+    return [jobs.shard_file(folder, job.inputs[0].name, number) for number in range(_wanted(folder, job))]
+
+
+def _wanted(folder: Path, job: Job[Pairs]) -> int:
+    """Return the number of blocks needed in all, estimated by the contacts made so far."""
+    return wanted(_counts(folder, job), job.recipe.count, job.inputs[0].path)
 
 
 def wanted(counts: dict[int, int], count: int, where: str) -> int:
@@ -144,9 +145,9 @@ def wanted(counts: dict[int, int], count: int, where: str) -> int:
     return max(number + 1, min(estimate, most))
 
 
-def _counts(folder: Path, job: Job[Pairs], index: int) -> dict[int, int]:
+def _counts(folder: Path, job: Job[Pairs]) -> dict[int, int]:
     """Return block -> number of contacts, for the blocks that exist."""
-    name, found = job.inputs[index].name, {}
+    name, found = job.inputs[0].name, {}
     for file in (folder / jobs.SHARDS).glob(f"{name}-*.h5"):
         number = file.stem.rpartition("-")[2]
         if re.fullmatch(r"[0-9]{6,9}", number):  # not what a cloud's folder calls a conflicted copy

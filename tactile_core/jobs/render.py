@@ -27,7 +27,6 @@ from ..pictures.mitsuba.scene_file import camera_planes, scene_files, write_scen
 from ..pictures.mitsuba.variant import fitting
 from ..pictures.presets import DEFAULT, FAST, PRESETS, describe_choice, measured
 from ..pictures.renderer import Renderer
-from ..sensors.calibration import Calibration
 from ..sensors.calibration_file import calibration_path, load_calibration
 from . import results
 from .gel_frames import read_frames
@@ -114,34 +113,19 @@ def render(
 
 def claimed(out: Path, options: Options) -> str:
     """Return the preset to render with, after checking that `out` and ``scene_out`` can be written, and remove what
-    killed runs left beside `out`. Raises TactileError for one that exists and may not be replaced."""
+    killed runs left beside `out`. Raises TactileError for one that exists and may not be replaced, and for a preset
+    beside levels."""
     results.check_free(out, options.overwrite, MAKER)
     if options.scene_out is not None and not options.overwrite:
         for file in scene_files(options.scene_out):
             atomic.claim(file, "Name another --scene-out, or add --overwrite")
     results.check_writable(out.parent)
     atomic.sweep(out.parent)
-    return choose_preset(options)
-
-
-def choose_preset(options: Options) -> str:
-    """Return the preset's name: as given, the cheapest within the levels, or the default; TactileError for both."""
     if options.levels is None:
         return options.preset or DEFAULT
     if options.preset is not None:
         raise TactileError("--error", "given with --preset", "one of the two")
     return fitting(options.levels, options.variant)
-
-
-def at_size(calibration: Calibration, heights: tuple[int, int] | None, size: tuple[int, int] | None) -> Calibration:
-    """Return the calibration at a size (width, height), or heights' (H, W), px; TactileError if both differ."""
-    if heights is not None:
-        height, width = heights
-        if size not in (None, (width, height)):
-            found = f"{size[0]} x {size[1]}, the height map {width} x {height}"
-            raise TactileError("--size", found, "the height map's size", "Leave it out")
-        size = (width, height)
-    return calibration if size is None else calibration.at_size(*size)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -202,7 +186,14 @@ def pictures(
 ) -> Pictures:
     """Return the writer of frames. heights : (H, W) of height maps, None for displacements
     Raises TactileError for a bad calibration or size, and ModuleNotFoundError without Mitsuba if it is needed."""
-    unit = at_size(load_calibration(options.calibration, None, options.object_reflectance), heights, options.size)
+    unit, size = load_calibration(options.calibration, None, options.object_reflectance), options.size
+    if heights is not None:
+        height, width = heights
+        if size not in (None, (width, height)):
+            found = f"{size[0]} x {size[1]}, the height map {width} x {height}"
+            raise TactileError("--size", found, "the height map's size", "Leave it out")
+        size = (width, height)
+    unit = unit if size is None else unit.at_size(*size)
     about = {"calibration": unit.unit, "preset": preset, "units": UNITS}
     renderer = Renderer(unit, preset, options.variant)
     return Pictures(renderer, clock or Stopwatch(), about, heights is not None, options.noise, options.exr)

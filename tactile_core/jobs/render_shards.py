@@ -28,7 +28,6 @@ from .render import Options, Pictures, claimed, note_of, pictures
 from .results import frames_text, parse_frames, select
 from .translate_shards import check_unit
 
-GROWS = False
 NUMBERS, VALUES, KIND, HEIGHTS = "numbers", "values", "kind", "heights"  # arrays of a prepared file
 
 

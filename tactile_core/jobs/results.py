@@ -34,11 +34,6 @@ KEEPABLE = ("latent", "displacement", "height", "image", "traction", "marker_mot
 DEFAULT_KEEP = ("latent", "displacement", "image")
 
 
-def parse_keep(text: str) -> tuple[str, ...]:
-    """Return the words of --keep in ``"image,latent"``, in KEEPABLE's order. Raises TactileError for other words."""
-    return parse_words(text, KEEPABLE, least=0)
-
-
 def ball_radius(gel: str) -> float | None:
     """Return the radius, m, of the ball that a --gel of ``"ball:28"`` states by its diameter in mm; None for
     "translated" and "solved". Raises TactileError for anything else."""

@@ -145,7 +145,6 @@ def _move(document: dict[str, Any], name: str, value: Value, where: str) -> None
 
 GRID = "grid.json"
 FORMAT = "tactile-grid-1"
-GROWS = False
 
 
 def simulate_grid(

@@ -35,7 +35,6 @@ from .results import TRANSLATED
 if TYPE_CHECKING:
     from .engine.job import Job
 
-GROWS = False
 # kB per frame of a shard, of the shipped recording: what is always there, and each word of --keep beyond it.
 ALWAYS_KB = 0.8
 KEEP_KB = {"latent": 0.5, "displacement": 78, "height": 199, "image": 101, "traction": 0.2, "marker_motion": 0.5}

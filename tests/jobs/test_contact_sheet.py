@@ -43,7 +43,7 @@ def reported(
         recording=recording, signals=signals, at=lambda frames: frames, read=lambda frames: (None, signals)
     )
     translator = SimpleNamespace(card={}, answer=Answer(mount_shift_mm=shift), source="biotac")
-    drawer = SimpleNamespace(camera=load_calibration().camera, target="digit", describe_gel=tuple)
+    drawer = SimpleNamespace(camera=load_calibration().camera, target="digit", found_on="digit")
     made = SimpleNamespace(folded=0, pictures=lambda arrays, rows: list(arrays["image"][rows]))
     report = ConversionReport(rows, frames, Tools(translator, drawer), made)
     gel = (count, len(sensors.digit_surface().rest), 3)

@@ -169,7 +169,7 @@ def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     from ...translation.answer import parse_answer
 
     wanted = Translate(
-        keep=list(results.parse_keep(options.keep)), weights="",
+        keep=list(results.parse_words(options.keep, results.KEEPABLE, least=0)), weights="",
         sensor=None if options.sensor is None else electrode_gains.read(options.sensor),
         prepare=Prepare(**prepare_words(options)),
         target=options.target, preset=options.preset or "",

@@ -136,7 +136,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
     from ...translation.answer import parse_answer
 
     prepare = PrepareOptions(**prepare_words(options))
-    keep, frames = results.parse_keep(options.keep), results.parse_frames(options.frames)
+    keep = results.parse_words(options.keep, results.KEEPABLE, least=0)
     answer = parse_answer(options.answer, options.frames_apart, options.mount_shift, options.samples, options.contacts)
     sensor = None if options.sensor is None else electrode_gains.read(options.sensor)
     paths = readers.list_fingers(options.recordings, prepare.columns)
@@ -144,7 +144,7 @@ def _read(options: argparse.Namespace) -> tuple[Options, ToolOptions, list[str],
     budget = Budget() if options.error is None else parse_budget(options.error)
     levels = budget.only("levels", "Nothing else can be chosen in a translation")
     preset = presets.FAST if levels is None else variant.fitting(levels)
-    job = convert.Options(frames, keep, prepare, options.overwrite, sensor)
+    job = convert.Options(results.parse_frames(options.frames), keep, prepare, options.overwrite, sensor)
     pictures = options.calibration, preset, None
     asked = convert.ToolOptions(
         options.weights, *pictures, answer, options.gel, options.target, source, options.object_reflectance

@@ -70,6 +70,7 @@ def run(options: argparse.Namespace) -> int:
     """Show the newest frames until the recording ends, the window is closed, or Ctrl-C; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
+    from ...jobs.drawer import describe_gel
     from ...recordings import PrepareOptions
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first
@@ -103,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
 
         unit = electrode_gains.read(options.sensor).gains_for(path, split(path).section, options.sensor, sensor)
     view = live.View(tools, options.rate, prepare, unit)
-    for sentence in tools.drawer.describe_gel():
+    for sentence in describe_gel(tools.drawer.target, tools.drawer.found_on):
         say(sentence)
     with contextlib.ExitStack() as opened:
         camera = None

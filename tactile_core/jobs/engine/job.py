@@ -105,7 +105,7 @@ def read(folder: Path) -> Job:
         if odd or not one.name.startswith(f"{index:05d}_") or not _encodes(one.name + one.path):
             raise TactileError(f"{file}, inputs", f"the name {one.name!r:.80}", f"{index:05d}_<file name>", ADVICE)
     if isinstance(job.recipe, Translate):
-        results.parse_keep(",".join(job.recipe.keep))
+        results.parse_words(",".join(job.recipe.keep), results.KEEPABLE, least=0)
         job.recipe.prepare.options().check()
         if job.recipe.sensor is not None:
             electrode_gains.check(job.recipe.sensor, f"{file}, recipe, sensor")

@@ -5,7 +5,7 @@ Each kind of job is done by a module of ``jobs``, in `MODULES`, which has
 if anything was made
 ``make(folder, job, index, number)``  makes a shard unless it is there and whole; returns true if it was made
 ``inspect_input(folder, job, index)``  returns `InputFacts` by the input's files; None before its first task is done
-``GROWS``  true if `prepare_input` is to be called again when all its shards are there
+``GROWS``  only where `prepare_input` is to be called again when all its shards are there: true
 
 The first two raise TactileError for what cannot be done, OSError if the disk cannot be written."""
 

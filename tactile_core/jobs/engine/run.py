@@ -121,7 +121,7 @@ class _Work:
         self._folder, self._job = folder, job
         self._part, self._parts = part or (0, 1)
         self.done, self.known, self.finished = Outcome(), 0, 0
-        self._grows = recipes.module_for(job.recipe).GROWS
+        self._grows = getattr(recipes.module_for(job.recipe), "GROWS", False)
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:
