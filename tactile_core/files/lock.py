@@ -18,10 +18,8 @@ def held(folder: Path, part: tuple[int, int] | None = None) -> Iterator[None]:
     Raises TactileError if another job, or the same part, is running. On a network file system it works if that forwards
     locks (NFS 4 and Lustre with flock do)."""
     with contextlib.ExitStack() as stack:
-        if part is None:
-            stack.enter_context(_lock(folder / FILE, folder, shared=False))
-        else:
-            stack.enter_context(_lock(folder / FILE, folder, shared=True))
+        stack.enter_context(_lock(folder / FILE, folder, shared=part is not None))
+        if part is not None:
             name = f"{FILE}-{part[0]}-of-{part[1]}"
             stack.enter_context(_lock(folder / name, f"{folder}, --array {part[0]}/{part[1]}", shared=False))
         yield

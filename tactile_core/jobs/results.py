@@ -101,9 +101,9 @@ def is_result(folder: Path, maker: str = "") -> bool:
     return isinstance(note, dict) and note.get("format") == FORMAT and note.get("made_by", "") == maker
 
 
-def parse_words(text: str | None, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
-    """Return the words of ``"image,electrodes"`` in known's order, None: all; TactileError for others or too few."""
-    words = known if text is None else [word.strip() for word in text.split(",") if word.strip()]
+def parse_words(text: str, known: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
+    """Return the words of ``"image,electrodes"`` in known's order; TactileError for others or too few."""
+    words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in known:
             raise TactileError("--keep", repr(word), f"words out of {', '.join(known)}", "Separate them by commas")

@@ -64,7 +64,6 @@ def test_results_of_another_verb_and_files_of_others_are_not_replaced(tmp_path):
 
 def test_words_come_in_their_own_order_and_all_without_a_text():
     assert results.parse_words("displacement_digit, electrodes", KNOWN) == ("electrodes", "displacement_digit")
-    assert results.parse_words(None, KNOWN) == KNOWN
     assert results.parse_words(" ", KNOWN, least=0) == ()
 
 

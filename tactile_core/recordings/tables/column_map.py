@@ -14,6 +14,7 @@ from pathlib import Path
 from ...errors import TactileError
 from ...files import atomic
 from ...files.outside import read_toml_text
+from ...files.short_text import listed
 from ...sensors import ELECTRODES, SAMPLE_RATE
 from ..time_stamps import Unit
 
@@ -98,8 +99,7 @@ def read(path: str | os.PathLike) -> ColumnMap:
 def write(path: str | os.PathLike, guessed: list[ColumnMap], held: tuple[str, ...]) -> None:
     """Write the first of the guessed maps to a file, those of further fingers as comments.
     held : names of all columns of the recording, for a comment"""
-    named = ", ".join(held[:MOST_NAMED]) + (f" and {len(held) - MOST_NAMED} more" if len(held) > MOST_NAMED else "")
-    quoted = json.dumps(named)[1:-1]  # escaped, so that no name ends the comment
+    quoted = json.dumps(listed(held, MOST_NAMED))[1:-1]  # escaped, so that no name ends the comment
     columns, *others = guessed
     lines = [
         "# Which column of a recording is what; guessed: check it. Leave empty what is not there.",
