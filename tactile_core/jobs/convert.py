@@ -202,8 +202,12 @@ def check_order(recording: Recording, answer: Answer) -> None:
 
 def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
     """Return the content of a result's note.json: what the same input reproduces, so no paths and no time of day.
+    Its weights have rms errors of the gel in um on contacts not trained on, and of no deformation, if their card does.
     frames : (T,) int, indices of the converted frames in the recording"""
-    recording = rows.recording
+    from ..translation.card import chain_error
+
+    recording, error = rows.recording, chain_error(tools.translator.card)
+    errors = {} if error is None else {"kept_apart_rms_um": error[0], "baseline_rms_um": error[1]}
     return {
         "format": results.FORMAT,
         "recording": {
@@ -221,20 +225,10 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         "warnings": list(report.warnings()),
         "flagged_frames": report.flagged,
         "explained": report.explained,
-        "weights": weights_entry(tools.translator),
+        "weights": {"sha256": tools.translator.sha256, **errors},
         **({} if tools.calibration is None else {"calibration": provenance.entry(tools.calibration)}),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
-
-
-def weights_entry(translator: Translator) -> dict:
-    """Return sha256, the hash of the weights' card, and, if stated there, rms errors of the gel in um:
-    kept_apart_rms_um on contacts not trained on, baseline_rms_um of no deformation."""
-    from ..translation.card import chain_error
-
-    found = chain_error(translator.card)
-    errors = {} if found is None else {"kept_apart_rms_um": found[0], "baseline_rms_um": found[1]}
-    return {"sha256": translator.sha256, **errors}
 
 
 def reverse(

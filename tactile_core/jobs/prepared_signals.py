@@ -73,18 +73,13 @@ def make(folder: Path, job: Job[Translate], index: int) -> tuple[int, bool]:
         return frames, False
     check_unchanged(one)
     with atomic.new_file(file, shared=True) as partial:
-        count = _write(partial, job, one.path, one.sha256)
-        checksummed.write_checksum(partial, rows=count)
-    return count, True
-
-
-def _write(file: Path, job: Job[Translate], path: str, digest: str) -> int:
-    with new_hdf5(file, {}, checksummed.ROOM) as (out, _):
-        writer = _Writer(out)
-        for recording, signals, repeated in _signals(path, job):
-            writer.append(recording, signals, repeated)
-        writer.close(digest)
-    return writer.count
+        with new_hdf5(partial, {}, checksummed.ROOM) as (out, _):
+            writer = _Writer(out)
+            for recording, signals, repeated in _signals(one.path, job):
+                writer.append(recording, signals, repeated)
+            writer.close(one.sha256)
+        checksummed.write_checksum(partial, rows=writer.count)
+    return writer.count, True
 
 
 def _signals(path: str, job: Job[Translate]) -> Iterator[tuple[Recording, Signals, int]]:

@@ -91,26 +91,21 @@ def run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, prog
     """Do the tasks of a job that are not done, all or those of part (i, n), inside the block of `opened`; return the
     outcome. place : executor of the tasks; progress : called with (tasks done, tasks known so far)
     Raises TactileError if the disk cannot be written."""
+    work = _Work(folder, job, part)
     try:
-        return _run(folder, job, place, part, progress)
+        with place:  # which may be refused: the folders say that the job has begun
+            for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
+                (folder / name).mkdir(exist_ok=True)
+            for task in work.first_tasks():
+                place.submit(task)
+            for task, reply in place.results(work.awaited):
+                for follow in work.take(task, reply):
+                    place.submit(follow)
+                progress(work.finished, work.known)
+        if part is None:
+            manifest.write(folder, job)
     except OSError as error:
         raise manifest.refused(folder, job, error) from error
-
-
-def _run(folder: Path, job: Job, place: Place, part: tuple[int, int] | None, progress: Progress) -> Outcome:
-    """Do the work of `run`. Raises OSError if the disk cannot be written."""
-    work = _Work(folder, job, part)
-    with place:  # which may be refused: the folders say that the job has begun
-        for name in (jobs.PREPARED, jobs.SHARDS, jobs.ASIDE):
-            (folder / name).mkdir(exist_ok=True)
-        for task in work.first_tasks():
-            place.submit(task)
-        for task, reply in place.results(work.awaited):
-            for follow in work.take(task, reply):
-                place.submit(follow)
-            progress(work.finished, work.known)
-    if part is None:
-        manifest.write(folder, job)
     return work.done
 
 

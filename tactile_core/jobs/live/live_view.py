@@ -13,9 +13,8 @@ from ... import accuracy
 from ...pictures.height_map import folds_counted
 from ...recordings.flags import Flag
 from ...recordings.recording import Recording
-from ...recordings.signals import PrepareOptions, Signals
+from ...recordings.signals import PrepareOptions
 from ...translation.contact_track import ForwardTracker
-from ...translation.translator import Translation
 from ...translation.trust_words import in_words
 from ..frame_pass import Tools
 from .live_signals import LiveSignals
@@ -74,8 +73,10 @@ class View:
         self.passed += len(rows) - 1
         pdc = np.full(1, np.nan) if rows.pdc is None else rows.pdc[-1:]
         signals = self.signals.signals(self._counts[None], pdc)
-        translation = self._translation(signals)
-        drawer = self._tools.drawer
+        drawer, translator = self._tools.drawer, self._tools.translator
+        evidence = translator.encode(signals)
+        state = self._track(evidence, self.frames / self._rate) if translator.answer.follows else None
+        translation = translator.decode(signals, evidence, state)
         gel = drawer.gel(vars(translation))["displacement_digit"]
         with folds_counted():  # a line for each such picture would hide the latencies
             heights = drawer.height_map(gel)
@@ -88,14 +89,6 @@ class View:
         shown = Shown(self.frames - 1, picture, force, latency, work, confidence, flags, words)
         self.latencies.append((latency, work))
         return shown
-
-    def _translation(self, signals: Signals) -> Translation:
-        """Return the translation of the newest frame, whose contact is tracked from the frames before."""
-        translator = self._tools.translator
-        evidence, state = translator.encode(signals), None
-        if translator.answer.follows:
-            state = self._track(evidence, self.frames / self._rate)
-        return translator.decode(signals, evidence, state)
 
     def describe_latency(self) -> str:
         """Return a sentence: median and 99th percentile of the last latencies, median of computing, frames skipped."""

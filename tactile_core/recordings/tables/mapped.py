@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any, BinaryIO
 
@@ -182,12 +182,11 @@ def read_by_map(
     return replace(found, not_taken=tuple(name for name in held if name not in taken))
 
 
-@contextmanager
-def open_store(path: str, container: str, file: BinaryIO) -> Iterator[Store]:
+def open_store(path: str, container: str, file: BinaryIO) -> AbstractContextManager[Store]:
     """Open the arrays of a file. container : "hdf5", "npz" or "mat"""
-    opened = {"hdf5": lambda: open_hdf5(path), "npz": lambda: open_npz(path, file)}
-    with opened.get(container, lambda: open_matlab(path, file))() as store:
-        yield store
+    if container == "hdf5":
+        return open_hdf5(path)
+    return open_npz(path, file) if container == "npz" else open_matlab(path, file)
 
 
 def guess_map(path: str, container: str, file: BinaryIO) -> tuple[list[ColumnMap], tuple[str, ...]]:
