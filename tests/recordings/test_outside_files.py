@@ -411,7 +411,7 @@ def test_files_of_other_programs_are_read(name, tmp_path):
 
 
 def test_a_live_view_knows_a_finger_that_does_not_answer(press):
-    from tactile_core.jobs.live.live_signals import LiveSignals
+    from tactile_core.jobs.live.live_view import LiveSignals
 
     def rows(electrodes):
         return assemble("touch.csv", "CSV", electrodes=electrodes, stamps=np.arange(len(electrodes)) / 100)

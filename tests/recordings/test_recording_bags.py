@@ -18,7 +18,7 @@ from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.recordings import chunks, electrode_gains
-from tactile_core.recordings.bags import bag, ros_messages, ros_sensors
+from tactile_core.recordings.bags import bag, ros_messages
 from tactile_core.recordings.readers import each_finger, sensor_of
 from tactile_core.recordings.recording import name_of
 
@@ -247,9 +247,9 @@ def test_definitions_that_multiply_cost_no_time():
     with pytest.raises(ValueError, match="more entries than bytes"):
         ros_messages.Decoder(bomb, ros1=True)(bytes(4000))
     wide = [f"x/{name}\n" + "".join(f"x/{within} f{i}\n" for i in range(100)) for name, within in pairwise("ABCDEF")]
-    assert ros_sensors.sensors_in(defined(*wide, "x/F\nint16 electrodes\n")) == []
-    assert len(ros_sensors.sensors_in(defined(*wide, "x/F\nint16[] electrodes\n"))) == ros_sensors.MOST
-    assert ros_sensors.sensors_in(defined("x/A\nx/A[] electrodes\n")) == []
+    assert ros_messages.sensors_in(defined(*wide, "x/F\nint16 electrodes\n")) == []
+    assert len(ros_messages.sensors_in(defined(*wide, "x/F\nint16[] electrodes\n"))) == ros_messages.MOST_SENSORS
+    assert ros_messages.sensors_in(defined("x/A\nx/A[] electrodes\n")) == []
 
 
 def test_the_bags_of_others_are_read_whole(outside_data):

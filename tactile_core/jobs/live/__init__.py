@@ -2,8 +2,7 @@
 
 from .digit_camera import DigitCamera
 from .frame_server import FrameServer
-from .live_signals import LiveSignals
-from .live_view import Shown, View
+from .live_view import LiveSignals, Shown, View
 from .playback import Growing, followed, played, watch
 
 __all__ = ["DigitCamera", "FrameServer", "Growing", "LiveSignals", "Shown", "View", "followed", "played", "watch"]

@@ -1,7 +1,8 @@
-"""Draw the newest frame as a picture, and measure how long that takes."""
+"""Draw the newest frame of a recording of which only the past is known, and measure how long that takes."""
 
 from __future__ import annotations
 
+import dataclasses
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -11,18 +12,157 @@ import numpy as np
 
 from ... import accuracy
 from ...pictures.height_map import folds_counted
+from ...recordings.doubt import REST, Reason, reason_of
+from ...recordings.electrode_faults import STALE, alike, repeats, silent
 from ...recordings.flags import Flag
+from ...recordings.preparer import DOUBTS, prepare
+from ...recordings.quiet import tare_frames, window_frames
 from ...recordings.recording import Recording
-from ...recordings.signals import PrepareOptions
+from ...recordings.rest_level import Baseline, Changes
+from ...recordings.signal_kind import counts_a_unit, full_scale
+from ...recordings.signals import EVERY, PrepareOptions, Signals
+from ...recordings.unit import film
+from ...sensors import SAMPLE_RATE, SOURCE
+from ...sensors.descriptor import of_kind
+from ...sensors.fluid_sensor import FALLS, POLARITIES, Fluid
 from ...translation.contact_track import ForwardTracker
 from ...translation.trust_words import in_words
 from ..frame_pass import Tools
-from .live_signals import LiveSignals
 
 if TYPE_CHECKING:
     from ...recordings.electrode_gains import ElectrodeGains
 
+LONGEST = 10.0  # s that are looked through for rest and polarity; then the calmest so far is taken (assumed)
+AGAIN = 25  # new frames after which they are looked at again
 REMEMBERED = 1000  # latencies whose quantiles are reported
+
+
+class LiveSignals:
+    """Changes against rest, frame by frame, with rest and film from the first frames, which are prepared together.
+
+    Rest and film are those of the first quiet part; drift and glitches are not removed. The first contacts decide the
+    polarity; until then it is the given one, or "falls".
+    rate : Hz; options : of the preparation, without effect of drift, repair and smooth; tare is of the first 10 s
+    unit : gains, offsets and rest, which is taken if the first window is not calm near it; sensor : the sensor's name
+    found : where the rest is from, in words, "" until it is known; polarity : "falls" or "rises"; evidence : what
+        shows that, in words; sure : true once it is final
+    silent : true if the finger does not respond: its electrodes all read the same
+    Raises TactileError for a tare of other frames."""
+
+    def __init__(
+        self,
+        rate: float = SAMPLE_RATE,
+        options: PrepareOptions | None = None,
+        unit: ElectrodeGains | None = None,
+        sensor: str = SOURCE,
+    ) -> None:
+        options = options or PrepareOptions()
+        self._rate, self._unit, self._sensor = rate, unit, sensor
+        self._most = round(LONGEST * rate)
+        self._least = window_frames(rate)  # frames before the first look
+        if options.tare not in (None, "none"):
+            tare = tare_frames(options.tare, self._most)
+            options, self._least = dataclasses.replace(options, tare=tare), tare.stop
+        self._options = dataclasses.replace(options, drift=False, repair=False, smooth=1)
+        if unit is not None:
+            self._options = dataclasses.replace(self._options, rest=unit.rest(), film=unit.film)
+        self._seen: Recording | None = None
+        self._next_look = self._least
+        self._known: Signals | None = None  # the first frames', once they show rest
+        self._rest_pdc, self._pdc_factor = np.nan, 1.0  # counts at rest; counts that 1 in the file's PDC means
+        self._factor = 1.0  # counts that an electrode's 1 in the file means
+        self.polarity = options.polarity if options.polarity in POLARITIES else FALLS
+        self.sure, self.silent = options.polarity in POLARITIES, False
+        self._noisy, self._last = False, np.zeros((0, 0))  # whether noise keeps rows apart; the last rows
+        self.found, self.evidence = "", "as given" if self.sure else "no contact has shown it yet"
+
+    def learn(self, rows: Recording) -> bool:
+        """Search new frames, rows, for rest and polarity; return true once rest is known."""
+        self.silent = bool(alike(rows.electrodes)[-1]) and (self._known is None or self._known.kind == "raw")
+        self._last = np.concatenate([self._last, rows.electrodes] if len(self._last) else [rows.electrodes])[-STALE:]
+        if self._known is None or not self.sure:
+            self._seen = seen = self._joined(rows)
+            if len(seen) >= self._next_look and not silent(seen.electrodes).all():
+                self._look(seen)
+        return self._known is not None
+
+    def _joined(self, rows: Recording) -> Recording:
+        """Return the frames so far, up to a number, with the channels that preparation needs."""
+        electrodes, pdc = rows.electrodes, rows.pdc
+        if self._seen is not None:
+            electrodes = np.concatenate([self._seen.electrodes, electrodes])[: self._most]
+            both = pdc is not None and self._seen.pdc is not None
+            pdc = np.concatenate([self._seen.pdc, pdc])[: self._most] if both else None
+        count = len(electrodes)
+        return Recording(
+            rows.name, rows.path, rows.layout, np.arange(count) / self._rate, 0.0, electrodes, np.arange(count),
+            np.zeros(count, np.uint16), pdc=pdc, about=rows.about, sensor=self._sensor,
+        )  # fmt: skip
+
+    def _look(self, seen: Recording) -> None:
+        """Prepare the frames so far; store their rest, once it shows, and their polarity."""
+        self._next_look = len(seen) + AGAIN
+        if self._known is None:
+            unit = full_scale(seen.electrodes)
+            self._factor, self._noisy = unit[0] if unit else 1.0, repeats(seen.electrodes)[1]
+        signals = prepare(seen, dataclasses.replace(self._options, counts_per_unit=self._factor))
+        of_unit = Reason.REST_OF_UNIT in map(reason_of, signals.warnings) or self._options.tare is not None
+        if self._known is None and (len(seen) == self._most or signals.quiet.any() or of_unit):
+            self._known, self.found = signals, _source(signals)
+            if seen.pdc is not None:
+                self._pdc_factor, _ = counts_a_unit(seen.pdc, self._factor, self._sensor)
+                rest = (self._pdc_factor * seen.pdc - signals.pdc)[np.isfinite(signals.pdc)]
+                self._rest_pdc = np.median(rest) if len(rest) else np.nan
+        self.polarity, self.evidence = (signals.report[name] for name in ("polarity", "polarity_evidence"))
+        self.sure = self._options.polarity in POLARITIES or not signals.flags[0] & DOUBTS
+
+    @property
+    def held(self) -> bool:
+        """Return true if the last 3 rows are equal though noise should differ: the driver stands still."""
+        return self._noisy and self.known.kind == "raw" and repeats(self._last)[0].sum() == STALE - 1
+
+    @property
+    def known(self) -> Signals:
+        """Return the first frames' signals, whose rest is taken for all. Raises ValueError before it is known."""
+        if self._known is None:
+            raise ValueError("no rest is known yet")
+        return self._known
+
+    def signals(self, electrodes: np.ndarray, pdc: np.ndarray) -> Signals:
+        """Return the signals of electrodes (T, 19), pdc (T,), as in the file or NaN. Raises ValueError as `known`."""
+        count, rest, kind = len(electrodes), self.known.rest, self.known.kind
+        unheard = alike(electrodes) & (kind == "raw")
+        flags = np.full(count, np.bitwise_and.reduce(self.known.flags) & ~DOUBTS, np.uint16)
+        flags[unheard] |= np.uint16(Flag.DEAD_CHANNEL)
+        flags[-1] |= np.uint16(Flag.DEAD_CHANNEL if self.held else 0)
+        electrodes = electrodes * self._factor
+        change = (electrodes - rest) * (1.0 if self.polarity == FALLS else -1.0)
+        pdc = self._pdc_factor * pdc - self._rest_pdc
+        elsewhere = any(reason_of(text) is Reason.REST_OF_UNIT for text in self.known.warnings)
+        fluid = film.Film.given(self.known.film)
+        pressed = of_kind(self._sensor, Fluid).readout.pressure * pdc > film.PRESSED
+        whole = Changes(count, change.__getitem__)
+        change = fluid.changes(whole, Baseline.constant(rest), ~pressed if elsewhere else None)[EVERY]
+        signals = Signals(
+            change=np.where(unheard[:, None], 0.0, change), rest=rest, drift=np.zeros_like(rest),
+            electrodes=electrodes, kind=kind,
+            quiet=np.zeros(count, bool), flags=flags, pdc=pdc,
+            warnings=(), report={}, sensor=self._sensor, film=self.known.film,
+        )  # fmt: skip
+        if self._unit is None:
+            return signals
+        from ...recordings import electrode_gains
+
+        return electrode_gains.apply(signals, self._unit)
+
+
+def _source(signals: Signals) -> str:
+    """Return in words where the signals' rest is from."""
+    doubts = [text for text in signals.warnings if reason_of(text) in REST]
+    parts = ", ".join(f"{first}:{last}" for first, last in signals.report["quiet_parts"])
+    if doubts or not parts:
+        return doubts[0] if doubts else signals.report["quiet_evidence"]
+    return f"frames {parts}" + (", as given" if signals.report["tare"] == "given" else "")
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,7 @@ from ...errors import TactileError
 from ...files import installed, outside
 from ...files.outside import damage_reported
 from ...files.short_text import listed
-from .ros_messages import Definition, definitions
-from .ros_sensors import sensors_in
+from .ros_messages import Definition, definitions, sensors_in
 
 STARTS = {b"#ROSBAG V": "ros1", b"\x89MCAP0\r\n": "mcap", b"SQLite format 3\0": "sqlite"}
 START_BYTES = 16  # bytes of a file from which its kind is known

@@ -14,8 +14,7 @@ from ...files.short_text import listed
 from ..assemble import MAX_FRAMES, assemble, check_electrodes, sensor_with
 from ..recording import Chosen, Recording, named
 from .bag import Bag, Topic, refused
-from .ros_messages import Decoder
-from .ros_sensors import channels, in_message, not_read, sensors_in, stamp_of
+from .ros_messages import Decoder, channels, in_message, not_read, sensors_in, stamp_of
 
 # Messages read to find a hand's fingers with signals, from the bag's start and, for drivers that start late, from its
 # middle; more if none has signals.
