@@ -1,6 +1,6 @@
 """Simulate paired contacts, the same force, lean and place on BioTac and DIGIT, as training data. Press i draws all it
 needs from (seed, i), so any number of workers makes the same file, and an interrupted run continues with the missing
-blocks of presses. What jobs call is described in ``engine.recipes``."""
+blocks of presses. What jobs call is described in ``engine.job``."""
 
 from __future__ import annotations
 
@@ -26,9 +26,8 @@ from ..simulation.scene import Scene
 from .engine import job as jobs
 from .engine import run as runs
 from .engine.inputs import Input, load_scene_of, read_scene
-from .engine.job import Job
+from .engine.job import InputFacts, Job, Pairs
 from .engine.local import InProcess
-from .engine.recipes import InputFacts, Pairs
 from .engine.run import Place, Progress
 
 GROWS = True

@@ -32,8 +32,7 @@ from .engine.inputs import check_unchanged
 if TYPE_CHECKING:
     import h5py
 
-    from .engine.job import Job
-    from .engine.recipes import Translate
+    from .engine.job import Job, Translate
 
 CHUNK = 1024  # rows per chunk: 160 kB of changes
 COLUMNS = {

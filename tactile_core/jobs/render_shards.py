@@ -1,6 +1,6 @@
 """Run `tactile render` in many processes: the same folder as from one process, but without timings.json.
 
-``engine.recipes`` says what `prepare_input`, `make` and `inspect_input` are for."""
+``engine.job`` says what `prepare_input`, `make` and `inspect_input` are for."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from . import results
 from .engine import inputs
 from .engine import job as jobs
 from .engine import run as runs
-from .engine.job import Job
-from .engine.recipes import InputFacts, Render
+from .engine.job import InputFacts, Job, Render
 from .engine.run import Place
 from .gel_frames import read_frames
 from .render import Options, Pictures, claimed, note_of, pictures

@@ -6,7 +6,7 @@
 A grid is all combinations of `NAME=A:B:N`, N values evenly from A to B, or `NAME=V,V,...`. NAME is a field of the
 scene's TOML, with numbers for places in lists (``recording.tilt_deg``, ``indenters.0.radius_mm``), or one of three that
 change the whole motion of the [recording]: ``force_n`` scales all forces to this greatest one, N; ``x_mm`` and ``z_mm``
-move all points, so that the one of greatest force lies there. ``engine.recipes`` says how jobs call this."""
+move all points, so that the one of greatest force lies there. ``engine.job`` says how jobs call this."""
 
 from __future__ import annotations
 
@@ -30,9 +30,8 @@ from ..simulation.scene_recording import DEFAULT, check_places, recording_of
 from .engine import job as jobs
 from .engine import run as runs
 from .engine.inputs import load_scene_of, read_scene
-from .engine.job import Job
+from .engine.job import InputFacts, Job, Simulate
 from .engine.local import InProcess
-from .engine.recipes import InputFacts, Simulate
 from .engine.run import Place, Progress
 
 MOST = 100_000  # combinations (assumed to be more than anyone simulates)

@@ -27,7 +27,7 @@ from .convert import ToolOptions
 from .drawer import describe_gel
 from .engine import job as jobs
 from .engine.inputs import unit_hash
-from .engine.recipes import MAX_SHARD_FRAMES, InputFacts, Translate
+from .engine.job import MAX_SHARD_FRAMES, InputFacts, Translate
 from .frame_pass import FramePass, Tools
 from .prepared_signals import Prepared
 from .results import TRANSLATED

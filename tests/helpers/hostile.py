@@ -24,7 +24,7 @@ from tactile_core.errors import TactileError
 from tactile_core.files import checksummed, exr_file
 from tactile_core.geometry.indenters import mesh_file
 from tactile_core.jobs import gel_frames, prepared_signals
-from tactile_core.jobs.engine import dask_cluster, inputs, recipes
+from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.live import Growing
 from tactile_core.pictures import background
@@ -131,7 +131,7 @@ def good_others(folder: Path) -> dict[str, tuple[bytes, Loader]]:
               "b": {"dtype": "F16", "shape": [4], "data_offsets": [16, 24]}}  # fmt: skip
     text = json.dumps(header).encode()
     safetensors = struct.pack("<Q", len(text)) + text + bytes(24)
-    job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], recipes.Translate(["latent"], "0" * 64), None)
+    job = jobs.make([jobs.Input("00000_a", "/a", "0" * 64, 1)], jobs.Translate(["latent"], "0" * 64), None)
     (folder / "job").mkdir()
     jobs.write(folder / "job", job)
     unit = electrode_gains.ElectrodeGains("made up", [1.0] * 19, [0.0] * 19)

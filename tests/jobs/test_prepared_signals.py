@@ -11,7 +11,7 @@ from conftest import write_counts
 
 from tactile_core import recordings
 from tactile_core.jobs import prepared_signals
-from tactile_core.jobs.engine import inputs, recipes
+from tactile_core.jobs.engine import inputs
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, chunks, polarity
 from tactile_core.recordings.electrode_gains import ElectrodeGains, units_file
@@ -36,7 +36,7 @@ def write(tmp_path):
 
 def prepared(path, **words):
     """Change (T, 19), PDC (T,) and flags (T,) of all parts, how many there were, and their films."""
-    recipe = recipes.Translate(["latent"], "0" * 64, prepare=recipes.Prepare(**words))
+    recipe = jobs.Translate(["latent"], "0" * 64, prepare=jobs.Prepare(**words))
     parts = list(prepared_signals._signals(str(path), SimpleNamespace(recipe=recipe)))
     arrays = [
         np.concatenate([getattr(signals, name)[repeated:] for _, signals, repeated in parts])
@@ -64,7 +64,7 @@ def test_parts_have_one_rest_one_pressure_and_one_polarity(sign, words, write, m
 
 def test_shards_know_the_unit_s_film_and_stiffness(write, tmp_path):
     unit = ElectrodeGains("made up", [1.0] * 19, [0.0] * 19, [3300.0] * 19, film=0.5, stiffness=2.0)
-    recipe = recipes.Translate(["latent"], "0" * 64, sensor=units_file({"unit": unit}))
+    recipe = jobs.Translate(["latent"], "0" * 64, sensor=units_file({"unit": unit}))
     job = jobs.make(inputs.hashed([Path(write(1))], lambda done, total: None), recipe, None)
     (tmp_path / "job" / jobs.PREPARED).mkdir(parents=True)
     prepared_signals.make(tmp_path / "job", job, 0)

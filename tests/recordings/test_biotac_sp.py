@@ -12,7 +12,7 @@ from tactile_core import recordings
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs import convert, prepared_signals, translate_shards
-from tactile_core.jobs.engine import inputs, recipes
+from tactile_core.jobs.engine import inputs
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.recordings import PrepareOptions, electrode_gains, info
 from tactile_core.recordings.preparer import Preparer
@@ -215,7 +215,7 @@ def test_tools_of_it_convert_its_recordings_alone(counts, write, press, in_layou
 def test_a_job_and_a_live_view_take_its_recordings(counts, write, tmp_path, monkeypatch, capsys):
     tools = fake_tools.tools("biotac_sp")
     slip = written(write, SLIP, [*counts[:1]] * 40 + [*(counts[:10] - 200)])
-    recipe = recipes.Translate(["displacement"], "0" * 64, source="biotac_sp")
+    recipe = jobs.Translate(["displacement"], "0" * 64, source="biotac_sp")
     job = jobs.make(inputs.hashed([Path(slip)], lambda done, total: None), recipe, None)
     jobs.write(tmp_path / "job", job)
     for folder in (jobs.PREPARED, jobs.SHARDS):

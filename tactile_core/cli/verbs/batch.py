@@ -13,8 +13,7 @@ from . import engine
 from .common import ANSWER, PREPARE, PRESETS, RESUMES, UNIT, add, prepare_words
 
 if TYPE_CHECKING:
-    from ...jobs.engine.job import Job
-    from ...jobs.engine.recipes import Translate
+    from ...jobs.engine.job import Job, Translate
 
 BRIEF = "translate many recordings, resumable, on one machine or many"
 TEXT = """\
@@ -100,7 +99,7 @@ def run(options: argparse.Namespace) -> int:
 def _say_cost(job: Job) -> None:
     """Print what 1,000 frames of a translation job take on one core, in time, memory and disk; reads no input."""
     from ...jobs import plan
-    from ...jobs.engine.recipes import Translate
+    from ...jobs.engine.job import Translate
     from ...jobs.results import TRANSLATED
 
     if isinstance(job.recipe, Translate):
@@ -124,7 +123,7 @@ def _say_warnings(folder: Path) -> None:
 
 def _following(folder: Path, job: Job, part: tuple[int, int] | None) -> str:
     """Return what to do next, in words, after a job or one part of it has ended without a failure."""
-    from ...jobs.engine.recipes import Translate
+    from ...jobs.engine.job import Translate
 
     ours, name = isinstance(job.recipe, Translate), quote(str(folder))
     if part is not None:
@@ -164,7 +163,7 @@ def _job(folder: Path, options: argparse.Namespace) -> Job:
 def _recipe(options: argparse.Namespace, paths: list[Path]) -> Translate:
     """Return the recipe by which the options translate the recordings of these paths."""
     from ...jobs import results, translate_shards
-    from ...jobs.engine.recipes import SHARD_FRAMES, Prepare, Translate
+    from ...jobs.engine.job import SHARD_FRAMES, Prepare, Translate
     from ...recordings import electrode_gains
     from ...translation.answer import parse_answer
 

@@ -26,7 +26,7 @@ from .. import export, translate_shards
 from ..engine import inputs
 from ..engine import job as jobs
 from ..engine import run as runs
-from ..engine.recipes import Translate
+from ..engine.job import Translate
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
 from . import dataset_card, summary, survival

@@ -18,7 +18,7 @@ from ...files.outside import read_toml_text, toml_quoted
 from ...files.shipped import shipped
 from ...sensors import SOURCE
 from ..engine import inputs
-from ..engine.recipes import Prepare
+from ..engine.job import Prepare
 from ..export.formats.imagefolder import NUMBERS
 
 FORMAT = "tactile-dataset-1"

@@ -16,7 +16,6 @@ from ...errors import TactileError
 from ...files import atomic, checksummed
 from ...files.outside import read_small
 from . import job as jobs
-from . import recipes
 from .job import Job
 
 FORMAT = "tactile-batch-1"
@@ -48,7 +47,7 @@ def status(folder: Path, job: Job) -> Status:
     found = Status(len(job.inputs), aside=_aside(folder))
     there = {path.name for path in (folder / jobs.SHARDS).glob("*.h5")}
     for index, one in enumerate(job.inputs):
-        seen = recipes.module_for(job.recipe).inspect_input(folder, job, index)
+        seen = jobs.module_for(job.recipe).inspect_input(folder, job, index)
         if seen is None:
             continue
         names = [jobs.shard_file(folder, one.name, number).name for number in range(seen.shards)]
@@ -125,11 +124,11 @@ def write(folder: Path, job: Job) -> None:
 
 def _recording(folder: Path, job: Job, index: int) -> dict[str, Any]:
     one = job.inputs[index]
-    seen = recipes.module_for(job.recipe).inspect_input(folder, job, index) or recipes.InputFacts(0)
+    seen = jobs.module_for(job.recipe).inspect_input(folder, job, index) or jobs.InputFacts(0)
     try:
         warnings = list(seen.warnings())
     except TactileError:  # its prepared file is damaged: the next run makes it again
-        seen, warnings = recipes.InputFacts(0), []
+        seen, warnings = jobs.InputFacts(0), []
     listed: dict[str, Any] = {"name": one.name, "sha256": one.sha256, "frames": seen.frames, "shards": []}
     for number in range(seen.shards):
         path = jobs.shard_file(folder, one.name, number)

@@ -15,7 +15,7 @@ from typing import Protocol, Self
 from ...errors import TactileError
 from ...files import atomic, lock
 from . import job as jobs
-from . import manifest, recipes, tasks
+from . import manifest, tasks
 from .job import Job
 from .tasks import Failure, Reply, Task
 
@@ -116,7 +116,7 @@ class _Work:
         self._folder, self._job = folder, job
         self._part, self._parts = part or (0, 1)
         self.done, self.known, self.finished = Outcome(), 0, 0
-        self._grows = getattr(recipes.module_for(job.recipe), "GROWS", False)
+        self._grows = getattr(jobs.module_for(job.recipe), "GROWS", False)
         self._asked, self._open = Counter[int](), Counter[int]()  # shards of each input: so far, and not done of them
 
     def awaited(self) -> int:

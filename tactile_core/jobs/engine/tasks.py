@@ -11,7 +11,7 @@ import msgspec
 from ...errors import TactileError
 from ...files.threads import one_thread
 from . import job as jobs
-from . import manifest, recipes
+from . import manifest
 
 _one_thread_once = functools.cache(one_thread)
 
@@ -76,7 +76,7 @@ def _run(folder: Path, task: Task) -> Reply:
     except TactileError as error:
         return Reply(failure=Failure.from_error(error))
     try:
-        kind = recipes.module_for(job.recipe)
+        kind = jobs.module_for(job.recipe)
         if task.shard is None:
             shards, made = kind.prepare_input(folder, job, task.recording)
             return Reply(made=made, shards=shards)

@@ -18,7 +18,7 @@ from ...sensors import PAIR
 from .. import translate_shards
 from ..engine import job as jobs
 from ..engine import manifest
-from ..engine.recipes import Translate
+from ..engine.job import Translate
 from ..frames_file import arrays_of, kept, named
 from ..prepared_signals import Prepared
 

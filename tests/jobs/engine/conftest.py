@@ -13,7 +13,7 @@ import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.jobs import convert
-from tactile_core.jobs.engine import inputs, local, recipes
+from tactile_core.jobs.engine import inputs, local
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 
@@ -49,7 +49,7 @@ def new_job(recordings, tmp_path):
 
 
 def job_of(recordings: list[Path], folder: Path, keep=("latent",)) -> tuple[Path, jobs.Job]:
-    recipe = recipes.Translate(list(keep), "0" * 64, shard_frames=50)
+    recipe = jobs.Translate(list(keep), "0" * 64, shard_frames=50)
     job = jobs.make(inputs.hashed(recordings, lambda done, total: None), recipe, None)
     jobs.write(folder, job)
     return folder, job

@@ -10,7 +10,7 @@ import pytest
 
 from tactile_core.errors import TactileError
 from tactile_core.jobs import pairs
-from tactile_core.jobs.engine import inputs, local, manifest, recipes
+from tactile_core.jobs.engine import inputs, local, manifest
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.tasks import Task
@@ -114,7 +114,7 @@ def test_only_a_jobs_own_leftovers_are_cleared(tmp_path):
 
 def test_a_conflicted_copy_is_no_block_of_pairs(tmp_path):
     made = inputs.Input("00000_presses", "/a", "0" * 64, 1)
-    job = jobs.make([made], recipes.Pairs(10, 0, [], []), None)
+    job = jobs.make([made], jobs.Pairs(10, 0, [], []), None)
     (tmp_path / jobs.SHARDS).mkdir()
     (tmp_path / jobs.SHARDS / "00000_presses-000000 (conflicted copy).h5").write_bytes(b"")
     assert pairs.inspect_input(tmp_path, job, 0) is None

@@ -15,7 +15,7 @@ import pytest
 from conftest import ROOT
 from one_node_slurm import wait
 
-from tactile_core.jobs.engine import inputs, local, recipes
+from tactile_core.jobs.engine import inputs, local
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 from tactile_core.jobs.engine.dask_cluster import Cluster
@@ -25,7 +25,7 @@ from tactile_core.translation import translate
 @pytest.fixture(scope="module")
 def calm(shared_recordings, tmp_path_factory):
     """A job by one local process, and how to begin it again in another folder."""
-    recipe = recipes.Translate(["latent"], translate.load_translator().sha256, shard_frames=50)
+    recipe = jobs.Translate(["latent"], translate.load_translator().sha256, shard_frames=50)
 
     def begin(folder):
         job = jobs.make(inputs.hashed(shared_recordings, lambda done, total: None), recipe, None)

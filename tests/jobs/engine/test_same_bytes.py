@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from tactile_core.jobs.engine import inputs, recipes
+from tactile_core.jobs.engine import inputs
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.translation.translate import load_translator
 
@@ -40,7 +40,7 @@ def by_workers(shared_recordings, tmp_path_factory):
 
 
 def run_by(place, recordings, folder):
-    recipe = recipes.Translate(["latent", "displacement"], load_translator().sha256, shard_frames=50)
+    recipe = jobs.Translate(["latent", "displacement"], load_translator().sha256, shard_frames=50)
     jobs.write(folder, jobs.make(inputs.hashed(recordings, lambda done, total: None), recipe, None))
     # Two threads, in kernels whose sums are seen to differ by that; those of AVX-512 are the same for this job.
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "OPENBLAS_CORETYPE": "Haswell"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tactile_core.jobs.engine import inputs, local, recipes
+from tactile_core.jobs.engine import inputs, local
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.engine import run as runs
 
@@ -25,7 +25,7 @@ def job(tmp_path_factory):
         noise = np.random.default_rng(frames).normal(0, 1, (frames, 19))
         paths.append(folder.parent / f"{name}.npz")
         np.savez(paths[-1], electrodes=np.rint(3000 + press + noise), time=np.arange(frames) / 100)
-    recipe = recipes.Translate(["latent", "height", "image"], "0" * 64, shard_frames=40)
+    recipe = jobs.Translate(["latent", "height", "image"], "0" * 64, shard_frames=40)
     made = jobs.make(inputs.hashed(paths, lambda done, total: None), recipe, None)
     jobs.write(folder, made)
     with runs.opened(folder, None):
