@@ -74,7 +74,7 @@ class TACTILE_OT_translate(JobOperator):
                 self._moved = mesh_cache.in_memory(stored["displacement"], self._target)
                 self._flags |= stored["flags"]
             self._error = np.full(len(self._flags), curves.UNKNOWN)
-            from ...tactile_core.jobs.drawer import describe_gel
+            from ...tactile_core.jobs.frame_pass import describe_gel
 
             for words in describe_gel(self._target, self._found.translator.target):
                 self.report({"WARNING"}, words)

@@ -1,9 +1,13 @@
-"""Describe where a result comes from: hashes of its input files, versions of libraries, the machine."""
+"""Describe where a result comes from (hashes of inputs, versions of libraries, the machine), and how long it took."""
 
 from __future__ import annotations
 
 import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from . import outside
 from .version import __version__
@@ -52,3 +56,30 @@ def _processor() -> str:
     except OSError:
         return platform.processor()
     return next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+class Stopwatch:
+    """Sums, by the stage's name, of wall time (`seconds`) and of this process's CPU time (`cpu_seconds`), in s."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.cpu_seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Add the time that the block takes to the stage ``name``."""
+        start, cpu_start = time.perf_counter(), time.process_time()
+        try:
+            yield
+        finally:
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            self.cpu_seconds[name] = self.cpu_seconds.get(name, 0.0) + time.process_time() - cpu_start
+
+    def timings(self, frames: int) -> dict[str, Any]:
+        """Return, for timings.json, ms a frame by the wall clock and of CPU, by stage and in all, and the machine.
+        frames : their number"""
+        found: dict[str, Any] = {"frames": frames, "machine": machine()}
+        for name, seconds in (("ms_a_frame", self.seconds), ("cpu_ms_a_frame", self.cpu_seconds)):
+            stages = seconds | {"all": sum(seconds.values())}
+            found[name] = {stage: round(1e3 * each / frames, 4) for stage, each in stages.items()}
+        return found

@@ -19,8 +19,7 @@ from ..sensors import title
 from ..translation.card import doubt
 from ..translation.simulated_likeness import contradicted
 from ..translation.trust_words import DENIED, FIRM, LOW_CONFIDENCE, SENTENCES, TOO_FIRM
-from .drawer import describe_gel
-from .frame_pass import FramePass, Tools
+from .frame_pass import FramePass, Tools, describe_gel
 from .frames_file import described
 from .sheet_figure import FRAMES, SheetFigure, scale
 

@@ -16,7 +16,7 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.hdf5_writer import new_hdf5
 from ..files.png_writer import pack_png
-from ..files.stopwatch import Stopwatch
+from ..files.provenance import Stopwatch
 from ..pictures.presets import FAST
 from ..recordings import PrepareOptions, Recording, labels
 from ..sensors import SOURCE, TARGET
@@ -25,8 +25,7 @@ from ..translation.translate import CHUNK, PreparedRows, load_translator
 from ..translation.translator import Translator
 from . import results
 from .conversion_report import ConversionReport
-from .drawer import load_drawer
-from .frame_pass import FramePass, Tools
+from .frame_pass import FramePass, Tools, load_drawer
 from .gel_frames import read_displacement
 from .results import SOLVED, TRANSLATED, ball_radius, frames_text, select
 
@@ -143,8 +142,7 @@ def convert(
                 report.draw_sheet(unfinished / results.SHEET)
             origin = note(rows, frames, report, options, tools)
             atomic.write_json(unfinished / results.NOTE, origin)
-            timings = {**clock.per_frame(len(frames)), "frames": len(frames), "machine": provenance.machine()}
-            atomic.write_json(unfinished / results.TIMINGS, timings)
+            atomic.write_json(unfinished / results.TIMINGS, clock.timings(len(frames)))
     except OSError as error:
         file = f"{os.path.basename(error.filename)} " if isinstance(error.filename, str) else ""
         found = f"{file}cannot be written ({error.strerror or error})"

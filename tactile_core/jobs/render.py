@@ -21,7 +21,7 @@ from ..errors import TactileError
 from ..files import atomic, provenance
 from ..files.exr_file import write_exr
 from ..files.png_writer import write_png
-from ..files.stopwatch import Stopwatch
+from ..files.provenance import Stopwatch
 from ..pictures.height_map import gel_mapper, of_unit
 from ..pictures.mitsuba.scene_file import camera_planes, scene_files, write_scene
 from ..pictures.mitsuba.variant import fitting
@@ -106,8 +106,7 @@ def render(
             shown(done, len(rows))
         note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
         atomic.write_json(folder / results.NOTE, note)
-        timings = {**clock.per_frame(len(rows)), "frames": len(rows), "machine": provenance.machine()}
-        atomic.write_json(folder / results.TIMINGS, timings)
+        atomic.write_json(folder / results.TIMINGS, clock.timings(len(rows)))
     return out
 
 

@@ -24,11 +24,10 @@ from ..recordings import readers
 from ..sensors.calibration_file import load_calibration
 from . import convert, prepared_signals
 from .convert import ToolOptions
-from .drawer import describe_gel
 from .engine import job as jobs
 from .engine.inputs import unit_hash
 from .engine.job import MAX_SHARD_FRAMES, InputFacts, Translate
-from .frame_pass import FramePass, Tools
+from .frame_pass import FramePass, Tools, describe_gel
 from .prepared_signals import Prepared
 from .results import TRANSLATED
 

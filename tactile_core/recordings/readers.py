@@ -23,13 +23,13 @@ from .formats import MAP_ADVICE
 from .opened_file import opened, refuse_finger
 from .recording import Chosen, Recording, named, split
 from .tables.array_table import labels_in
+from .tables.cells import NUMBERED
 from .tables.column_map import ColumnMap, refuse_bag
 from .tables.column_map import read as read_map
 from .tables.json_table import read_json
 from .tables.map_guess import is_time
 from .tables.mapped import open_store, read_by_map, read_mapped
 from .tables.table import Table, read_header, read_table
-from .tables.table_header import NUMBERED
 
 RECOGNISED = 0.5  # share of a layout's own columns that a file must hold; the missing ones are then named (assumed)
 PAC = re.compile(r"pac\d+")

@@ -14,8 +14,7 @@ import time
 import numpy as np
 
 from tactile_core import sensors
-from tactile_core.jobs.drawer import Drawer
-from tactile_core.jobs.frame_pass import Tools
+from tactile_core.jobs.frame_pass import Drawer, Tools
 from tactile_core.recordings import Signals
 from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration

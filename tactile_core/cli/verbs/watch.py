@@ -70,7 +70,7 @@ def run(options: argparse.Namespace) -> int:
     """Show the newest frames until the recording ends, the window is closed, or Ctrl-C; returns the exit status."""
     one_thread()  # before numpy is imported
     from ...jobs import convert, live
-    from ...jobs.drawer import describe_gel
+    from ...jobs.frame_pass import describe_gel
     from ...recordings import PrepareOptions
     from ...recordings.opened_file import container_of
     from ...recordings.readers import sensor_of_first

@@ -29,7 +29,7 @@ from ..engine import run as runs
 from ..engine.job import Translate
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
-from . import dataset_card, summary, survival
+from . import dataset_card, survival
 from .collected import TEST, TRAIN, Collected, File, beside, calibrated, collect, file_name, readable
 from .recipe import FORCE, Recipe
 
@@ -86,7 +86,7 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
     for layout in asked.layouts:
         _export(source, layout, out / layout, asked)
     with asked.bar("summary", "recording") as shown:
-        summaries = summary.summarise(source, [*recipe.tasks, recipe.split.kept], shown)
+        summaries = survival.summarise(source, [*recipe.tasks, recipe.split.kept], shown)
     for task in recipe.tasks:
         if not any(task in one.told for one in summaries):
             asked.say(f"warning: no recording has the label {task!r}, which the recipe's tasks name")
@@ -225,7 +225,7 @@ def _export(source: Finished, layout: str, out: Path, asked: Asked) -> None:
 
 
 def _write_words(
-    recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[summary.Summary], out: Path,
+    recipe: Recipe, named: str, found: Collected, source: Finished, summaries: list[survival.Summary], out: Path,
     asked: Asked,
 ) -> None:  # fmt: skip
     """Write card, page and report; how much of the labels survives is measured if scikit-learn is installed.

@@ -19,8 +19,7 @@ from ..export.finished_job import Finished
 from . import survival
 from .collected import Collected
 from .recipe import SHIPPED, Recipe
-from .summary import RAW, Summary
-from .survival import Row
+from .survival import RAW, Row, Summary
 
 MOST_WARNINGS, MOST_VALUES = 8, 12
 NUMBER = re.compile(r"[\d.,]+|\bE\d+")  # by which warnings of one kind differ

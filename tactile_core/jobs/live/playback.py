@@ -16,9 +16,9 @@ from ...recordings.assemble import MAX_BAD_SHARE, BadRows
 from ...recordings.chunks import read_parts
 from ...recordings.readers import table_reader
 from ...recordings.recording import Recording, split
+from ...recordings.tables.cells import Header
 from ...recordings.tables.column_map import ColumnMap
 from ...recordings.tables.table import read_lines, text_lines
-from ...recordings.tables.table_header import Header
 from ...sensors import SOURCE
 from .digit_camera import DigitCamera
 from .live_view import Shown, View

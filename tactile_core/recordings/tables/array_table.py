@@ -14,9 +14,8 @@ from ...sensors import ELECTRODES
 from ..array_store import Store
 from ..assemble import MAX_FRAMES
 from ..labels import labels_of
-from .cells import LABEL
+from .cells import LABEL, MAX_COLUMNS
 from .table import Table
-from .table_header import MAX_COLUMNS
 
 INDEX = re.compile(r"(.*?)((?:\[\d+\])*)$", re.DOTALL)
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES
-from .cells import LABEL, LOOKED_AT, Cells, number
+from .cells import LABEL, LOOKED_AT, MAX_COLUMNS, Cells, number
 from .table import Table
-from .table_header import MAX_COLUMNS
 
 MAX_JSON = 64 * 2**20  # bytes: twelve minutes of the widest records, in half a GB of memory (assumed enough)
 BETWEEN = " \t\r\n,"

@@ -10,8 +10,7 @@ import numpy as np
 
 from ...files.short_text import shown
 from ..assemble import Problem
-from .cells import Cells, number
-from .table_header import COMMENTS, SPACE, Header, split
+from .cells import COMMENTS, SPACE, Cells, Header, number, split
 
 LARGEST = 1e300  # of a number that a cell may hold, so that sums of several are finite
 THOUSANDS = re.compile(r"[-+]?\d{1,3}(?:([,.'’_\s])\d{3})(?:\1\d{3})*(?:[.,]\d+)?")

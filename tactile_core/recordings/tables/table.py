@@ -13,9 +13,8 @@ import numpy as np
 from ...errors import TactileError
 from ..assemble import MAX_FRAMES, MAX_PROBLEMS, Problem
 from ..labels import labels_of
-from .cells import LABEL, MISSING, Words, unquoted
+from .cells import LABEL, MISSING, Header, Words, unquoted
 from .rows import clean, doubt_last_cell, is_row, no_number, row, tell_blank_lines
-from .table_header import Header
 
 MAX_BYTES = 512 * 2**20  # of text, about 7 hours of the widest layout; bounds memory (assumed enough)
 MAX_LINE = 2**20  # bytes; the widest layout has 500 per line (assumed enough)

@@ -18,8 +18,7 @@ from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
 from tactile_core.jobs.dataset import collected, survival
 from tactile_core.jobs.dataset import recipe as recipes
-from tactile_core.jobs.dataset.summary import ARRAYS, PICTURE, RAW, Summary
-from tactile_core.jobs.dataset.survival import ALWAYS, rows
+from tactile_core.jobs.dataset.survival import ALWAYS, ARRAYS, PICTURE, RAW, Summary, rows
 from tactile_core.jobs.export.finished_job import Recorded
 
 DATA = Path(os.environ.get("TACTILE_TEST_DATA", Path(__file__).parents[4] / "shared" / "data"))
