@@ -185,11 +185,14 @@ class Translator:
         flags[two_contacts(shares) | np.isfinite(beside.center[:, 0])] |= np.uint16(Flag.TWO_CONTACTS)
         undecided = touched & (elsewhere(evidence, state, nets.frames["MVD"]) > UNDECIDED)
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
+        # The error foretold is that of the frame alone: where that answers no contact, a tracked one may be all wrong.
+        held = touched & ~touches(evidence.likely)
+        least = held[:, None] * np.stack([accuracy.lengths(each).max(axis=1) for each in (skin, gel)], -1)
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
             confidence=confidence, flags=flags, explained=explained, second_center=beside.center,
-            second_force=beside.force, **self._errors(change, rectified, center[:, 0]),
+            second_force=beside.force, **self._errors(change, rectified, center[:, 0], least),
         )  # fmt: skip
 
     def _mounted(self, gel: np.ndarray) -> np.ndarray:
@@ -227,10 +230,13 @@ class Translator:
         """Return what 99 % of frames of noise stay below, by the card; quantity : biotac_m, digit_m or force_N of it"""
         return silent_level(self.card["silence"], quantity)
 
-    def _errors(self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
-        """Return expected largest errors and their bounds, by `Translation`'s names, for change (T, e), rectified (T,)
-        bool. x : (T,) m, of the contact along the finger, NaN without contact"""
-        expected, found = self.nets.expected_error(change, rectified), {}
+    def _errors(
+        self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray, least: np.ndarray
+    ) -> dict[str, np.ndarray]:
+        """Return expected largest errors, at least ``least`` (T, 2) m, and their bounds, by `Translation`'s names.
+        change : (T, e) counts; rectified : (T,) bool; x : (T,) m, of the contact along the finger, NaN without contact
+        """
+        expected, found = np.maximum(self.nets.expected_error(change, rectified), least), {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
             found[f"expected_error_{name}"] = expected[:, index]

@@ -101,6 +101,18 @@ def test_confidence_is_high_where_trained_and_low_elsewhere(translator, shipped,
     assert translator(restless).confidence.max() <= np.float32(UNTRAINED_CONFIDENCE)
 
 
+def test_a_contact_that_is_tracked_through_silence_may_be_all_wrong(translator, shipped, signals, translation):
+    """The networks' error is that of their own answer, no contact."""
+    rows, deepest = np.flatnonzero(signals.quiet)[:3], np.linalg.norm(shipped.truth.force, axis=1).argmax()
+    here = signals.at(rows)
+    state = np.tile(translator.encode(signals.at(np.array([deepest]))).likely, (len(rows), 1))
+    held = translator(here, state)
+    for name in ("biotac", "digit"):
+        dent = accuracy.lengths(getattr(held, f"displacement_{name}")).max(axis=1)
+        assert (dent > 1e-4).all() and (getattr(held, f"expected_error_{name}") >= dent).all()
+        assert (getattr(translation, f"expected_error_{name}")[rows] < 0.5 * dent).all()
+
+
 def test_confidence_has_the_order_of_what_is_explained(translator, shipped, signals):
     gains = np.random.default_rng(0).uniform(0.7, 1.1, 19)
     odd = translator(dataclasses.replace(signals, change=gains * signals.change))
