@@ -21,7 +21,7 @@ import tactile_core as tactile
 from tactile_core.files.installed import advice
 from tactile_core.geometry.indenters import Pose
 from tactile_core.recordings import PrepareOptions
-from tactile_core.recordings.recording import Truth
+from tactile_core.recordings.recording import Recording, Truth
 
 ROOT = Path(__file__).parent.parent
 NO_PLACE = np.full((2, 2), np.nan)
@@ -183,6 +183,13 @@ def pulled():
     return np.where(np.arange(2867)[:, None] == 1400, [0, -0.2e-3, 0], 0)
 
 
+def spoilt(**fields):
+    """Return a recording of 60 still frames with other fields, as of one changed by hand."""
+    zeros = np.zeros(60, np.uint16)
+    still = Recording("touch", "touch", "", np.arange(60) / 100, 0.0, np.full((60, 19), 3000.0), zeros, zeros)
+    return dataclasses.replace(still, **fields)
+
+
 def from_behind():
     """Return a pose whose push goes out of the gel."""
     return Pose(np.array([-6e-3, 0, 0]), np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([0, -1.0, 0]))
@@ -217,6 +224,9 @@ BALL, PLACE = tactile.indenters.Sphere(3e-3), tactile.Placement(x=-6e-3, z=0.0)
         (lambda: tactile.Renderer(preset="fast").picture(np.zeros((320, 240, 3)), 1), "noise: 1; expected a generator"),
         (lambda: tactile.Renderer(preset="fast").render(np.ma.masked_less(pulled(), 0)), "displacement: masked values"),
         (lambda: tactile.solve("digit", BALL, from_behind(), depth=1e-4), "solve, place: .* from inside the sensor"),
+        (lambda: tactile.translate(spoilt(electrodes=None)), "electrodes: a NoneType; expected a plain numpy array"),
+        (lambda: tactile.translate(spoilt(about=None)), "about: a NoneType; expected"),
+        (lambda: tactile.translate(spoilt(warnings=None)), "warnings: a NoneType; expected"),
         (lambda: PrepareOptions(repair="no").check(), "option repair: 'no'; expected True or False"),
     ],
 )  # fmt: skip

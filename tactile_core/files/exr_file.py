@@ -15,13 +15,17 @@ HEIGHT_CHANNELS = ("height", "Y", "Z", "R")  # where a height map of others is l
 
 
 def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about: Mapping[str, str]) -> None:
-    """Write channels, name -> (H, W), as float32, whole or not at all; about : name -> text, the attributes"""
+    """Write channels, name -> (H, W), as float32, whole or not at all; about : name -> text, the attributes
+    Raises OSError for a disk that refuses."""
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **about}
     planes = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
     with atomic.new_file(path) as partial, OpenEXR.File(header, planes) as file:
-        file.write(os.fspath(partial))
+        try:
+            file.write(os.fspath(partial))
+        except RuntimeError as error:  # what the library raises for a full disk
+            raise OSError(str(error)) from error
 
 
 def read_exr(path: str | os.PathLike) -> tuple[dict[str, np.ndarray], dict[str, str]]:

@@ -123,7 +123,10 @@ class Recording(Summary):
         return replace(self, **rows, labels=labels, truth=None if self.truth is None else self.truth.at(frames))
 
     def check(self) -> None:
-        """Raise TactileError for arrays that do not fit each other, as of a recording that was changed by hand."""
+        """Raise TactileError for fields that do not fit each other, as of a recording that was changed by hand."""
+        for name, kind in (("warnings", tuple | list), ("about", dict)):
+            if not isinstance(value := getattr(self, name), kind):
+                raise TactileError(f"{self.path}, {name}", f"a {type(value).__name__}", f"{kind}", "Leave it empty")
         for name, axes in {"electrodes": 2, "time": 1, "rows": 1, "flags": 1, "pdc": 1}.items():
             value = getattr(self, name)
             if value is None and name == "pdc":

@@ -22,11 +22,13 @@ from ..errors import TactileError
 from ..files import provenance
 from ..recordings import prepare, read
 from ..recordings.flags import Flag
+from ..recordings.force_file import check_newtons
 from ..sensors import unrolling
 from ..simulation.pairs_file import Split, split_presses
 from ..translation import networks, reference_signals
 from ..translation.card import PLACE, STATE
 from ..translation.contact_frame import ContactFrame
+from ..translation.force_scale import check_scale
 from ..translation.gel_place import on_gel, place_on
 from ..translation.layers import COMPRESSED_LIMIT
 from ..translation.networks import Networks
@@ -67,7 +69,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
 
     Places are assumed in SynTouch's frame of the electrodes (docs/sources.md), in m or mm by their size, and are
     unrolled onto the gel; of forces only the magnitude is used, whatever their frame. seed : of the split into presses
-    Raises TactileError for no labels, places that are not on the skin, or too few contacts."""
+    Raises TactileError for no labels, places that are not on the skin, forces that are not N, or too few contacts."""
     recording = read(path)
     position, forces = recording.position, recording.force
     if position is None or forces is None:
@@ -92,6 +94,7 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
         raise TactileError(path, found, f"at least {FEWEST}", "Give a longer recording")
     change = signals.typical[used].astype(np.float32)
     rectified = signals.kind == "rectified"
+    check_newtons(f"{os.fspath(path)}, force_vec", force[used])
     split = split_presses(_presses(used), seed, path)
     labels = place.astype(np.float32), force[used].astype(np.float32)
     return LabelledRecording(np.abs(change) if rectified else change, rectified, *labels, split, tuple(dropped))
@@ -102,7 +105,7 @@ def _places(position: np.ndarray, frame: ContactFrame, path: str | os.PathLike) 
     off the pad. position : (F, 3), in SynTouch's frame, m or mm; path : of the file, for errors"""
     if not len(position):
         return np.zeros((0, 2)), np.zeros(0, bool)
-    metres = position if np.abs(position).max() < METRES_BELOW else 1e-3 * position
+    metres = position if np.median(accuracy.lengths(position)) < METRES_BELOW else 1e-3 * position
     rest, unrolled = sensors.biotac_surface().rest, unrolling.unrolled_nodes()
     points = sensors.from_maker(metres, sensors.SOURCE)
     nearest, gap = np.empty(len(points), int), np.empty(len(points))
@@ -155,6 +158,8 @@ def fine_tune(
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)
+    found = np.maximum(_answer(before, data)[1], FORCE_FLOOR)
+    check_scale(f"{os.fspath(path)}, force_vec", float(np.median(data.force / found)))
     typical = reference_signals.read(source).typical.astype(np.float32)
     with prepared_folder(Path(out_folder), overwrite):
         net = "R2MPN" if data.rectified else "S2MPN"
@@ -232,18 +237,23 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     training presses' median. when : word in the rows' set, "before" or "after" the fine-tuning"""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
-    latent = nets.encode_signal(data.change[test], data.rectified)
-    state = nets.contact(latent, data.rectified)
+    state, load = (each[test] for each in _answer(nets, data))
     true, middle = on_gel(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
     miss, baseline = (accuracy.lengths(on_gel(frame, each) - true) for each in (state[:, :PLACE], middle))
-    estimated = nets.force_in(state, nets.given(latent, state, data.rectified))
-    load, usual = accuracy.lengths(estimated), np.median(data.force[train])
+    usual = np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [
         row("real_position_mm", 1e3 * float(np.median(miss)), "mm", baseline=1e3 * float(np.median(baseline)), of=of),
         row("real_force_percent", float(np.median(share)), "%", baseline=float(np.median(nothing)), of=of),
     ]
+
+
+def _answer(nets: Networks, data: LabelledRecording) -> tuple[np.ndarray, np.ndarray]:
+    """Return the states (F, STATE) and the sizes (F,) N of force that the networks find in the recording's frames."""
+    latent = nets.encode_signal(data.change, data.rectified)
+    state = nets.contact(latent, data.rectified)
+    return state, accuracy.lengths(nets.force_in(state, nets.given(latent, state, data.rectified)))
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:

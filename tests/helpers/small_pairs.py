@@ -63,7 +63,7 @@ def write_pairs(
             data.attrs["scale"] = scale
             file[f"depth_{name}"] = depth.astype(np.float32)
             file.attrs[f"{name}_nodes_sha256"] = "0" * 64
-        reals = {"signal": signal, "gap": gap, "force": force, "contact_center": center, "pressure": 1e4 * depth}
+        reals = {"signal": signal, "gap": gap, "force": force, "contact_center": center, "pressure": 1e6 * depth}
         for name, values in reals.items():
             file[name] = values.astype(np.float32)
         file["contact_patch_digit"] = gel[..., 1] > 0.5 * gel[..., 1].max(1, keepdims=True)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import shutil
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -151,6 +154,16 @@ def test_height_maps_come_as_exr_too(render, tmp_path, small, press):
         assert render(tmp_path / f"{number}.exr", out=f"out{number}")[0] == 0
         shown = picture(tmp_path / f"out{number}" / "images" / "00000.png")
         np.testing.assert_array_equal(shown, Renderer(small, "fast")(height))
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device stands for a full disk here")
+def test_a_disk_that_is_full_at_an_exr_is_said(render, heights, tmp_path, monkeypatch):
+    pytest.importorskip("OpenEXR", reason='OpenEXR is missing: pip install "tactile-core[render]"')
+    from tactile_core.files import exr_file
+
+    monkeypatch.setattr(exr_file, "atomic", SimpleNamespace(new_file=lambda path: nullcontext("/dev/full")))
+    status, _, said = render(heights, "--exr")
+    assert status == 2 and "No space left on device" in said and not (tmp_path / "out").exists()
 
 
 def test_the_note_says_how_and_equal_input_gives_equal_bytes(render, heights, tmp_path):

@@ -54,6 +54,11 @@ def replace(name, values, **attributes):
     return change
 
 
+def times(name, factor):
+    """A change of a file: a dataset in another unit, or of the other sign."""
+    return lambda file: file[name].write_direct((factor * file[name][:]).astype(file[name].dtype))
+
+
 def poison(file):
     file["signal"][4, 2] = np.nan
 
@@ -80,6 +85,12 @@ def poison(file):
         (replace("displacement_biotac", lambda file: file["displacement_digit"][:], scale=0.0), "scale 0.0"),
         (replace("force", np.zeros((15, 3), np.int32)), "force: dtype int32"),
         (poison, "signal, contact 4: NaN"),
+        (times("force", 1000), r"force: a median of .*; expected 0\.001 to 20 N"),
+        (times("pressure", 1e-3), "pressure: a median of .* Pa"),
+        (times("signal", 3.3 / 4096), "signal: a median of .* counts"),
+        (times("depth_biotac", 1000), "depth_biotac: a median of"),
+        (times("displacement_digit", -1), "displacement_digit: a median of .* inward"),
+        (times("displacement_biotac", 10), "displacement_biotac: a median of .* times the depth"),
         (lambda file: file.attrs.update(indenters="sphere"), "attribute indenters: Expecting value"),
         (lambda file: file.attrs.update(indenters="[" * 10_000), "a JSON list of names"),
         (lambda file: file.attrs.update(indenters='{"sphere": 0}'), "a JSON list of names"),

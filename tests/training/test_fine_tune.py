@@ -27,7 +27,7 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys):
     path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
     said = capsys.readouterr()
-    assert "real_force_percent" in said.out
+    assert "real_force_percent" in said.out and "warning: real_" not in said.err
     assert f"next: tactile convert touch.csv --out results --weights {tmp_path / 'tuned' / 'weights'}" in said.err
     before, after = networks.load(), networks.load(tmp_path / "tuned" / "weights")
     rows = {(row["name"], row["set"].rsplit(" ", 1)[1]): row for row in after.card["fine_tuned"]["errors"]}
@@ -83,6 +83,9 @@ def test_metres_read_as_millimetres(arrays, tmp_path):
         (lambda a: changed(a, contact_loc=a["contact_loc"] + 30), "off the skin"),
         (lambda a: changed(a, contact_loc=np.full_like(a["contact_loc"], np.nan)), "usable frames"),
         (lambda a: changed(a, force_vec=0 * a["force_vec"]), "usable frames"),
+        (lambda a: changed(a, force_vec=102 * a["force_vec"]), "cannot be a finger's force in newtons"),  # gf
+        (lambda a: changed(a, force_vec=0 * a["force_vec"] + 1), "cannot be a finger's force in newtons"),
+        (lambda a: changed(a, force_vec=0.102 * a["force_vec"]), r"0\.1\d* times the translated force"),  # kgf
         (lambda a: {name: values[:300] for name, values in a.items()}, "usable frames"),
     ],
 )
@@ -90,6 +93,18 @@ def test_refusals(arrays, tmp_path, spoil, said):
     with pytest.raises(TactileError, match=said):
         fine_tune(write_labelled(tmp_path / "labelled.hdf5", spoil(arrays)), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_labels_that_no_network_could_mean_are_doubted(arrays, tmp_path, capsys, monkeypatch):
+    """Places of the finger's other side are learnt as well as true ones; one wild place is no other unit."""
+    monkeypatch.setattr(fine_tuning, "EPOCHS", 1)
+    mirrored = 1e-3 * arrays["contact_loc"] * [1, -1, 1]  # m
+    mirrored[np.linalg.norm(arrays["force_vec"], axis=1).argmax()] = 0.9
+    path = write_labelled(tmp_path / "labelled.hdf5", changed(arrays, contact_loc=mirrored))
+    assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
+    said = capsys.readouterr().err
+    assert "warning: real_position_mm of kept presses, before is no better than always the same answer" in said
+    assert "left out: 1 contacts that are not on the pad" in said
 
 
 def test_options_that_do_not_fit(tmp_path, capsys):

@@ -63,6 +63,12 @@ def test_a_force_that_was_not_tared_is_refused():
         force_scale.fit(translated, lambda by: np.interp(TIME + by, TIME, translated + 1), "f.csv")
 
 
+def test_a_scale_that_pounds_would_have_is_doubted():
+    for unit, doubted in ((1.0, False), (0.2248, True), (3.6, True)):
+        found = force_scale.fit(FORCE, lambda by, unit=unit: unit * np.interp(TIME + by, TIME, FORCE), "f.csv")
+        assert ("is the force in newtons" in found.describe()) is doubted
+
+
 def test_force_and_pressure_are_scaled_and_signals_stay(shipped):
     translator = load_translator(answer=Answer(samples=3))
     signals = prepare(shipped).at(slice(60, 120))

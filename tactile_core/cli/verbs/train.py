@@ -94,6 +94,7 @@ def _fine_tune(options: argparse.Namespace) -> int:
         raise TactileError("--real", "none", "a recording with contact places and forces")
     from ...accuracy import HEADER, line
     from ...training.fine_tune import fine_tune
+    from ...translation.weights import read_card
 
     with bar("fine-tuning", "%", options.progress) as shown:
         rows = fine_tune(
@@ -106,6 +107,11 @@ def _fine_tune(options: argparse.Namespace) -> int:
         )
     for text in (HEADER, *map(line, rows)):
         tell(text)
+    for text in read_card(os.path.join(options.out, "weights"))[0]["fine_tuned"]["dropped"]:
+        say(f"left out: {text}")
+    for row in (row for row in rows if row["value"] >= row["baseline"]):
+        always = f"no better than always the same answer ({row['baseline']:g})"
+        say(f"warning: {row['name']} of {row['set']} is {always}: are the labels' units, frame and order right?")
     tell(options.out)
     next_step(_convert(options.out))
     return 0

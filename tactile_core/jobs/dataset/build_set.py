@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,6 +82,8 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
     parts = [part for part in parts if part[2].recordings]
     if not parts:
         raise TactileError(folder, "no recording that could be translated", "recordings", "See what was said above")
+    for line in _copies(parts):
+        asked.say(line)
     source = _joined(recipe, parts, aside, out)
     for layout in asked.layouts:
         _export(source, layout, out / layout, asked)
@@ -152,6 +154,19 @@ def _translated(
     if len(done.aside) == len(job.inputs):
         return Finished(place, job.id, (), {name: str(why) for name, why in done.aside.items()}, {})
     return finished_job.load(place)
+
+
+def _copies(parts: list[tuple[str, list[File], Finished]]) -> Iterator[str]:
+    """Yield warnings of files that hold the same bytes. parts : (unit, its files, its job)"""
+    alike: dict[str, dict[str, str]] = {}
+    for _, files, done in parts:
+        known = {str(file.path): f"{file.path} ({file.split})" for file in files}
+        for one in jobs.read(done.folder).inputs:
+            file = chosen(one.path).file
+            alike.setdefault(one.sha256, {})[file] = known[file]
+    for names in alike.values():
+        if len(names) > 1:
+            yield f"warning: {', '.join(names.values())} are one recording: take the copies out of the folder"
 
 
 def _joined(

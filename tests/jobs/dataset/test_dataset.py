@@ -10,13 +10,14 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tactile_core.cli.main import main
 from tactile_core.errors import TactileError
-from tactile_core.jobs.dataset import collected, survival
+from tactile_core.jobs.dataset import build_set, collected, survival
 from tactile_core.jobs.dataset import recipe as recipes
 from tactile_core.jobs.dataset.survival import ALWAYS, ARRAYS, PICTURE, RAW, Summary, rows
 from tactile_core.jobs.export.finished_job import Recorded
@@ -176,6 +177,17 @@ def test_a_guessed_recipe_finds_the_recordings_it_was_guessed_from(folder, tmp_p
     found = collected.collect(recipe, folder, tmp_path / "out")
     expected = {(name, str(session)) for name in OBJECTS for session in range(SESSIONS)}
     assert {tuple(file.labels.values()) for file in found.files if file.labels} == expected
+
+
+def test_a_recording_that_is_there_twice_is_told(monkeypatch):
+    """A copy in train of what is tested makes the test worthless; two fingers of one file are no copies."""
+    files = [collected.File(Path(f"/in/{part}.npz"), "", {}, part) for part in ("train", "test")]
+    hand, copy = [("test.npz#0", "y"), ("test.npz#1", "y")], [("test.npz", "x")]
+    said = "warning: /in/train.npz (train), /in/test.npz (test) are one recording: take the copies out of the folder"
+    for others, expected in ((hand, []), (copy, [said])):
+        listed = [SimpleNamespace(path=f"/in/{name}", sha256=sha) for name, sha in [("train.npz", "x"), *others]]
+        monkeypatch.setattr(build_set.jobs, "read", lambda folder, listed=listed: SimpleNamespace(inputs=listed))
+        assert list(build_set._copies([("", files, SimpleNamespace(folder=None))])) == expected
 
 
 def test_labels_that_differ_in_case_alone_are_named(recipe, tmp_path, capsys):
