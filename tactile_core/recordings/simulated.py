@@ -75,12 +75,16 @@ def write_simulated(
     packed = {"compression": "gzip", "compression_opts": 6, "shuffle": True, "track_times": False}
     room = atomic.writing(path, "room in a folder that can be written to", "")
     with room, atomic.new_file(path) as partial, new_hdf5(partial, attributes) as (file, _):
-        for name, values in (plain | steps | forces | tractions).items():
-            of_nodes = name in steps or name in tractions
-            chunks = (min(BLOCK, frames), *values.shape[1:]) if of_nodes else None
-            data = file.create_dataset(name, data=values, chunks=chunks, **packed)
-            if of_nodes:
-                data.attrs.update({"scale": SCALE} if name in steps else {"unit": "Pa"})
+        for name, values in plain.items():
+            file.create_dataset(name, data=values, **packed)
+        for name, values in steps.items():
+            data = file.create_dataset(name, data=values, chunks=(min(BLOCK, frames), *values.shape[1:]), **packed)
+            data.attrs["scale"] = SCALE
+        for name, values in forces.items():
+            file.create_dataset(name, data=values, **packed)
+        for name, values in tractions.items():
+            chunks = (min(BLOCK, frames), *values.shape[1:])
+            file.create_dataset(name, data=values, chunks=chunks, **packed).attrs["unit"] = "Pa"
     return path
 
 
