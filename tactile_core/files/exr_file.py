@@ -15,8 +15,7 @@ HEIGHT_CHANNELS = ("height", "Y", "Z", "R")  # where a height map of others is l
 
 
 def write_exr(path: str | os.PathLike, channels: Mapping[str, np.ndarray], about: Mapping[str, str]) -> None:
-    """Write channels, name -> (H, W), as float32, whole or not at all; about : name -> text, the attributes
-    Raises OSError for a disk that refuses."""
+    """Write channels, name -> (H, W), as float32, whole or not at all; about : name -> text, the attributes"""
     import OpenEXR
 
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **about}

@@ -43,13 +43,11 @@ DATASETS: dict[str, tuple[tuple[int | None, ...], str]] = {
     "press": ((), "i"),
     "indenter": ((), "i"),
 }
-# Smallest and largest median size that contacts of a fingertip can have, and its unit (assumed; single contacts of our
-# own reach 98 N); and of the dent over the body's travel, which is .88 on the gel and .80 on the skin.
+# Smallest and largest median size of a fingertip's contacts, and its unit (assumed; single ones of ours reach 98 N).
 SIZES = {
     "signal": (0.1, 2e3, "counts"), "force": (1e-3, 20.0, "N"), "pressure": (10.0, 1e6, "Pa"),
     "depth_biotac": (1e-5, 0.02, "m"), "depth_digit": (1e-5, 0.02, "m"),
 }  # fmt: skip
-DENT = 0.4, 2.5
 SCALED = ("displacement_biotac", "displacement_digit")
 SCALE = 1e-7  # m per unit of the int16 displacements: 0.1 um steps, up to 3.2 mm
 
@@ -139,7 +137,7 @@ def read_pairs(path: str | os.PathLike) -> Pairs:
         raise TactileError(path, found, "a whole HDF5 file of pairs", ADVICE) from error
     _check_values(arrays, path)
     if len(arrays["press"]):
-        _check_sizes(arrays, scales, names, path)
+        _check_sizes(arrays, scales, path)
     _check_names(attributes["indenters"], arrays["indenter"], path)
     digest = _content_hash(
         {names[name]: array for name, array in arrays.items()},
@@ -204,21 +202,19 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
             raise TactileError(f"{os.fspath(path)}, {name}, contact {bad}", "NaN or infinite", "finite numbers", ADVICE)
 
 
-def _check_sizes(
-    arrays: dict[str, np.ndarray], scales: dict[str, float], names: dict[str, str], path: str | os.PathLike
-) -> None:
+def _check_sizes(arrays: dict[str, np.ndarray], scales: dict[str, float], path: str | os.PathLike) -> None:
     """Raise TactileError if the contacts' sizes show another unit, or a dent does not go inward with its depth.
-    arrays : of the file, name -> (C, ...); scales : m per unit of the displacements; names : of the datasets there"""
+    arrays : of the file, name -> (C, ...); scales : m per unit of the displacements"""
     found = {name: float(np.median(np.abs(arrays[name]))) for name in SIZES}
     skin, gel = arrays["displacement_biotac"], arrays["displacement_digit"][:, :, 1]
     for name, dent in (("biotac", np.maximum(skin.max((1, 2)), -skin.min((1, 2)))), ("digit", gel.max(1))):
-        moved = scales[f"displacement_{name}"] * dent
-        found[f"displacement_{name}"] = float(np.median(moved / np.maximum(arrays[f"depth_{name}"], 1e-9)))
+        share = scales[f"displacement_{name}"] * dent / np.maximum(arrays[f"depth_{name}"], 1e-9)
+        found[f"displacement_{name}"] = float(np.median(share))
     for name, size in found.items():
-        least, most, unit = SIZES.get(name, (*DENT, "times the depth, inward"))
+        least, most, unit = SIZES.get(name, (0.4, 2.5, "times the depth, inward"))  # ours: .88 on gel, .80 on skin
         if not least <= size <= most:
             expected = f"{least:g} to {most:g} {unit}"
-            raise TactileError(f"{os.fspath(path)}, {names[name]}", f"a median of {size:.3g}", expected, ADVICE)
+            raise TactileError(f"{os.fspath(path)}, {name}", f"a median of {size:.3g}", expected, ADVICE)
 
 
 def _check_names(names: str, indenter: np.ndarray, path: str | os.PathLike) -> None:

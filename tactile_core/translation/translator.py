@@ -188,11 +188,12 @@ class Translator:
         # The error foretold is that of the frame alone: where that answers no contact, a tracked one may be all wrong.
         held = touched & ~touches(evidence.likely)
         least = held[:, None] * np.stack([accuracy.lengths(each).max(axis=1) for each in (skin, gel)], -1)
+        expected = np.maximum(nets.expected_error(change, rectified), least)
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),
             confidence=confidence, flags=flags, explained=explained, second_center=beside.center,
-            second_force=beside.force, **self._errors(change, rectified, center[:, 0], least),
+            second_force=beside.force, **self._errors(expected, rectified, center[:, 0]),
         )  # fmt: skip
 
     def _mounted(self, gel: np.ndarray) -> np.ndarray:
@@ -230,13 +231,10 @@ class Translator:
         """Return what 99 % of frames of noise stay below, by the card; quantity : biotac_m, digit_m or force_N of it"""
         return silent_level(self.card["silence"], quantity)
 
-    def _errors(
-        self, change: np.ndarray, rectified: np.ndarray, x: np.ndarray, least: np.ndarray
-    ) -> dict[str, np.ndarray]:
-        """Return expected largest errors, at least ``least`` (T, 2) m, and their bounds, by `Translation`'s names.
-        change : (T, e) counts; rectified : (T,) bool; x : (T,) m, of the contact along the finger, NaN without contact
-        """
-        expected, found = np.maximum(self.nets.expected_error(change, rectified), least), {}
+    def _errors(self, expected: np.ndarray, rectified: np.ndarray, x: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the largest errors expected (T, 2) m and their bounds, by `Translation`'s names, for rectified (T,)
+        bool. x : (T,) m, of the contact along the finger, NaN without contact"""
+        found = {}
         for index, name in enumerate(SURFACES):
             kinds = {kind: self.bound(expected[:, index], x, name, kind) for kind in KINDS}
             found[f"expected_error_{name}"] = expected[:, index]

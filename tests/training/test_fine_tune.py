@@ -103,7 +103,7 @@ def test_labels_that_no_network_could_mean_are_doubted(arrays, tmp_path, capsys,
     path = write_labelled(tmp_path / "labelled.hdf5", changed(arrays, contact_loc=mirrored))
     assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
     said = capsys.readouterr().err
-    assert "warning: real_position_mm of kept presses, before is no better than always the same answer" in said
+    assert "warning: real_position_mm of kept presses, before is no better than one answer for all" in said
     assert "left out: 1 contacts that are not on the pad" in said
 
 

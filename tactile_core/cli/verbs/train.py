@@ -110,8 +110,7 @@ def _fine_tune(options: argparse.Namespace) -> int:
     for text in read_card(os.path.join(options.out, "weights"))[0]["fine_tuned"]["dropped"]:
         say(f"left out: {text}")
     for row in (row for row in rows if row["value"] >= row["baseline"]):
-        always = f"no better than always the same answer ({row['baseline']:g})"
-        say(f"warning: {row['name']} of {row['set']} is {always}: are the labels' units, frame and order right?")
+        say(f"warning: {row['name']} of {row['set']} is no better than one answer for all: check units, frame, order")
     tell(options.out)
     next_step(_convert(options.out))
     return 0

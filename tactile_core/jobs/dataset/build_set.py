@@ -6,7 +6,7 @@ import dataclasses
 import hashlib
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,8 +82,7 @@ def build(recipe: Recipe, named: str, folder: Path, out: Path, asked: Asked) -> 
     parts = [part for part in parts if part[2].recordings]
     if not parts:
         raise TactileError(folder, "no recording that could be translated", "recordings", "See what was said above")
-    for line in _copies(parts):
-        asked.say(line)
+    _tell_copies(parts, asked.say)
     source = _joined(recipe, parts, aside, out)
     for layout in asked.layouts:
         _export(source, layout, out / layout, asked)
@@ -156,8 +155,8 @@ def _translated(
     return finished_job.load(place)
 
 
-def _copies(parts: list[tuple[str, list[File], Finished]]) -> Iterator[str]:
-    """Yield warnings of files that hold the same bytes. parts : (unit, its files, its job)"""
+def _tell_copies(parts: list[tuple[str, list[File], Finished]], say: Callable[[str], None]) -> None:
+    """Say which files hold the same bytes. parts : (unit, its files, its job)"""
     alike: dict[str, dict[str, str]] = {}
     for _, files, done in parts:
         known = {str(file.path): f"{file.path} ({file.split})" for file in files}
@@ -166,7 +165,7 @@ def _copies(parts: list[tuple[str, list[File], Finished]]) -> Iterator[str]:
             alike.setdefault(one.sha256, {})[file] = known[file]
     for names in alike.values():
         if len(names) > 1:
-            yield f"warning: {', '.join(names.values())} are one recording: take the copies out of the folder"
+            say(f"warning: {', '.join(names.values())} are one recording: take the copies out of the folder")
 
 
 def _joined(
