@@ -1,7 +1,5 @@
 """What tests of all rooms share: the outside data and small recordings."""
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Each metric against a case that can be worked out by hand."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

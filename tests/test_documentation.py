@@ -3,8 +3,6 @@
 What a test of its own runs, or what none can run, is listed below with its place or its reason.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

@@ -1,7 +1,5 @@
 """Who may import whom: what a plain import costs, what works without which library, and that the lint rules bite."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import graphlib

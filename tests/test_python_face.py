@@ -1,7 +1,5 @@
 """Public names of the package: listed by dir and help, imported at first use; from a CSV to pictures in five lines."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

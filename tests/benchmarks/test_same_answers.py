@@ -1,7 +1,5 @@
 """The script that compares answers before and after a change of structure: what it reports, and that it can run."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """The extension under test inside Blender (the bpy wheel, or a real one): enabled once, a fresh scene for each test."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import sys

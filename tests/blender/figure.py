@@ -6,8 +6,6 @@ NAME: of FIGURES, or "previews", which are the styles' in the Asset Browser; all
 minutes on two cores, with numba.
 """
 
-from __future__ import annotations
-
 import argparse
 import dataclasses
 import os

@@ -3,8 +3,6 @@
 TACTILE_SITE: the folder that holds pytest, which no Blender brings; TACTILE_ZIP: the extension to install.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

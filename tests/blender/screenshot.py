@@ -3,8 +3,6 @@
 STAGE: imported, translated, rendered or authored; OUT: picture to write; ZIP: extension to install
 """
 
-from __future__ import annotations
-
 import functools
 import os
 import shutil

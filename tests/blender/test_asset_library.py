@@ -1,7 +1,5 @@
 """The asset library of the styles: written by this Blender, listed, and of use without the add-on's code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

@@ -1,7 +1,5 @@
 """Author: sensors, indenters, scenes and the simulation."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files and scenes that are not as the extension makes them: each works, or says what to do."""
 
-from __future__ import annotations
-
 import shutil
 
 import bpy

@@ -1,7 +1,5 @@
 """``blender -b --command tactile``."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A gel that is copied, appended or instanced draws its own picture, or says what is missing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import bpy

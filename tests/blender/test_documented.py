@@ -1,7 +1,5 @@
 """The example of docs/blender.md, as it stands there: an author's whole way, from an empty file to a picture."""
 
-from __future__ import annotations
-
 import csv
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The zip that users install: its listing, Blender's own check of it, and the whole job from the installed copy."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import re

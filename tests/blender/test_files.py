@@ -1,7 +1,5 @@
 """What may be chosen to import: every layout that is read, a finger of a hand, a map of columns, a unit, snapshots."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

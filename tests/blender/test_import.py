@@ -1,7 +1,5 @@
 """File > Import > BioTac Recording."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """LEDs, coating and camera as objects: what is seen is what the picture is made with."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 

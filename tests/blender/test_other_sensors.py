@@ -1,7 +1,5 @@
 """Sensors beside the BioTac and the DIGIT: any gel to translate to, weights of other sensors, what a scene holds."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Out of Blender: the picture's scene as Mitsuba's XML, sensors with their motion as Alembic and USD."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Preferences: the cache's size and its clearing, LLVM's verdict, the default calibration."""
 
-from __future__ import annotations
-
 import bpy
 import pytest
 

@@ -1,7 +1,5 @@
 """The picture follows the scene, in place of one of another moment."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

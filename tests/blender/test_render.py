@@ -1,7 +1,5 @@
 """The render engine: files as Blender people expect them, with the library's own pixels in them."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Bodies of the sensors: published sizes, closed solids, and a view into them for the sensor's own camera."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

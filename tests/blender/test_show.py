@@ -1,7 +1,5 @@
 """Import and show: what a new file begins with is hidden, a second recording stands apart, images stay."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Styles: the dent in colours, drawn larger than it is, and a picture that stays the true gel's."""
 
-from __future__ import annotations
-
 import bpy
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """The button "Translate to DIGIT"."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Blender with numpy alone: what the extension promises without its wheels."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import subprocess

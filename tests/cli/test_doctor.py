@@ -1,7 +1,5 @@
 """`tactile doctor` tells, and never fails."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_core.cli.main import main

@@ -1,7 +1,5 @@
 """A named pipe in place of each file that a verb reads: refused in words, and never opened, which would wait."""
 
-from __future__ import annotations
-
 import argparse
 import errno
 import os

@@ -1,7 +1,5 @@
 """Compiled loops are kept on disk for the next process, whatever its name of the package, and give numpy's numbers."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Files that ask for far more than they hold: each loader says no, within the memory of ``bounded_child``."""
 
-from __future__ import annotations
-
 import io
 import json
 import struct

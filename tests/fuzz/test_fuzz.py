@@ -1,7 +1,5 @@
 """Whatever the bytes, a loader ends well or in a TactileError."""
 
-from __future__ import annotations
-
 import os
 import random
 import resource

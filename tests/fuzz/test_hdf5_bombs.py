@@ -1,7 +1,5 @@
 """HDF5 files that ask for far more than they hold: each loader says no, within the memory of ``bounded_child``."""
 
-from __future__ import annotations
-
 import os
 import re
 import struct

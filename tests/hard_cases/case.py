@@ -1,7 +1,5 @@
 """A hard case: what is asked, of which stage, what is expected in words, and what was found."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable
 

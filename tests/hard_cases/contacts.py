@@ -1,7 +1,5 @@
 """Contacts of both tiers, the laws that each must fulfil, and how far the fast one is from the full one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tactile_core.geometry.indenters import Indenter, Pose

@@ -1,7 +1,5 @@
 """Hard contacts through the whole translation, from the counts that they make to the gel's nodes, and drift."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

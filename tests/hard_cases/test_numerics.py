@@ -1,7 +1,5 @@
 """What strains a solver: no compressibility, too large steps, too coarse meshes, bad starts, too deep, too small."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

@@ -4,8 +4,6 @@ Heights are held against the gel's own nodes, the fast picture against Mitsuba's
 with it from the visibility of lights on.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

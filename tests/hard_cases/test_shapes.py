@@ -4,8 +4,6 @@ The full tier is the truth of the fast one, within the error that the fast one s
 apart lay below). The full tier itself must fulfil the laws of contact; its own truth is the reference tier.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from hard_cases.case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal

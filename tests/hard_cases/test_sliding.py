@@ -1,7 +1,5 @@
 """Contacts that move: sliding to Coulomb's limit, rolling, over the pad's rim and off it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hard_cases.case import MECHANICS_FAST, MECHANICS_FULL, Found, case, refusal

@@ -4,8 +4,6 @@ The law must stay finite and monotone there, and a translation that knows the un
 Deeper than is asked here, with a core that bears most of the force, it is not (docs/accuracy.md, Speed against error).
 """
 
-from __future__ import annotations
-
 import functools
 
 import numpy as np

@@ -1,7 +1,5 @@
 """ROS bags of a made-up press, as the public drivers of the BioTac write them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

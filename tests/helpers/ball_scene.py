@@ -1,7 +1,5 @@
 """A scene of one ball that presses and moves: the least that can be simulated."""
 
-from __future__ import annotations
-
 
 def ball_scene(*points: tuple[float, float, float, float], radius_mm: float = 3.5) -> str:
     """The text of scene.toml; points : (time s, x mm, z mm, force N)."""

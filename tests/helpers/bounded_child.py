@@ -1,7 +1,5 @@
 """Loaders run in a child process that may take BOUND more memory than it has; what it says comes back by a pipe."""
 
-from __future__ import annotations
-
 import os
 import resource
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Load a script that is no part of a package, anew for each test."""
 
-from __future__ import annotations
-
 import importlib.util
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """Sensors of the package with nodes farther apart: their matrices, which do not ship, take seconds and not a minute."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

@@ -5,8 +5,6 @@ Run as a script it is the command ``tactile`` with these tools: ``python tests/h
 tests can interrupt it there.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,7 +1,5 @@
 """What tests of pictures share: presses by formula, changed units, and the variants of Mitsuba that work here."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

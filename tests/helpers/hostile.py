@@ -3,8 +3,6 @@
 SPOILED=5000 in the environment spoils so many files of each kind in place of a few.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import json

@@ -1,7 +1,5 @@
 """A labelled recording of a made-up sensor, in the layout of Narang et al., from contacts of the test set."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

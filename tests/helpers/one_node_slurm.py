@@ -1,7 +1,5 @@
 """A real SLURM on this machine alone, its files in one folder, for as long as a test needs it."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

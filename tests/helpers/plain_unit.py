@@ -1,7 +1,5 @@
 """A DIGIT unit of round numbers, so that tests of pictures do not depend on what ships."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from tactile_core.sensors.calibration import AMBIENT_TERMS, Calibration, Coating, Fit, Response

@@ -1,7 +1,5 @@
 """Photographs of a unit whose numbers are known: balls pressed into it, rendered by the fast picture."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A flat elastic layer bonded below, as a sensor: the textbook cases of contact mechanics live on it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from tactile_core.geometry.lattice import Lattice, grid_faces

@@ -1,7 +1,5 @@
 """A small pairs file with analytic dents: enough to train on, nothing to learn physics from."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

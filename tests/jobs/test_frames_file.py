@@ -1,7 +1,5 @@
 """frames.h5: what is kept and nothing else, as other programs read it: netCDF's rules, xarray, pandas."""
 
-from __future__ import annotations
-
 import json
 
 import h5py

@@ -1,7 +1,5 @@
 """`--plan`: what is built for which outputs, and that its numbers follow the tables."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A long recording, prepared part by part, gives the signals that `convert` prepares of the whole."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

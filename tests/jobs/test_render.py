@@ -1,7 +1,5 @@
 """`tactile render`: every kind of input, what it leaves behind, and bad input."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

@@ -1,7 +1,5 @@
 """From a gel back to the skin: nearer the truth than an untouched finger, and refused where there is no gel."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 from conftest import SHIPPED

@@ -1,7 +1,5 @@
 """Grids of parameters: which combinations they say, and what they change in a scene."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_core.errors import TactileError

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import pytest
 from gel_pictures import works
 from plain_unit import plain_unit

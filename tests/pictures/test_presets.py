@@ -1,7 +1,5 @@
 """The presets' table and the choice by error."""
 
-from __future__ import annotations
-
 import pytest
 
 from tactile_core.errors import TactileError

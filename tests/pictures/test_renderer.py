@@ -1,7 +1,5 @@
 """Pictures of every preset: exact zeros, Lambert's law, symmetry, repeats, variants, bad input."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

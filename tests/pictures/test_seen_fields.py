@@ -1,7 +1,5 @@
 """Fields beside the picture: what a pixel holds is what the gel point has that it sees."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

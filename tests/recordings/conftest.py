@@ -1,7 +1,5 @@
 """A made-up press in the style of a BioTac, and files that hold it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

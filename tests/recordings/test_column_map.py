@@ -1,7 +1,5 @@
 """A CSV file with names of its own: the map is guessed, read again, and refused in words where it is wrong."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

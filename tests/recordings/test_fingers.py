@@ -1,7 +1,5 @@
 """Files of several fingers: one recording a finger, MATLAB files read without running anything, odd ones refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A force measured beside a recording: what is read, and what is refused in words."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Files of other programs, a row a kind: read as the same recording, by their map or without, or refused in words."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import json

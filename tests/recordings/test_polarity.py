@@ -1,7 +1,5 @@
 """What counts do where a film thins is read from the recording, said with how surely, and never guessed in silence."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import h5py

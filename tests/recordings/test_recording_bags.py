@@ -1,7 +1,5 @@
 """Bags: every container and message version, fingers, parts, and hostile ones."""
 
-from __future__ import annotations
-
 import bz2
 import contextlib
 import sqlite3

@@ -1,7 +1,5 @@
 """A recording in parts is the recording."""
 
-from __future__ import annotations
-
 import tracemalloc
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Counting long columns of whole numbers says what sorting them does."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The set-up script, as far as it goes without installing anything; `.ci/run` does the rest on a fresh environment."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

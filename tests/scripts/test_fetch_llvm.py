@@ -1,7 +1,5 @@
 """scripts/fetch_llvm.py without a network."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

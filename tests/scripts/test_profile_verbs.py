@@ -1,7 +1,5 @@
 """Each verb loads the libraries it needs and no others, and help loads none; the cases are those that are profiled."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

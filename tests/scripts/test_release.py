@@ -1,7 +1,5 @@
 """A release: one version everywhere, nothing that no commit holds."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from pathlib import Path

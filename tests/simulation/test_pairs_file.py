@@ -1,7 +1,5 @@
 """Reading and splitting the pairs file: what is wrong with it is said, and no press is in two parts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The tier that a scene gets for a bound: by the measured table, and how deep the scene goes."""
 
-from __future__ import annotations
-
 import io
 import re
 import sys

@@ -1,7 +1,5 @@
 """What training sees: the linear basis, the signals as read, the loss over nodes."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fine-tuning on a labelled recording: made here, in the layout of Narang et al., from contacts of the test set."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from labelled_recording import BALANCED, HELD, PAIRS, labelled_arrays, write_labelled

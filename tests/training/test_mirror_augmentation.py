@@ -1,7 +1,5 @@
 """Contacts seen in a mirror are those that mechanics finds on the other side of the finger."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_pairs import frame, write_pairs

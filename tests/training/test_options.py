@@ -1,7 +1,5 @@
 """Networks on another device than the contacts: no step mixes the two, and a GPU that is not there is said."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from small_pairs import frame, write_pairs

@@ -1,7 +1,5 @@
 """Training on pairs of another sensor: as many electrodes as its descriptor says, its name in the card."""
 
-from __future__ import annotations
-
 import shutil
 
 import numpy as np

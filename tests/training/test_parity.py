@@ -1,7 +1,5 @@
 """The numpy forward passes against torch, on random weights of the shipped sizes: relative 1e-5."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A whole training on tiny data: it learns, says what it did, gives the same bytes twice and after an interruption."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

@@ -1,7 +1,5 @@
 """Gains and offsets of an unknown sensor, held against simulated truth; the sensor file; the verb."""
 
-from __future__ import annotations
-
 import json
 
 import msgspec

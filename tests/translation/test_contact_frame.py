@@ -1,7 +1,5 @@
 """The window that moves with a dent: found, cut out and put back, by whole cells."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The share of the electrodes' change that a translated contact explains: right laws against wrong ones."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A unit's stiffness by a measured force: found, judged on what it was not fitted to, and used."""
 
-from __future__ import annotations
-
 import json
 
 import h5py

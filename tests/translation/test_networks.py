@@ -1,7 +1,5 @@
 """The numpy networks on random weights: shapes, verification when loaded, and the same answer in any batch."""
 
-from __future__ import annotations
-
 import json
 import shutil
 

@@ -1,7 +1,5 @@
 """Weights of another fluid sensor: a copy of the BioTac under another name gives the same, by what its card holds."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import shutil

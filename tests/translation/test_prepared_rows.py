@@ -1,7 +1,5 @@
 """A part of a recording is converted with what it needs of it in memory, and is the same as in the whole."""
 
-from __future__ import annotations
-
 import dataclasses
 import tracemalloc
 

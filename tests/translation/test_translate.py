@@ -1,7 +1,5 @@
 """A whole recording in one call: the same as the command's result, whatever part of it is requested."""
 
-from __future__ import annotations
-
 import h5py
 import numpy as np
 import pytest

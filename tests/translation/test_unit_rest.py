@@ -1,7 +1,5 @@
 """A unit's rest is found among recordings that all begin and end in contact, and used where nothing calm is near it."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The safetensors reader and writer: round trip, agreement with the library, and every kind of damage refused."""
 
-from __future__ import annotations
-
 import json
 import struct
 

@@ -1,7 +1,5 @@
 """Rows of the answered contact and of the posterior: a posterior that is true is said so, one that boasts is not."""
 
-from __future__ import annotations
-
 import types
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The judging of real recordings: made-up slides with known answers, and the tool beside the public recordings."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

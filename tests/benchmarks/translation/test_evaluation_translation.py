@@ -1,7 +1,5 @@
 """Metrics of the translation on paired contacts: zero for the truth, the baseline answer for nothing, fair averages."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

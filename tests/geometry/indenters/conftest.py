@@ -1,7 +1,5 @@
 """Meshes to press with, each written and built once."""
 
-from __future__ import annotations
-
 import pytest
 import trimesh
 

@@ -1,7 +1,5 @@
 """A small data set: two objects in six sessions, made of the shipped recording with noise, and its recipe."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

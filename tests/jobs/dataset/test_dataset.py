@@ -1,7 +1,5 @@
 """`tactile dataset`: a folder of recordings to labelled pictures, a card and a page."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,7 +1,5 @@
 """Small jobs without networks, each frame a dent."""
 
-from __future__ import annotations
-
 import importlib.util
 import shutil
 import subprocess

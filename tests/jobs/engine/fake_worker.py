@@ -5,8 +5,6 @@ that is made first, so that it happens once); FAKE_CUT: a process ends at this f
 cut. ``python fake_worker.py batch ...`` is the command, with such workers.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """``tactile batch`` as its user meets it."""
 
-from __future__ import annotations
-
 import json
 import os
 

@@ -1,7 +1,5 @@
 """Dask as one more place, over TLS too; test_same_bytes has its bytes. Workers are threads."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import shutil

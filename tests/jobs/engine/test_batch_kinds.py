@@ -1,7 +1,5 @@
 """Simulation and rendering as jobs: the same bytes as by one process, whoever makes the parts."""
 
-from __future__ import annotations
-
 import json
 
 import h5py

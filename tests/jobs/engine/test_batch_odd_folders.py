@@ -1,7 +1,5 @@
 """Jobs in folders that hold what others put there, and inputs that are no plain files."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

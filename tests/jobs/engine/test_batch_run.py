@@ -1,7 +1,5 @@
 """A job gives the same bytes whatever happens to it on the way."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -3,8 +3,6 @@
 What a cluster would do with several nodes, limits and accounting is not tried.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 import subprocess

@@ -1,7 +1,5 @@
 """A job with the shipped networks makes the same bytes in this process, by worker processes and on Dask."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

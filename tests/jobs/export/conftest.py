@@ -1,7 +1,5 @@
 """A finished job of two recordings with pictures."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A finished job in the layouts of others, read back with their own tools."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """Data sets in both of LeRobot's layouts, read with pyarrow, OpenCV, and LeRobot where it is installed."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

@@ -1,7 +1,5 @@
 """The camera of a real DIGIT, played from a video file: upright, beside the simulated picture, and gone at the end."""
 
-from __future__ import annotations
-
 import fake_tools
 import numpy as np
 import pytest

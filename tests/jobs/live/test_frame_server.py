@@ -1,7 +1,5 @@
 """Frames for other programs: what the page's reader reads of them, and what watch publishes."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

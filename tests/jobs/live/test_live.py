@@ -1,7 +1,5 @@
 """A growing recording: every row once, none half, and the newest shown."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The ROS 2 node of docs/, fed with a bag's messages by an rclpy that is made up here: none is installed with pip."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace

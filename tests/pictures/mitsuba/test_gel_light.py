@@ -1,7 +1,5 @@
 """Pictures by Mitsuba's emitters and materials: against its path integrator, and whether each parameter acts."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

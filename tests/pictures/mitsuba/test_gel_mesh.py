@@ -1,7 +1,5 @@
 """The mesh that Mitsuba gets: where its vertices are, and what is refused before it crashes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Points that stand for a light."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The pictures against Mitsuba's own path tracer, analytic light, and the order of their convergence."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import zlib

@@ -1,7 +1,5 @@
 """Refraction by gel and acrylic."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recording of a wrong law is doubted, one as simulated is not, and what is too little says nothing."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

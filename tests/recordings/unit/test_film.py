@@ -1,7 +1,5 @@
 """A unit's fluid film: found from its recording and taken off; made-up units, and real ones beside a force sensor."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 
