@@ -6,12 +6,11 @@ from pathlib import Path
 
 import fake_tools
 import pytest
+from conftest import ROOT
 
 from tactile_core.cli.main import main
 from tactile_core.cli.verbs import VERBS
 from tactile_core.jobs import convert
-
-ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture

@@ -3,10 +3,10 @@
 import ast
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 from tactile_core import sensors
 from tactile_core.files import compiled
@@ -16,7 +16,6 @@ from tactile_core.mechanics.solve import Step, solve_path
 from tactile_core.pictures.height_map import folds_counted, gel_mapper
 from tactile_core.pictures.renderer import Renderer
 
-ROOT = Path(__file__).resolve().parents[2]
 INTERPOLATE = """
 import os, sys, types
 sys.path.insert(0, os.getcwd())

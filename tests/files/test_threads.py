@@ -7,7 +7,7 @@ import threading
 import numpy as np  # noqa: F401 - loads a library of linear algebra
 import pytest
 import threadpoolctl
-from conftest import ROOT
+from conftest import ROOT, SHIPPED
 
 import tactile_core as tactile
 from tactile_core.files import threads
@@ -77,7 +77,7 @@ def test_the_last_of_several_blocks_gives_the_threads_back():
 
 
 def test_a_gel_and_a_translation_give_the_same_bytes_at_any_number_of_threads():
-    recording, found = tactile.read(ROOT / "scenes/press_roll_slide/press_roll_slide.h5"), []
+    recording, found = tactile.read(SHIPPED), []
     for count in (1, 2):
         with threadpoolctl.threadpool_limits(count, user_api="blas"):
             gel = tactile.Gel("digit", tactile.indenters.Sphere(15e-3))

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 
 import numpy as np
-from conftest import ROOT
+from conftest import SHIPPED
 
 from hard_cases.case import TRANSLATION, Found, case
 from hard_cases.test_shapes import CONTACTS, HARD_OF, SHOWN
@@ -18,7 +18,6 @@ from tactile_core.sensors import REST_COUNTS
 from tactile_core.translation.translate import load_translator
 
 WORDS = Flag.OUT_OF_RANGE | Flag.BEYOND_DIGIT
-SHIPPED = ROOT / "scenes/press_roll_slide/press_roll_slide.h5"
 
 translator = functools.cache(load_translator)
 

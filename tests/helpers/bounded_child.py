@@ -13,7 +13,7 @@ SECONDS = 200  # of CPU time. The longest take 3, more with what the process bef
 
 
 def prepare(path):
-    """Read a recording, part by part, as `tactile convert` does."""
+    """All that a batch does with a recording before the networks, part by part."""
     for part in chunks.read_parts(path):
         recordings.prepare(part.recording)
 

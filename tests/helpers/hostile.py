@@ -14,10 +14,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from bounded_child import prepare
+from conftest import ROOT, write_counts
 from PIL import Image
 from small_pairs import write_pairs
 
-from tactile_core import recordings
 from tactile_core.errors import TactileError
 from tactile_core.files import checksummed, exr_file
 from tactile_core.geometry.indenters import mesh_file
@@ -26,12 +27,11 @@ from tactile_core.jobs.engine import dask_cluster, inputs
 from tactile_core.jobs.engine import job as jobs
 from tactile_core.jobs.live import Growing
 from tactile_core.pictures import background
-from tactile_core.recordings import chunks, electrode_gains
+from tactile_core.recordings import electrode_gains
 from tactile_core.sensors import calibration_file, descriptor, gel_shape
 from tactile_core.simulation import pairs_file, scene
 from tactile_core.translation import networks, translate, weights
 
-ROOT = Path(__file__).resolve().parents[2]
 WORDS = [b"nan", b"-1", b"1e308", b"99999999999999999999", b"../../x", b"\n", b",", b'"', b"[", b"{", b"\0", b"null"]
 NUMBERS = [0, 1, 2**16, 2**31 - 1, 2**32 - 1, 2**40, 2**63 - 1, 2**64 - 1]
 Loader = Callable[[Path], object]
@@ -66,17 +66,15 @@ def spoil(data: bytes, chance: random.Random) -> bytes:
 def good_recordings(folder: Path) -> dict[str, tuple[bytes, Loader]]:
     """A recording in each container."""
     frames = np.rint(3000 + np.random.default_rng(0).normal(0, 1, (60, 19)))
-    header = "timestamp,tdc,tac,pdc," + ",".join([f"pac{i}" for i in range(1, 23)] + [f"ele{i}" for i in range(1, 20)])
-    rows = np.column_stack([1.6e9 + np.arange(60) / 100, np.full((60, 25), 2000), frames])
-    text = io.StringIO()
-    np.savetxt(text, rows, fmt="%.10g", delimiter=",", header=header, comments="")
+    write_counts(folder / "good.csv", frames)
+    text = (folder / "good.csv").read_bytes()
     archive = io.BytesIO()
     np.savez_compressed(archive, electrodes=frames, time=np.arange(60) / 100)
     found: dict[str, tuple[bytes, Loader]] = {
-        "csv": (text.getvalue().encode(), prepare),
+        "csv": (text, prepare),
         "npz": (archive.getvalue(), prepare),
         "hdf5": (hdf5({"electrode_vals/data": frames, "force_vec/data": np.zeros((60, 3))}), prepare),
-        "growing": (text.getvalue().encode(), lambda path: Growing(path).poll()),
+        "growing": (text, lambda path: Growing(path).poll()),
     }
     try:
         import bags
@@ -85,7 +83,9 @@ def good_recordings(folder: Path) -> dict[str, tuple[bytes, Loader]]:
         return found
     from types import SimpleNamespace
 
-    press = SimpleNamespace(time=np.arange(60) / 100, electrodes=frames, pdc=rows[:, 3], tac=rows[:, 2], tdc=rows[:, 1])
+    press = SimpleNamespace(
+        time=np.arange(60) / 100, electrodes=frames, **dict.fromkeys(("pdc", "tac", "tdc"), [2000] * 60)
+    )
     for container in ("ros1", "mcap", "sqlite3"):
         bags.write_bag(folder / container, press, container, "hand")
         path = folder / container
@@ -104,12 +104,6 @@ def read_bag_with(mark: Path) -> Loader:
         prepare(mark.parent)
 
     return read
-
-
-def prepare(path: Path) -> None:
-    """All that a batch does with a recording before the networks."""
-    for part in chunks.read_parts(path):
-        recordings.prepare(part.recording)
 
 
 def hdf5(arrays: dict[str, np.ndarray], packing: str | None = "gzip") -> bytes:

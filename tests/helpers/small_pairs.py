@@ -11,6 +11,9 @@ from tactile_core.training.step_errors import Bodies
 from tactile_core.translation.contact_frame import ContactFrame
 
 SHAPES = {"biotac": (9, 7), "digit": (11, 8)}
+# Options of a training on them, which have no mirror images.
+BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
+SMALL = {"mirrored": 0.0, "parts_steps": 10, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
 
 
 def grid(rows: int, columns: int) -> np.ndarray:

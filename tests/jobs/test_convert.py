@@ -14,6 +14,7 @@ import fake_tools
 import h5py
 import numpy as np
 import pytest
+from conftest import ROOT, SHIPPED
 from PIL import Image
 from plain_unit import plain_unit
 
@@ -31,7 +32,6 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration import Markers
 
 FRAMES = 150  # of slide_csv: more than two chunks
-ROOT = Path(__file__).parents[2]
 FAKE = ROOT / "tests" / "helpers" / "fake_tools.py"
 
 
@@ -171,7 +171,7 @@ def test_the_note_names_the_calibration_that_was_given(slide_csv, tmp_path, tool
 
 
 def test_the_note_of_the_shipped_recording_takes_4_kb(run):
-    folder = run(Path(__file__).parents[2] / "scenes" / "press_roll_slide" / "press_roll_slide.h5", keep=())
+    folder = run(SHIPPED, keep=())
     assert (folder / "note.json").stat().st_size <= 4096
 
 
@@ -196,7 +196,7 @@ def test_flags_of_recording_and_translation_meet_and_are_told(run, slide_csv):
 
 @pytest.mark.parametrize("denied", [False, True])
 def test_frames_that_the_fluid_s_pressure_denies_say_so(denied, request, tmp_path, no_sheet):
-    path = shutil.copy(request.config.rootpath / "scenes/press_roll_slide/press_roll_slide.h5", tmp_path / "touch.h5")
+    path = shutil.copy(SHIPPED, tmp_path / "touch.h5")
     with h5py.File(path, "r+") as file:
         if denied:
             file["pdc"][...] = 80 + np.arange(len(file["pdc"])) % 2

@@ -1,10 +1,10 @@
 """A gel in MuJoCo: its force and the geom's pose reach the gel; any geom presses; the example runs."""
 
-import importlib.util
 from pathlib import Path
 
 import numpy as np
 import pytest
+from by_path import module_at
 
 mujoco = pytest.importorskip("mujoco", reason="the extra [mujoco] is not installed")
 pytest.importorskip("gymnasium", reason="the extra [mujoco] is not installed")
@@ -108,9 +108,7 @@ def no_display(*_):
 
 def test_the_example_grasps(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(mujoco, "Renderer", no_display)
-    spec = importlib.util.spec_from_file_location("grasp", EXAMPLE)
-    grasp = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(grasp)
+    grasp = module_at(EXAMPLE)
     frames = list(grasp.run(0.25, ("left",)))
     last = frames[-1]
     assert last["left"]["force"][1] == pytest.approx(last["left MuJoCo"][1], rel=5e-3)

@@ -1,9 +1,9 @@
 """`--plan`: what is built for which outputs, and that its numbers follow the tables."""
 
 import json
-from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
 from tactile_core.cli.main import main
 from tactile_core.jobs import plan
@@ -13,7 +13,6 @@ from tactile_core.simulation import tier_choice
 from tactile_core.simulation.scene_recording import sensors_of
 from tactile_core.simulation.tier_choice import TierChoice
 
-ROOT = Path(__file__).parents[2]
 PRESS = ROOT / "scenes" / "press"
 PART = {"start": 1.0, "ms": 10.0, "mb": 100.0, "kb": 2.0}
 NAMES = (

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import ROOT, SHIPPED
 from gel_pictures import NO_MITSUBA, Press
 
 from tactile_core.cli.main import main
@@ -20,8 +21,7 @@ from tactile_core.pictures.renderer import Renderer
 from tactile_core.sensors import digit_surface
 from tactile_core.sensors.calibration_file import load_calibration, write_calibration
 
-SCENES = Path(__file__).parents[2] / "scenes"
-RECORDING = SCENES / "press_roll_slide" / "press_roll_slide.h5"
+SCENES = ROOT / "scenes"
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ def test_height_maps_become_pictures(render, heights, tmp_path, small):
 
 
 def test_frames_of_a_simulated_recording_keep_their_numbers(render, tmp_path):
-    assert render(RECORDING, "--frames", "300:302")[0] == 0
+    assert render(SHIPPED, "--frames", "300:302")[0] == 0
     images = sorted((tmp_path / "out" / "images").iterdir())
     assert [path.name for path in images] == ["00300.png", "00301.png"]
     assert picture(images[0]).shape == (320, 240, 3)
@@ -92,7 +92,7 @@ def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
 
     def simulated(scene, out, progress, keep):
         asked.append((Path(scene), keep))
-        shutil.copy(RECORDING, out)
+        shutil.copy(SHIPPED, out)
 
     monkeypatch.setattr(scene_recording, "simulate_recording", simulated)
     assert render(SCENES / "press_roll_slide", "--frames", "300:301")[0] == 0
@@ -102,9 +102,9 @@ def test_a_scene_is_simulated_first(render, tmp_path, monkeypatch):
 
 
 def test_another_size(render, tmp_path):
-    status, _, err = render(RECORDING, "--size", "480x480")
+    status, _, err = render(SHIPPED, "--size", "480x480")
     assert status == 2 and "aspect ratio" in err
-    assert render(RECORDING, "--frames", "300:301", "--size", "480x640")[0] == 0
+    assert render(SHIPPED, "--frames", "300:301", "--size", "480x640")[0] == 0
     assert picture(tmp_path / "out" / "images" / "00300.png").shape == (640, 480, 3)
 
 
@@ -291,7 +291,7 @@ def test_the_result_of_convert_that_is_rendered_is_not_replaced(render, tmp_path
 
 @pytest.mark.parametrize("size", ["24000x32000", "3000x4000"])
 def test_a_size_without_bound_is_refused(size, render):
-    status, _, err = render(RECORDING, "--frames", "0:1", "--size", size)
+    status, _, err = render(SHIPPED, "--frames", "0:1", "--size", size)
     assert status == 2 and "at most 10 million pixels" in err
 
 

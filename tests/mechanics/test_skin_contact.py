@@ -13,22 +13,20 @@ from tactile_core.mechanics.fast.compliance import compliance_of
 from tactile_core.mechanics.fast.contact import ContactProblem
 from tactile_core.mechanics.node_areas import node_areas, traction
 from tactile_core.mechanics.placement import MOST_TILT, Placement, pose_at
-from tactile_core.mechanics.skin_contact import pressing_traction
-from tactile_core.sensors.unrolling import node_normals
-from tactile_core.simulation.pairs_file import read_pairs
-from tactile_core.training.step_errors import true_displacement
-from tactile_core.translation.gel_place import contact_patch
-
-pytest.importorskip("scipy", reason="contacts are solved with scipy, of the extra [fem]")
 from tactile_core.mechanics.skin_contact import (
     RADII,
     USUAL_RADIUS,
     leaning,
     likely_contacts,
     patch_radius,
+    pressing_traction,
     skin_contact,
 )
 from tactile_core.mechanics.solve import solve
+from tactile_core.sensors.unrolling import node_normals
+from tactile_core.simulation.pairs_file import read_pairs
+from tactile_core.training.step_errors import true_displacement
+from tactile_core.translation.gel_place import contact_patch
 
 CUBE = Box((14e-3, 14e-3, 14e-3), 0.5e-3)
 

@@ -3,11 +3,9 @@
 import bz2
 import gzip
 import json
-import os
 import re
 import zipfile
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -122,7 +120,7 @@ TEXTS = {
 }  # fmt: skip
 
 
-def write_arrays(path: Path, press) -> None:
+def write_arrays(path, press):
     """The press in an HDF5, NPZ, NPY or MATLAB file of other names."""
     stamps = np.rint(1e9 * (START + press.time)).astype(np.int64)
     if path.suffix == ".h5":
@@ -380,7 +378,6 @@ def test_a_finger_that_does_not_answer_touches_nothing(how, press, tmp_path):
         np.testing.assert_allclose(found.change[180:520].min(), press.change.min(), rtol=0.2)  # trembles, with noise
 
 
-OUTSIDE = Path(os.environ.get("TACTILE_TEST_DATA", "")) / "outside"
 MAPPED = [
     "ns.csv",
     "wallclock.csv",
@@ -393,14 +390,14 @@ MAPPED = [
 KNOWN = ["label.csv", "no_ele7.csv", "norm.csv", "volts.csv", "ms.csv", "space.csv", "comment.csv", "plain.csv.gz"]
 
 
-@pytest.mark.skipif(not OUTSIDE.is_dir(), reason="set TACTILE_TEST_DATA to a folder with outside")
 @pytest.mark.parametrize("name", [*MAPPED, *KNOWN, "output.txt", "electrodes.npy", "trial_001.json"])
-def test_files_of_other_programs_are_read(name, tmp_path):
+def test_files_of_other_programs_are_read(name, outside_data, tmp_path):
+    path = outside_data("outside") / name
     if name in KNOWN:
-        found = recordings.read(OUTSIDE / name)
+        found = recordings.read(path)
     else:
         link = tmp_path / name
-        link.symlink_to(OUTSIDE / name)
+        link.symlink_to(path)
         found = read_by_guess(link)
     signals = recordings.prepare(found)
     assert signals.kind == "raw" and found.rate == pytest.approx(100, rel=1e-3)

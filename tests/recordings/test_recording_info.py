@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tactile_core import recordings
-from tactile_core.errors import TactileError
 from tactile_core.recordings import PrepareOptions
 from tactile_core.recordings.info import describe
 from tactile_core.recordings.tables import table
@@ -112,8 +111,3 @@ def test_a_known_layout_is_taken_whole(layout, press, in_layout):
 def test_few_frames(frames, press, in_layout):
     few = type(press)(**{k: v[:frames] if np.ndim(v) and len(v) == 700 else v for k, v in vars(press).items()})
     assert "no_quiet_part" in describe(in_layout("csv_31", few))
-
-
-def test_no_recording(tmp_path):
-    with pytest.raises(TactileError, match="no such file"):
-        describe(tmp_path / "absent.csv")

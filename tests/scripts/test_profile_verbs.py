@@ -6,14 +6,13 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from benchmarks import profile_verbs as profile
+from conftest import ROOT
 
 from tactile_core.cli.verbs import VERBS
 
-ROOT = Path(__file__).parents[2]
 CASES = {case.name: case for case in profile.CASES}
 READS = {"render_fast": "convert", "render_standard": "convert", "export": "batch"}
 NEEDS = {"render_standard": "mitsuba", "train": "torch", "mesh_full": "pypardiso"}  # beyond what all tests have

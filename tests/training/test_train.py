@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_pairs import bodies, frame, write_pairs
+from small_pairs import SMALL, bodies, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 
@@ -27,9 +27,6 @@ from tactile_core.translation import card as cards  # noqa: E402
 from tactile_core.translation import networks, weights  # noqa: E402
 from tactile_core.translation.layers import DISTANCES  # noqa: E402
 
-BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
-# The small surfaces have no mirror images.
-SMALL = {"mirrored": 0.0, "parts_steps": 10, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
 SURFACES = {"bodies": bodies(), "frame": frame}
 QUICK = Options(**SMALL, effort=0.04, checkpoint_seconds=0.0)
 

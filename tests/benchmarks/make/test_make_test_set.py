@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-from pathlib import Path
 
 import h5py
 import msgspec
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 from benchmarks.make import make_test_set
 from benchmarks.make.make_test_set import REGION_X, draw_press, full_rows
+from conftest import ROOT
 
 from tactile_core import sensors
 from tactile_core.errors import TactileError
@@ -25,7 +25,6 @@ from tactile_core.mechanics.solve import solve
 from tactile_core.simulation import pairs_file, pairs_writer
 from tactile_core.simulation.scene import load_scene
 
-ROOT = Path(__file__).parents[3]
 BALL, PLACE = Sphere(3.5e-3), Placement(-8e-3, 1e-3, 0.15, 1.0)
 
 

@@ -12,11 +12,6 @@ from benchmarks.mechanics.golden import GOLDEN_FORCE
 from tactile_core.accuracy import failed, line, order, row
 
 
-@pytest.fixture
-def script():
-    return validate_mechanics
-
-
 def test_a_row_is_judged_by_its_size_or_from_below():
     assert row("error", -0.4, "percent", 0.5)["ok"] is True
     assert row("error", -0.6, "percent", 0.5)["ok"] is False
@@ -57,25 +52,27 @@ def test_report_holds_every_row(tmp_path):
     assert [line for line in text.splitlines() if not line.startswith("|")] == words
 
 
-def test_script_writes_its_rows_and_says_what_missed(script, monkeypatch, tmp_path, capsys):
+def test_script_writes_its_rows_and_says_what_missed(monkeypatch, tmp_path, capsys):
     good, bad, slow = row("a", 0.1, "1", 1.0), row("b", 2.0, "1", 1.0), row("c", 2.0, "s", 1.0)
-    monkeypatch.setattr(script, "CHECKS", {"good": (lambda quick: [good, slow], ""), "bad": (lambda quick: [bad], "")})
-    assert script.main(["--quick", "--only", "good", "--json", str(tmp_path / "rows.json")]) == 0
+    monkeypatch.setattr(
+        validate_mechanics, "CHECKS", {"good": (lambda quick: [good, slow], ""), "bad": (lambda quick: [bad], "")}
+    )
+    assert validate_mechanics.main(["--quick", "--only", "good", "--json", str(tmp_path / "rows.json")]) == 0
     assert json.loads((tmp_path / "rows.json").read_text()) == [good, slow]
-    assert script.main(["--quick"]) == 1
+    assert validate_mechanics.main(["--quick"]) == 1
     said = capsys.readouterr()
     assert "MISSED: b = 2.0 1, target 1.0" in said.err and line(bad) in said.out
 
 
-def test_a_check_that_breaks_off_is_a_miss_and_the_others_go_on(script, monkeypatch, tmp_path, capsys):
+def test_a_check_that_breaks_off_is_a_miss_and_the_others_go_on(monkeypatch, tmp_path, capsys):
     good = row("a", 0.1, "1", 1.0)
 
     def broken(quick):
         yield good
         raise ArithmeticError("no equilibrium")
 
-    monkeypatch.setattr(script, "CHECKS", {"broken": (broken, ""), "good": (lambda quick: [good], "")})
-    assert script.main(["--quick", "--json", str(tmp_path / "rows.json")]) == 1
+    monkeypatch.setattr(validate_mechanics, "CHECKS", {"broken": (broken, ""), "good": (lambda quick: [good], "")})
+    assert validate_mechanics.main(["--quick", "--json", str(tmp_path / "rows.json")]) == 1
     rows = json.loads((tmp_path / "rows.json").read_text())
     assert [found["name"] for found in rows] == ["a", "broken_completed", "a"]
     assert "no equilibrium" in capsys.readouterr().err

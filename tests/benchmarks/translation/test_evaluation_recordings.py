@@ -17,7 +17,6 @@ from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.repair import fill
 from tactile_core.translation.translator import Translation
 
-ROOT = Path(__file__).resolve().parents[3]
 FRAMES = 500
 START = 1.6e9
 

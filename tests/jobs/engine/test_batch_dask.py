@@ -123,16 +123,6 @@ def test_a_scheduler_that_dies_is_told_in_a_sentence(new_job, capfd):
     assert jobs.exists(folder)  # and the same command goes on
 
 
-def test_nobody_listening_is_told(new_job):
-    import dask
-
-    folder, job = new_job()
-    place = Cluster(folder, "tcp://127.0.0.1:9")
-    reported = pytest.raises(TactileError, match="no scheduler answers")
-    with dask.config.set({CONFIGURED: "1s"}), reported, runs.opened(folder, None):
-        runs.run(folder, job, place, None, lambda done, total: None)
-
-
 @pytest.mark.parametrize(("patience", "starts"), [("600s", True), ("100ms", False)])
 def test_a_loop_that_starts_late_is_waited_for_as_long_as_configured(patience, starts, monkeypatch):
     """As on a busy machine, where Dask's own loop gives up after 10 s."""
