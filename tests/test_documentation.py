@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import write_counts
+from conftest import ROOT, SHIPPED, write_counts
 from labelled_recording import labelled_arrays, write_labelled
 from plain_unit import plain_unit
 from pressed_unit import PLACES, write_photographs
@@ -24,7 +24,6 @@ from pressed_unit import PLACES, write_photographs
 from tactile_core.cli.main import main
 from tactile_core.simulation.scene import load_scene
 
-ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), ROOT / "scenes" / "README.md"]
 FENCED = re.compile(r"^```([\w{}-]*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
@@ -46,7 +45,7 @@ LESS = [
     ("scenes/press --keep displacement_digit --error 5um", "brief --keep displacement_digit --error 5um"),
     ("simulate scenes/press ", "simulate short "),
 ]
-# A press of 0.02 s after rest: each frame of the full tier takes a second or more, and scenes/press has 200.
+# A press of one frame after rest: each of the full tier takes a second or more, and scenes/press has 200.
 BRIEF = """\
 format = "tactile-scene-1"
 name = "brief"
@@ -134,10 +133,7 @@ def inputs(tmp_path_factory) -> Path:
     for name, frames in (("touch.csv", 80), ("day1/a.csv", 80), ("day2/b.csv", 80), ("touches/1.csv", None)):
         (folder / name).parent.mkdir(exist_ok=True)
         write_touch(folder / name, frames)
-    with (
-        h5py.File(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5") as file,
-        h5py.File(folder / "own.h5", "w") as own,
-    ):
+    with h5py.File(SHIPPED) as file, h5py.File(folder / "own.h5", "w") as own:
         own["trial_1/finger_0/electrode_data"] = np.rint(file["electrodes"][:80])
         own["trial_1/stamps"] = 10**7 * np.arange(80)  # ns
     (folder / "slips").mkdir()
@@ -146,9 +142,9 @@ def inputs(tmp_path_factory) -> Path:
         header = ",".join(f"ff_e{number}" for number in range(1, 25))
         np.savetxt(folder / "slips" / f"{name}.csv", counts, fmt="%d", delimiter=",", header=header, comments="")
     (folder / "locations.csv").touch()
-    for name, rest in (("brief", 0.01), ("short", 1.02)):
+    for name, rest in (("brief", 0.01), ("short", 1.03)):
         (folder / name).mkdir()
-        (folder / name / "scene.toml").write_text(BRIEF % (rest, rest + 0.02))
+        (folder / name / "scene.toml").write_text(BRIEF % (rest, rest + 0.01))
     # A fit takes the time of its pixels and presses, and tests of calibrations find a unit's numbers from larger ones.
     write_photographs(folder / "presses", plain_unit().at_size(30, 40), PLACES[:3])
     shutil.copytree(folder / "presses", folder / "other_presses")
@@ -159,7 +155,7 @@ def inputs(tmp_path_factory) -> Path:
 
 def write_touch(path: Path, frames: int | None) -> None:
     """The first frames of the recording that ships, as raw readings in CSV."""
-    with h5py.File(ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5", "r") as file:
+    with h5py.File(SHIPPED, "r") as file:
         electrodes = file["electrodes"][:frames]
     write_counts(path, electrodes)
 
@@ -203,9 +199,12 @@ def in_bash(text: str, folder: Path) -> subprocess.CompletedProcess:
 
 @pytest.mark.skipif(os.name == "nt", reason="the pages' commands are written for a Unix shell")
 @pytest.mark.parametrize("page", [page for page in PAGES if commands(page)], ids=lambda page: page.name)
+@pytest.mark.usefixtures("no_sheet")
 def test_commands_work(page, user, monkeypatch, capsys):
     monkeypatch.chdir(user)
     every = commands(page)
+    if TORCH:
+        monkeypatch.setattr("tactile_core.training.fine_tune.EPOCHS", 1)  # of thirty, which take half a minute
     if not TORCH and any(command.startswith("tactile train") for command in every):
         pytest.skip("torch is not installed: dev.py test --train")
     if "tactile scenes copy" in every:

@@ -18,6 +18,7 @@ def coarse_fits(monkeypatch: pytest.MonkeyPatch) -> None:
     minimise = fit.minimise
     monkeypatch.setattr(ball_pictures, "WORKING_WIDTH", 60)
     monkeypatch.setattr(press_fit, "DEPTHS", (0.4,))
+    monkeypatch.setattr(press_fit, "TOLERANCE", 1e-3)
     monkeypatch.setattr(checked_fit, "COARSE_SIDE", 30)
     monkeypatch.setattr(fit, "minimise", lambda *given, most, **more: minimise(*given, most=min(most, 4), **more))
 

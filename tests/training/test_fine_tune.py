@@ -40,7 +40,7 @@ def test_it_learns_the_sensor(arrays, tmp_path, capsys):
 
 
 def test_same_bytes_again(arrays, tmp_path, monkeypatch):
-    monkeypatch.setattr(fine_tuning, "EPOCHS", 4)
+    monkeypatch.setattr(fine_tuning, "EPOCHS", 2)
     path = write_labelled(tmp_path / "labelled.hdf5", arrays)
     for name in ("a", "b"):
         fine_tune(path, tmp_path / name)

@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 import pytest
-from small_pairs import SHAPES, bodies, frame, write_pairs
+from small_pairs import SHAPES, SMALL, bodies, frame, write_pairs
 
 torch = pytest.importorskip("torch", reason="training needs torch")
 h5py = pytest.importorskip("h5py")
@@ -18,8 +18,6 @@ from tactile_core.training.train import train  # noqa: E402
 from tactile_core.translation import networks, reference_signals  # noqa: E402
 
 NAME, COUNT = "finger_of_17", 17
-BASES = {"wide_biotac": 8, "near_biotac": 8, "half_biotac": 3, "wide_digit": 8, "near_digit": 8, "half_digit": 3}
-SMALL = {"mirrored": 0.0, "width": 32, "latent_biotac": 8, "latent_digit": 10, "batch": 32, **BASES}
 
 
 @pytest.fixture

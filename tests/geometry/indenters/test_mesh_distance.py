@@ -35,7 +35,7 @@ def test_uncompiled_grids_are_the_same(compiled_loops):
 def test_slender_triangles_are_cut_along_their_length():
     """Pieces grow as length over cell, not its square; of so many long triangles that they do not fit, cells grow."""
     few, many = (trimesh.creation.cylinder(5.0, 30.0, sections=n).triangles for n in (1000, 10_000))
-    for triangles, cell, grown in ((few, 0.2, False), (few, 0.1, False), (many, 0.2, True)):
+    for triangles, cell, grown in ((few, 0.1, False), (many, 0.2, True)):
         near = NearTriangles(triangles, cell)
         longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
         rows = np.ceil(np.log2(longest / cell) + 0.5)

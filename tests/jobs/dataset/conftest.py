@@ -4,18 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHIPPED
 
 from tactile_core import recordings
 
-ROOT = Path(__file__).resolve().parents[3]
-RECORDING = ROOT / "scenes" / "press_roll_slide" / "press_roll_slide.h5"
 OBJECTS = {"ball": slice(30, 70), "rolled": slice(110, 150)}  # a press, and a roll beside it
 SESSIONS = 6
 RECIPE = """\
 format = "tactile-dataset-1"
 files = ["{object}_{session}.npz"]
 tasks = ["object"]
-every = 2
+every = 4
 notes = ["Simulated."]
 
 [source]
@@ -36,7 +35,7 @@ test = ["4", "5"]
 
 def write_recordings(folder: Path) -> None:
     """Write a recording of the untouched finger, and of each object in each session: 20 frames at rest, a touch."""
-    electrodes = np.asarray(recordings.read(RECORDING).electrodes)
+    electrodes = np.asarray(recordings.read(SHIPPED).electrodes)
     rng = np.random.default_rng(0)
     still = np.rint(electrodes[:1] + rng.normal(0, 1.5, (60, electrodes.shape[1])))
     np.savez(folder / "rest.npz", electrodes=still, time=np.arange(60) / 100)

@@ -4,15 +4,11 @@ import h5py
 import numpy as np
 import pytest
 from benchmarks.make import make_compliance
-from slab import assemble, slab_mesh
+from slab import slab_mesh
 
-from tactile_core.geometry.indenters import Sphere
 from tactile_core.mechanics.fast import compliance
 from tactile_core.mechanics.fast.compact_halves import unpack
 from tactile_core.mechanics.fast.compliance_rows import surface_motion
-from tactile_core.mechanics.fast.contact import ContactProblem
-from tactile_core.mechanics.placement import Placement, pose_at
-from tactile_core.mechanics.solids.sparse_cholesky import factor
 from tactile_core.sensors import PAIR, Material
 
 
@@ -30,25 +26,26 @@ def test_a_sensor_that_ships_is_not_built(monkeypatch, tmp_path):
     np.testing.assert_array_equal(first.move, second.move)
 
 
-def test_a_contact_moves_as_the_whole_solid_does():
-    """Under the forces of a contact, against a sparse solve of all nodes: 0.1 um rms, the bound that was asked for.
+# um, of nodes under a load and of every 320th, by a sparse solve of all nodes of the DIGIT's gel, which takes 30 s:
+# `factor(assemble(mesh, material)[free][:, free])` (tests/helpers/slab.py, sparse_cholesky), m and N.
+EXACT = [
+    (67.37, 102.94, -52.21), (201.14, 435.36, -152.46), (133.64, 254.20, -102.72), (185.30, 304.00, -149.45),
+    (-6.35, 6.18, -16.76), (5.48, -3.46, 8.40), (212.53, 345.99, -129.23), (59.87, -25.29, -54.96),
+    (21.70, -8.24, -25.21), (5.12, -0.27, -8.73), (9.85, -2.30, 5.20), (9.35, -2.26, 1.19), (6.13, -0.99, -0.59),
+]  # fmt: skip
 
-    Of the gel alone: the skin's solid takes too long for a test.
-    """
-    solid, found = compliance.solid_of("digit"), compliance.compliance_of("digit")
-    mesh, ball = solid.mesh, Sphere(3e-3)
-    pose = pose_at("digit", ball, Placement(-14e-3, 2e-3, 0.2, 1.0))
-    contact = ContactProblem(found, ball, pose, 0.5e-3).at_depth(0.5e-3)
-    none = np.empty(0, int)
-    moved = surface_motion(found, contact.nodes, contact.nodal_force, none, np.empty(0))
-    load = np.zeros((len(mesh.nodes), 3))
-    load[mesh.surface[solid.touchable[contact.nodes]]] = contact.nodal_force
-    free = np.repeat(~mesh.clamped, 3)
-    answer = np.zeros((len(free), 1))
-    answer[free] = factor(assemble(mesh, solid.material)[free][:, free].tocsc())(load.reshape(-1, 1)[free])
-    exact = answer.reshape(-1, 3)[mesh.surface]
-    assert np.linalg.norm(exact, axis=1).max() > 100e-6  # it moves far more than the bound
-    assert np.sqrt(((moved - exact) ** 2).sum(axis=1).mean()) < 0.1e-6
+
+def test_a_load_moves_the_gel_as_the_whole_solid_does():
+    """To 0.1 um, the bound that was asked for. Of the gel alone: the skin's solid takes minutes."""
+    found = compliance.compliance_of("digit")
+    rest = found.surface.rest
+    away = np.hypot(rest[:, 0] + 14e-3, rest[:, 2] - 2e-3)[found.touchable]
+    nodes = np.flatnonzero(away < 2e-3)
+    share = 1 - (away[nodes] / 2e-3) ** 2
+    force = share[:, None] / share.sum() * [0.3, 1.0, -0.2]
+    moved = surface_motion(found, nodes, force, np.empty(0, int), np.empty(0))
+    shown = np.r_[found.touchable[nodes[::26]], 0 : len(rest) : 320]
+    np.testing.assert_allclose(1e6 * moved[shown], EXACT, rtol=0, atol=0.1)
 
 
 def test_half_is_off_by_less_than_half_a_step(tmp_path):

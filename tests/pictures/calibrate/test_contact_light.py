@@ -13,7 +13,7 @@ from tactile_core.pictures.calibrate.fit import calibrate
 from tactile_core.pictures.calibrate.photographs import read_photographs
 from tactile_core.sensors.calibration import Coating
 
-THIN = dataclasses.replace(plain_unit().at_size(120, 160), coating=Coating(transmission=0.25))
+THIN = dataclasses.replace(plain_unit().at_size(60, 80), coating=Coating(transmission=0.25))
 
 
 @pytest.mark.parametrize("reflectance", [0.0, 0.8])

@@ -176,10 +176,10 @@ def test_a_quadratic_is_found_beside_a_press():
 
 
 def test_presses_are_found_under_a_drifted_light(tmp_path):
-    unit = plain_unit().at_size(120, 160)
+    unit = plain_unit().at_size(60, 80)
     folder = write_photographs(tmp_path / "presses", unit, PLACES[:3])
     for file in sorted(folder.iterdir()):
-        picture = np.asarray(Image.open(file)).astype(float) + DRIFT[::2, ::2]
+        picture = np.asarray(Image.open(file)).astype(float) + DRIFT[::4, ::4]
         Image.fromarray(np.rint(picture).clip(0, 255).astype(np.uint8)).save(file)
     tried = evaluate_unit(unit, read_photographs(folder, tmp_path / "untouched.png"), BALL, search_radius=False)
     for each, (right, down, depth) in zip(tried, PLACES, strict=False):
