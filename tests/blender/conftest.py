@@ -6,7 +6,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 
 import pytest
 
@@ -87,6 +87,19 @@ def imported(scene):
         options = {"filepath": str(RECORDING), "frames": "40:140"} | options
         assert bpy.ops.tactile.import_recording(**options) == {"FINISHED"}
         return bpy.context.object
+
+    return run
+
+
+@pytest.fixture
+def loaded(part):
+    """``loaded("40:140")``: those frames of the shipped recording as the extension translates them."""
+
+    def run(frames="40:140"):
+        files = {"weights": "", "columns": "", "unit": ""}
+        asked = SimpleNamespace(tare="auto", polarity="auto", frames=frames, apart=False, two=False, **files)
+        load = part("addon.operators.recording_data").load
+        return load(str(RECORDING), asked, lambda share: None, "SHAPE_KEYS", 1000.0)
 
     return run
 

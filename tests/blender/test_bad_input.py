@@ -75,21 +75,6 @@ def test_two_gels_are_drawn_each_by_its_own_parts(translated, part):
     assert (before[1] == after[1]).all()  # a copy without LEDs has the calibration's
 
 
-def test_a_recording_that_has_moved_is_named(translated):
-    skin = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "BIOTAC")
-    skin.tactile.recording = "//gone.h5"
-    bpy.context.view_layer.objects.active = skin
-    with pytest.raises(RuntimeError, match=r"gone\.h5"):
-        bpy.ops.tactile.translate()
-
-
-def test_a_text_as_calibration_is_named(translated, tmp_path):
-    (tmp_path / "notes.txt").write_text("dear diary")
-    bpy.context.scene.tactile_render.calibration = str(tmp_path / "notes.txt")
-    with pytest.raises(RuntimeError, match=r"notes\.txt"):
-        bpy.ops.tactile.set_up_render()
-
-
 @pytest.mark.parametrize("scale", [(1, 1, -1), (-1, 1, 1), (0, 1, 1)])
 def test_a_mirrored_indenter_is_refused_in_words(scene, scale):
     pytest.importorskip("msgspec")

@@ -75,7 +75,7 @@ def test_simulate_a_scene(run, tmp_path):
     folder.mkdir()
     text = (ROOT / "scenes" / "press" / "scene.toml").read_text()
     at = "x_mm = -8.0, z_mm = 0.0"
-    points = f"points = [{{ time_s = 0.0, {at}, force_n = 0.0 }}, {{ time_s = 0.02, {at}, force_n = 0.2 }}]\n"
+    points = f"points = [{{ time_s = 0.0, {at}, force_n = 0.0 }}, {{ time_s = 0.01, {at}, force_n = 0.2 }}]\n"
     (folder / "scene.toml").write_text(text[: text.index("points")] + points)
     assert run("simulate", folder, "--out", tmp_path / "out") == 0
     assert (tmp_path / "out" / "tiny" / "tiny.blend").is_file() and not list(tmp_path.rglob("*.blend1"))

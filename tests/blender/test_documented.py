@@ -15,7 +15,7 @@ def test_the_example_goes_from_an_empty_file_to_a_picture(scene, part, needs, mo
     monkeypatch.chdir(tmp_path)
     code = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL).group(1)
     assert code.count("12") == 3 and code.count("(6,") == 1
-    code = code.replace("12", "4").replace("(6,", "(2,")  # a third of the frames
+    code = code.replace("12", "3").replace("(6,", "(2,")  # a quarter of the frames
     bpy.context.scene.frame_set(1)
     exec(compile(code, str(PAGE), "exec"), {})  # noqa: S102 (the page's own text)
     found = part("tactile_core.simulation.scene").load_scene(tmp_path / "author" / "press")[0]

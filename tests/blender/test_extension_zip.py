@@ -1,6 +1,5 @@
 """The zip that users install: its listing, Blender's own check of it, and the whole job from the installed copy."""
 
-import importlib.util
 import os
 import re
 import shutil
@@ -12,18 +11,16 @@ from pathlib import Path
 
 import bpy
 import pytest
+from by_path import module_at
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def builder():
-    spec = importlib.util.spec_from_file_location("build_extension", ROOT / "scripts" / "build_extension.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
     if not (ROOT / ".git").exists() or shutil.which("git") is None:
         pytest.skip("the zip is made of what git tracks, and this is no checkout, or git is not here")
-    return module
+    return module_at(ROOT / "scripts" / "build_extension.py")
 
 
 @pytest.fixture(scope="module")

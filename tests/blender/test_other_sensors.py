@@ -3,7 +3,6 @@
 import os
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -52,12 +51,9 @@ def test_the_menus_list_the_sensors_that_are_there_the_usual_pair_first(part):
     assert gels[0] == "DIGIT" and "GELSIGHT_MINI" in gels and "BIOTAC_SP" not in gels
 
 
-def test_another_gel_is_solved_under_the_contact_that_the_networks_find(on_both, nodes_of, part):
+def test_another_gel_is_solved_under_the_contact_that_the_networks_find(on_both, nodes_of, loaded, part):
     scene, (digit, mini) = bpy.context.scene, on_both
-    files = {"weights": "", "columns": "", "unit": ""}
-    asked = SimpleNamespace(tare="auto", polarity="auto", frames="55:85:6", apart=False, two=False, **files)
-    path = str(ROOT / "scenes/press_roll_slide/press_roll_slide.h5")
-    found = part("addon.operators.recording_data").load(path, asked, lambda share: None, "", 1000.0).translation
+    found = loaded("55:85:6").translation
     arrays = {name: getattr(found, name) for name in ("displacement_digit", "contact_center", "force", "flags")}
     wanted = part("tactile_core.jobs.solved_gel").solved(arrays, GEL, "digit")["displacement_digit"]
     scene.frame_set(79)

@@ -290,11 +290,6 @@ def test_another_aspect_ratio_is_reported(ready, tmp_path):
         bpy.ops.render.render()
 
 
-def test_there_must_be_a_gel(scene):
-    with pytest.raises(RuntimeError, match="no DIGIT"):
-        bpy.ops.tactile.set_up_render()
-
-
 def test_the_camera_looks_at_what_the_picture_shows(ready, part):
     from bpy_extras.object_utils import world_to_camera_view
     from mathutils import Vector

@@ -1,5 +1,8 @@
 """Import and show: what a new file begins with is hidden, a second recording stands apart, images stay."""
 
+import runpy
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -70,3 +73,12 @@ def test_the_panel_says_an_indenter_s_shape_in_words(scene, part):
 
 def test_a_workspace_is_offered_in_a_window_alone(extension):
     assert not bpy.ops.tactile.open_workspace.poll()  # what it opens is photographed by scripts/fetch_blender.py
+
+
+def test_the_example_s_script_writes_it(scene, needs, tmp_path):
+    needs("h5py")
+    script = Path(__file__).parents[2] / "scenes" / "press_roll_slide" / "make_blend.py"
+    runpy.run_path(str(script))["write"](tmp_path / "example.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "example.blend"))
+    assert {"BIOTAC", "DIGIT"} <= {thing.tactile.role for thing in bpy.context.scene.objects}
+    assert bpy.context.scene.camera is not None

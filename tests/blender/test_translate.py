@@ -4,7 +4,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -22,39 +21,35 @@ def gel(imported):
     return bpy.context.scene.objects["DIGIT gel"]
 
 
-def _translation(part):
-    asked = SimpleNamespace(
-        tare="auto", polarity="auto", frames="40:140", weights="", columns="", unit="", apart=False, two=False
-    )
-    return (
-        part("addon.operators.recording_data").load(str(RECORDING), asked, lambda share: None, "", 1000.0).translation
-    )
+@pytest.fixture
+def translation(loaded):
+    return loaded().translation
 
 
-def test_the_gel_moves_as_translated(gel, nodes_of, part):
+def test_the_gel_moves_as_translated(gel, nodes_of, part, translation):
     rest = part("tactile_core.sensors").digit_surface().rest
     for frame in (40, 80, 139):
         bpy.context.scene.frame_set(frame)
-        wanted = part("addon.objects.axes").to_blender(rest + _translation(part).displacement_digit[frame - 40], 1000)
+        wanted = part("addon.objects.axes").to_blender(rest + translation.displacement_digit[frame - 40], 1000)
         np.testing.assert_allclose(nodes_of(gel), wanted, atol=TOLERANCE)
 
 
-def test_the_displacement_can_be_read_back(gel, part):
+def test_the_displacement_can_be_read_back(gel, part, translation):
     bpy.context.scene.frame_set(80)
     found = part("addon.objects.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
-    np.testing.assert_allclose(found, _translation(part).displacement_digit[40], atol=1e-3 * TOLERANCE)
+    np.testing.assert_allclose(found, translation.displacement_digit[40], atol=1e-3 * TOLERANCE)
 
 
-def test_the_gel_says_how_far_it_may_be_off(gel, part):
+def test_the_gel_says_how_far_it_may_be_off(gel, translation):
     bpy.context.scene.frame_set(80)
     shown = gel.evaluated_get(bpy.context.evaluated_depsgraph_get())
-    expected = 1e6 * _translation(part).expected_error_digit[40]
+    expected = 1e6 * translation.expected_error_digit[40]
     assert shown["expected_error_um"] == pytest.approx(expected, rel=1e-5)
 
 
-def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part):
+def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part, translation):
     bpy.context.scene.frame_set(80)
-    skin, found = bpy.context.scene.objects["BioTac skin"], _translation(part)
+    skin, found = bpy.context.scene.objects["BioTac skin"], translation
     in_words = part("tactile_core.translation.trust_words").in_words
     dent = part("tactile_core.accuracy").lengths(found.displacement_digit[40]).max()
     words = in_words(found.confidence[40], found.flags[40], found.expected_error_digit[40], dent, found.force[40])
@@ -62,8 +57,8 @@ def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part):
     assert words.startswith("guess: shape unsure, expected error")
 
 
-def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part):
-    silent = int(np.flatnonzero(~_translation(part).force.any(axis=1))[0])
+def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part, translation):
+    silent = int(np.flatnonzero(~translation.force.any(axis=1))[0])
     bpy.context.scene.frame_set(40 + silent)
     words, _ = part("addon.ui.panels").trust_of(bpy.context.scene.objects["BioTac skin"], gel)
     assert "no contact" in words and "expected error" not in words
@@ -95,9 +90,9 @@ def test_flags_are_kept_frame_by_frame(scene, part):
     assert said[20] == ("guess: rectified recording, expected error 0.37 mm", True)
 
 
-def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
+def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part, translation):
     surface = part("tactile_core.sensors").digit_surface()
-    patch = part("tactile_core.translation.gel_place").contact_patch(_translation(part).displacement_digit, surface)
+    patch = part("tactile_core.translation.gel_place").contact_patch(translation.displacement_digit, surface)
     assert patch[40].any() and not patch[40].all()
     for frame in (40, 80, 100, 139):
         bpy.context.scene.frame_set(frame)
@@ -107,10 +102,10 @@ def test_the_contact_patch_is_an_attribute_of_every_frame(gel, part):
         np.testing.assert_array_equal(values > 0.5, patch[frame - 40])
 
 
-def test_the_picture_and_height_map_are_those_of_the_library(gel, part):
+def test_the_picture_and_height_map_are_those_of_the_library(gel, part, translation):
     bpy.context.scene.frame_set(80)
     part("addon.operators.pictures").update(gel, bpy.context.evaluated_depsgraph_get())
-    heights = part("tactile_core.pictures.height_map").height_map(_translation(part).displacement_digit[40])
+    heights = part("tactile_core.pictures.height_map").height_map(translation.displacement_digit[40])
     shown = bpy.data.images["DIGIT height map"]
     values = np.empty(320 * 240 * 4, np.float32)
     shown.pixels.foreach_get(values)
@@ -165,11 +160,6 @@ def test_a_recording_moved_after_import_is_reported(imported, tmp_path):
     with pytest.raises(RuntimeError, match=r"here\.h5: there is no such file"):
         bpy.ops.tactile.translate()
     assert len(bpy.data.objects) == before
-
-
-def test_there_must_be_a_recording(scene):
-    with pytest.raises(RuntimeError, match="poll"):
-        bpy.ops.tactile.translate()
 
 
 def test_a_file_of_a_newer_version_is_refused(imported):
