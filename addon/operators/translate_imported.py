@@ -5,6 +5,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...tactile_core.errors import TactileError
+from ...tactile_core.jobs.results import BALL, ball_radius
 from ...tactile_core.translation import gel_place
 from ..objects import curves, digit_body, digit_objects, mesh_cache, motion
 from ..process.jobs import Job, JobFolder
@@ -14,7 +15,7 @@ from . import pictures, recording_data, set_style, view
 from .import_recording import play, plays
 from .job_operator import JobOperator
 
-_READ = ("displacement_digit", "contact_center", "force", "flags")  # of a translation, to solve its contacts
+_READ = ("displacement_digit", "contact_center", "force", "flags", "expected_error_digit")  # to solve its contacts
 
 
 class TACTILE_OT_translate(JobOperator):
@@ -39,7 +40,7 @@ class TACTILE_OT_translate(JobOperator):
         return True
 
     def begin(self, context: bpy.types.Context) -> None:
-        """Translate the recording; start a job only for a gel that networks do not lead to, to solve its contacts."""
+        """Translate the recording; start a job only to solve the contacts, under a known ball or on another gel."""
         skin = properties.of_role(context.scene, "BIOTAC", context.object)
         properties.check_format(skin)
         properties.check_own(skin, skin.data)  # an override's mesh is linked
@@ -49,10 +50,12 @@ class TACTILE_OT_translate(JobOperator):
         with shown(context) as progress:
             own = recording_data.translator_of(about, bpy.path.abspath(about.recording)).target
             self._target = self.to.lower() if self.properties.is_property_set("to") else own
-            if about.two and self._target != own:
+            ball = ball_radius(f"{BALL}{about.ball:g}") if about.ball else None
+            solved = self._target != own or ball is not None
+            if about.two and solved:
                 raise TactileError("Two Contacts", "a gel that is solved", "one that is translated to", "Leave it out")
-            # Another gel's contacts are solved from what is in memory.
-            how = (about.motion if self._target == own else "") or "SHAPE_KEYS"
+            # Contacts are solved from what is in memory.
+            how = (about.motion if not solved else "") or "SHAPE_KEYS"
             found = recording_data.load(bpy.path.abspath(about.recording), about, progress, how, about.per_metre)
         self._skin = skin.session_uid, skin.name
         self._found = found
@@ -60,12 +63,12 @@ class TACTILE_OT_translate(JobOperator):
         beside = gel_place.beyond_picture(found.translation.contact_center, unit.camera)
         self._moved, self._flags = found.gel, found.translation.flags | beside
         self._error = found.translation.expected_error_digit
-        if self._target != own:
+        if solved:
             require("scipy")
             self._folder = JobFolder()
             arrays = {name: getattr(found.translation, name) for name in _READ}
             np.savez(self._folder.path / "frames.npz", **arrays)
-            self._job = Job("solve_gel", self._folder.path, gel=self._target, found_on=own)
+            self._job = Job("solve_gel", self._folder.path, gel=self._target, found_on=own, ball=ball)
 
     def finish(self, context: bpy.types.Context) -> None:
         """Animate the gel by the translation; add a gel if there is none."""
@@ -73,7 +76,7 @@ class TACTILE_OT_translate(JobOperator):
             with np.load(self._folder.path / "gel.npz") as stored:
                 self._moved = mesh_cache.in_memory(stored["displacement"], self._target)
                 self._flags |= stored["flags"]
-            self._error = np.full(len(self._flags), curves.UNKNOWN)
+                self._error = np.nan_to_num(stored["error"], nan=curves.UNKNOWN)
             from ...tactile_core.jobs.frame_pass import describe_gel
 
             for words in describe_gel(self._target, self._found.translator.target):

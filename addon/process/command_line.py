@@ -89,6 +89,7 @@ def _parser() -> argparse.ArgumentParser:
         )
         verb.add_argument("--frames-apart", action="store_true", help="translate each frame by itself, as of snapshots")
         verb.add_argument("--contacts", type=int, choices=(1, 2), default=1, help="looked for in a frame (default: 1)")
+        verb.add_argument("--ball", type=float, default=0.0, metavar="MM", help="known to touch: solved; a plate: 2000")
         verb.add_argument("--to", choices=gels, help="gel of recordings (default: the weights')")
         verb.add_argument("--frames", default=":", help="of recordings: A:B:STEP")
         verb.add_argument("--seed", type=int, default=0, help="of simulated noise")
@@ -128,6 +129,7 @@ def convert(path: Path, folder: Path, options: argparse.Namespace) -> None:
         "polarity": options.polarity,
         "apart": options.frames_apart,
         "two": options.contacts == 2,
+        "ball": options.ball,
     }
     files = {"weights": options.weights, "columns": options.columns, "unit": options.sensor}
     words |= {name: str(file.resolve()) for name, file in files.items() if file is not None}

@@ -245,8 +245,9 @@ def picture_scene(folder: Path, job: dict, progress: Progress) -> None:
 def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
     """Solve on the gel job["gel"] the contacts that networks found on the gel job["found_on"].
 
-    Reads FOLDER/frames.npz: a translation's displacement_digit, contact_center, force, flags
-    Writes FOLDER/gel.npz: displacement (T, n, 3) m, flags (T,)
+    job["ball"] : radius, m, of the ball that touched; None for one as curved as the dent
+    Reads FOLDER/frames.npz: a translation's displacement_digit, contact_center, force, flags, expected_error_digit
+    Writes FOLDER/gel.npz: displacement (T, n, 3) m, flags (T,), error (T,) m, expected, NaN where it is not known
     """
     from tactile_core.jobs import solved_gel
 
@@ -258,11 +259,11 @@ def solve_gel(folder: Path, job: dict, progress: Progress) -> None:
     count, parts = len(arrays["flags"]), []
     for start in range(0, count, BLOCK):
         part = {name: values[start : start + BLOCK] for name, values in arrays.items()}
-        found = solved_gel.solved(part, job["gel"], job["found_on"])
-        parts.append((found["displacement_digit"], found["flags"]))
+        found = solved_gel.solved(part, job["gel"], job["found_on"], job["ball"])
+        parts.append((found["displacement_digit"], found["flags"], found[solved_gel.EXPECTED]))
         progress(min(start + BLOCK, count), count)
-    moved, flags = map(np.concatenate, zip(*parts, strict=True))
-    np.savez(folder / "gel.npz", displacement=moved, flags=flags)
+    moved, flags, error = map(np.concatenate, zip(*parts, strict=True))
+    np.savez(folder / "gel.npz", displacement=moved, flags=flags, error=error)
 
 
 def variant(folder: Path, job: dict, progress: Progress) -> None:

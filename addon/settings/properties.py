@@ -78,6 +78,10 @@ class RecordingOptions:
         name="Two Contacts", description="Look for a second contact in each frame, of a finger that touches in two"
         " places; a single wide contact is often taken for two", options=set(),
     )  # fmt: skip
+    ball: bpy.props.FloatProperty(
+        name="Known Ball", description="Diameter, mm, of the ball that is known to have touched, 2000 for a plate; 0 if"
+        " it is not known. Translate then solves the gel under it", min=0.0, soft_max=2000.0, options=set(),
+    )  # fmt: skip
     weights: bpy.props.StringProperty(
         name="Weights", description="Folder of the networks, which name their two sensors; empty: those that ship for"
         " the recording's sensor", subtype="DIR_PATH", options=RELATIVE,

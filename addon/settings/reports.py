@@ -34,6 +34,8 @@ WORDS = (
     (r"--error\b", "Largest Error"),
     (r"--frames-apart\b", "Each Frame Alone"),
     (r"--contacts( 2)?\b", "Two Contacts"),
+    (r"--gel: 'ball:(\S+)'", r"Known Ball: \1"),
+    (r"translated, solved or ball:MM, |ball:(?=\d)", ""),
     (r"the aspect ratio of \d+ x \d+", lambda found: f"{found[0]}. Set Up Render sets it; the percentage keeps it"),
 )  # fmt: skip
 ADVICE = "Install the extension's zip for this platform, which brings it"

@@ -46,7 +46,7 @@ class TACTILE_PT_recording(_Panel, bpy.types.Panel):
             box.prop(skin.tactile, "recording", text="")
             box.prop(skin.tactile, "tare")
             box.prop(skin.tactile, "polarity")
-            for name in ("columns", "unit", "apart", "two", "weights"):
+            for name in ("columns", "unit", "apart", "two", "ball", "weights"):
                 box.prop(skin.tactile, name)
         row = layout.row(align=True)
         row.operator(TACTILE_OT_translate.bl_idname, icon="MOD_MESHDEFORM")

@@ -28,7 +28,7 @@ from tactile_core.pictures.calibrate.photographs import CHANGE, Photographs, cho
 from tactile_core.pictures.renderer import Renderer, camera_noise
 from tactile_core.recordings import PrepareOptions, read
 from tactile_core.recordings.assemble import assemble
-from tactile_core.sensors.calibration import LARGEST_LEVEL
+from tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.translation.translate import translate
 
@@ -72,6 +72,15 @@ def other_unit(data: Path) -> Photographs:
     return read_photographs(folder, folder / "untouched.jpg")
 
 
+def folds(photographs: Photographs, count: int, start: Calibration) -> Iterator[tuple[Calibration, Photographs]]:
+    """Split photographs into ``count`` parts; for each yield a fit from ``start`` to all others, and the part."""
+    names = [press.name for press in photographs.presses]
+    for fold in range(count):
+        apart = names[fold::count]
+        others = chosen(photographs, [name for name in names if name not in apart])
+        yield calibrate(others, DIAMETER, start, unit="", quick=True).calibration, chosen(photographs, apart)
+
+
 def metric_rows(tried: list[Evaluation], of: str) -> Iterator[Row]:
     """Yield rows of the metrics' means over evaluated photographs, and of the worst PSNR; of : names them, a text"""
     ours, baseline = mean_metrics(tried)
@@ -87,11 +96,8 @@ def thirds(data: Path) -> Iterator[Row]:
     the other third and on ``deeper`` presses."""
     known = own_unit(data)
     start, deep, apart, deep_tried = load_calibration(START), deeper(data, known), [], []
-    names = [press.name for press in known.presses]
-    for third in (names[fold::3] for fold in range(3)):
-        others = chosen(known, [name for name in names if name not in third])
-        unit = calibrate(others, DIAMETER, start, unit="", quick=True).calibration
-        apart += evaluate_unit(unit, chosen(known, third), DIAMETER / 2, search_radius=False)
+    for unit, third in folds(known, 3, start):
+        apart += evaluate_unit(unit, third, DIAMETER / 2, search_radius=False)
         deep_tried += evaluate_unit(unit, deep, DIAMETER / 2, search_radius=False)
     yield from metric_rows(apart, "14 photographs by thirds")
     yield from metric_rows(deep_tried, "2 deeper, by the fits of the 14")
@@ -103,6 +109,14 @@ def five(data: Path) -> Iterator[Row]:
     apart = [press.name for press in known.presses if press.name not in unit.fit.photographs]
     for of, each in (("5 not fitted", chosen(known, apart)), ("another unit", other_unit(data))):
         yield from metric_rows(evaluate_unit(unit, each, DIAMETER / 2, search_radius=False), f"unit that ships, {of}")
+
+
+def fifths(data: Path) -> Iterator[Row]:
+    """Yield rows of fits to four fifths of another unit's photographs, from the shipped unit, judged on the fifth."""
+    tried = []
+    for unit, fifth in folds(other_unit(data), 5, load_calibration()):
+        tried += evaluate_unit(unit, fifth, DIAMETER / 2, search_radius=False)
+    yield from metric_rows(tried, "another unit by fifths")
 
 
 def levels(data: Path) -> Iterator[Row]:
@@ -194,7 +208,7 @@ def patch_statistics(picture: np.ndarray) -> np.ndarray:
 
 
 PARTS: dict[str, Callable[[Path], Iterator[Row]]] = {
-    each.__name__: each for each in (levels, five, thirds, told_apart)
+    each.__name__: each for each in (levels, five, thirds, fifths, told_apart)
 }  # fmt: skip
 
 if __name__ == "__main__":

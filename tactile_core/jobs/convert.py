@@ -17,6 +17,7 @@ from ..files import atomic, provenance
 from ..files.hdf5_writer import new_hdf5
 from ..files.png_writer import pack_png
 from ..files.provenance import Stopwatch
+from ..files.threads import in_one_thread
 from ..pictures.presets import FAST
 from ..recordings import PrepareOptions, Recording, labels
 from ..sensors import SOURCE, TARGET
@@ -110,6 +111,7 @@ class Converted:
     remark: str
 
 
+@in_one_thread
 def convert(
     recording_path: str | os.PathLike,
     folder: str | os.PathLike,

@@ -269,7 +269,27 @@ def test_a_second_contact_is_looked_for_and_said_where_asked(two_balls, part):
     assert np.abs(moved[True] - moved[False]).max() > 0.1e-3
 
 
-def test_two_contacts_on_a_gel_that_is_solved_are_refused(two_balls):
-    bpy.ops.tactile.import_recording(filepath=str(two_balls), two=True)
+@pytest.mark.parametrize(("ball", "to"), [(0, "GELSIGHT_MINI"), (28, "DIGIT")])
+def test_two_contacts_on_a_gel_that_is_solved_are_refused(two_balls, ball, to):
+    bpy.ops.tactile.import_recording(filepath=str(two_balls), two=True, ball=ball)
     with pytest.raises(RuntimeError, match="Two Contacts"):
-        bpy.ops.tactile.translate(to="GELSIGHT_MINI")
+        bpy.ops.tactile.translate(to=to)
+
+
+def test_a_known_ball_is_solved_for(imported, part, needs):
+    needs("scipy")
+    skin = imported(frames="80:81")
+    scene, dents, told = bpy.context.scene, [], []
+    for ball in (0, 14):
+        skin.tactile.ball = ball
+        bpy.ops.tactile.translate()
+        scene.frame_set(80)
+        gel = scene.objects["DIGIT gel"]
+        moved = part("addon.objects.digit_objects").displacement_of(gel, bpy.context.evaluated_depsgraph_get())
+        dents.append(np.linalg.norm(moved, axis=1).max())
+        told.append(gel["expected_error_um"])
+    assert 0.3 * dents[0] < dents[1] < 0.95 * dents[0]  # wider than the body that the signals alone tell of
+    assert told[1] / told[0] == pytest.approx(dents[1] / dents[0], rel=0.01)
+    skin.tactile.ball = 0.5
+    with pytest.raises(RuntimeError, match=r"Known Ball: 0\.5; expected a diameter of 1 to 2000 mm\. A plate is 2000"):
+        bpy.ops.tactile.translate()
