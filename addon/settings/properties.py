@@ -79,8 +79,8 @@ class RecordingOptions:
         " places; a single wide contact is often taken for two", options=set(),
     )  # fmt: skip
     ball: bpy.props.FloatProperty(
-        name="Known Ball (mm)", description="Diameter, mm, of the ball that is known to have touched, 2000 for a plate; 0 if"
-        " it is not known. Translate then solves the gel under it", min=0.0, soft_max=2000.0, options=set(),
+        name="Known Ball (mm)", description="Diameter of the ball that is known to have touched, 2000: a plate; 0 if"
+        " it is not known. Translate then solves the gel under it", soft_min=0.0, soft_max=2000.0, options=set(),
     )  # fmt: skip
     weights: bpy.props.StringProperty(
         name="Weights", description="Folder of the networks, which name their two sensors; empty: those that ship for"

@@ -217,6 +217,9 @@ def tell_problems(problems: Sequence[Problem], row_word: str) -> list[str]:
 
 
 def _check_size(path: str, electrodes: np.ndarray, sensor: str) -> None:
+    if electrodes.ndim != 2:
+        expected = f"(frames, {electrode_count(sensor)})"
+        raise TactileError(f"{path}, electrodes", f"an array of shape {electrodes.shape}", expected)
     if len(electrodes) == 0:
         advice = "Check that the recording was written to its end"
         raise TactileError(path, "no data rows", "at least one frame", advice)

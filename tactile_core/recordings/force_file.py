@@ -20,7 +20,7 @@ MOST_FORCE = 100.0  # N: a fingertip breaks; numbers beyond are grams, millinewt
 LEAST_CHANGE = 1e-3  # N, standard deviation below which a column is no force on a finger that touches (assumed)
 SHARED = 0.5  # of the recording's frames, that the force's clock must cover (assumed)
 COLUMNS = "N in one column or three (x, y, z), behind the column of time if there is one"
-OTHER_UNIT = re.compile(r"[\[(](lbf?|lbs|kgf?|gf?|grams?|ozf?|mn|kn|m?v|counts?)[\])]|_(lbf?|lbs|kgf?|gf|ozf|mn)$")
+OTHER_UNIT = re.compile(r"[\[(](lbf?|lbs|kgf?|gf?|grams?|ozf?|mn|kn|m?v|counts?)[\])]|_(lbf?|lbs|kgf?|gf|ozf)$")
 ADVICE = "Leave in it what is measured beside the recording, in newtons"
 
 
@@ -42,7 +42,7 @@ def read_force(named: str, recording: Recording) -> tuple[np.ndarray, np.ndarray
         raise TactileError("--force", found, "the force of a recording", advice)
     columns = table.columns([column for each in picked for column in each] if own else list(table.header))
     timed = not own and columns.shape[1] in (2, 4)
-    for name in table.header if not own else [column for each in picked for column in each]:
+    for name in table.header[int(timed) :] if not own else [column for each in picked for column in each]:
         if OTHER_UNIT.search(name):
             raise TactileError(where, f"a column {name!r}", "newtons", "Convert it, and name the column after them")
     size = _size(where, columns[:, int(timed) :], table.lines)
@@ -84,15 +84,10 @@ def _size(where: str, columns: np.ndarray, lines: np.ndarray) -> np.ndarray:
     if not np.isfinite(size).all():
         found = f"no number in row {lines[int(np.argmin(np.isfinite(size)))]}"
         raise TactileError(where, found, "a force in every row", "Cut the rows off, or fill them in")
-    check_newtons(where, size)
-    return size
-
-
-def check_newtons(where: str, size: np.ndarray) -> None:
-    """Raise TactileError for the size (n,) of a force that no finger has in newtons. where : the file, for messages"""
     if size.max() > MOST_FORCE or size.std() < LEAST_CHANGE:
         found = f"{size.min():g} to {size.max():g}, which cannot be a finger's force in newtons"
         raise TactileError(where, found, f"changing sizes up to {MOST_FORCE:g} N", "Convert it to newtons")
+    return size
 
 
 def _beside(where: str, stamps: np.ndarray, recording: Recording) -> np.ndarray:

@@ -124,9 +124,10 @@ class Recording(Summary):
 
     def check(self) -> None:
         """Raise TactileError for fields that do not fit each other, as of a recording that was changed by hand."""
-        for name, kind in (("warnings", tuple | list), ("about", dict)):
+        for name, kind, expected in (("warnings", tuple | list, "sentences in a tuple"), ("about", dict, "a dict")):
             if not isinstance(value := getattr(self, name), kind):
-                raise TactileError(f"{self.path}, {name}", f"a {type(value).__name__}", f"{kind}", "Leave it empty")
+                found = f"a {type(value).__name__}"
+                raise TactileError(f"{self.path}, {name}", found, expected, "Leave it empty: () or {}")
         for name, axes in {"electrodes": 2, "time": 1, "rows": 1, "flags": 1, "pdc": 1}.items():
             value = getattr(self, name)
             if value is None and name == "pdc":

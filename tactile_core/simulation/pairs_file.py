@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import sensors
+from .. import accuracy, sensors
 from ..errors import TactileError
 from ..files.hdf5_checked import declared, open_checked
 from ..sensors import PAIR
@@ -205,7 +205,8 @@ def _check_values(arrays: dict[str, np.ndarray], path: str | os.PathLike) -> Non
 def _check_sizes(arrays: dict[str, np.ndarray], scales: dict[str, float], path: str | os.PathLike) -> None:
     """Raise TactileError if the contacts' sizes show another unit, or a dent does not go inward with its depth.
     arrays : of the file, name -> (C, ...); scales : m per unit of the displacements"""
-    found = {name: float(np.median(np.abs(arrays[name]))) for name in SIZES}
+    sizes = arrays | {"force": accuracy.lengths(arrays["force"])}
+    found = {name: float(np.median(np.abs(sizes[name]))) for name in SIZES}
     skin, gel = arrays["displacement_biotac"], arrays["displacement_digit"][:, :, 1]
     for name, dent in (("biotac", np.maximum(skin.max((1, 2)), -skin.min((1, 2)))), ("digit", gel.max(1))):
         share = scales[f"displacement_{name}"] * dent / np.maximum(arrays[f"depth_{name}"], 1e-9)

@@ -22,13 +22,12 @@ from ..errors import TactileError
 from ..files import provenance
 from ..recordings import prepare, read
 from ..recordings.flags import Flag
-from ..recordings.force_file import check_newtons
+from ..recordings.force_file import MOST_FORCE
 from ..sensors import unrolling
 from ..simulation.pairs_file import Split, split_presses
 from ..translation import networks, reference_signals
 from ..translation.card import PLACE, STATE
 from ..translation.contact_frame import ContactFrame
-from ..translation.force_scale import check_scale
 from ..translation.gel_place import on_gel, place_on
 from ..translation.layers import COMPRESSED_LIMIT
 from ..translation.networks import Networks
@@ -43,6 +42,7 @@ from .train import deterministic, prepared_folder
 METRES_BELOW = 0.5
 OFF_SKIN = 4e-3  # m; a contact farther from the skin is in another frame or unit (assumed; dents are below 2 mm)
 OFF_SHARE = 0.1  # of the contacts that may lie off the skin, as places of real robots do
+WILD = 0.02  # of the forces that may be beyond any finger's, as a sensor's glitches are (assumed)
 TOUCH = 0.05  # N: below, a frame is no contact (assumed; force sensors of robots are no better)
 FEWEST = 200  # frames in contact (assumed)
 BLOCKS = 20  # parts of a recording without pauses, which then stand for presses
@@ -94,7 +94,9 @@ def read_labelled(path: str | os.PathLike, frame: ContactFrame, seed: int) -> La
         raise TactileError(path, found, f"at least {FEWEST}", "Give a longer recording")
     change = signals.typical[used].astype(np.float32)
     rectified = signals.kind == "rectified"
-    check_newtons(f"{os.fspath(path)}, force_vec", force[used])
+    if np.mean(force[used] > MOST_FORCE) > WILD:
+        found = f"{force[used].min():g} to {force[used].max():g}, which cannot be a finger's force in newtons"
+        raise TactileError(f"{os.fspath(path)}, force_vec", found, f"up to {MOST_FORCE:g} N", "Convert it to newtons")
     split = split_presses(_presses(used), seed, path)
     labels = place.astype(np.float32), force[used].astype(np.float32)
     return LabelledRecording(np.abs(change) if rectified else change, rectified, *labels, split, tuple(dropped))
@@ -158,8 +160,6 @@ def fine_tune(
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
     data = read_labelled(path, before.frames["MVD"], seed)
-    found = np.maximum(_answer(before, data)[1], FORCE_FLOOR)
-    check_scale(f"{os.fspath(path)}, force_vec", float(np.median(data.force / found)))
     typical = reference_signals.read(source).typical.astype(np.float32)
     with prepared_folder(Path(out_folder), overwrite):
         net = "R2MPN" if data.rectified else "S2MPN"

@@ -25,7 +25,7 @@ LAGS = np.round(np.arange(-1, 1.001, 0.01), 2)  # s, of the force behind the ele
 # Least correlation of measured and translated force of one touch, at the best lag: against the shipped recording's 180
 # frames noise reaches .24, the time itself .33.
 TOGETHER = 0.4
-UNUSUAL = 3.0  # scale, or its inverse, that a unit hardly has: those measured are .5 to 1.7
+UNUSUAL = 3.0  # scale, or its inverse, that a unit hardly has: of raw counts .5 to 1.7 (of tared ones .2)
 UNTOUCHED = 0.3  # share of the force in contact that a sensor may show without contact; more was not tared (assumed)
 PARTS = 8  # of the frames; the scatter of their scales gives the scale's error
 
@@ -59,7 +59,7 @@ class ForceScale:
             f"with this scale, {self.without:.2f} N without, {self.constant:.2f} N of a constant force"
         )
         if not 1 / UNUSUAL <= self.scale <= UNUSUAL:
-            said += "; that is far from any finger so far: is the force in newtons (1 lbf is 4.45 N, 1 ozf 0.28 N)?"
+            said += "; is the force in newtons (1 lbf is 4.45 N, 1 ozf 0.28 N)?"
         if self.better:
             return f"stiffness: {said}"
         apart = self.correlation < TOGETHER
@@ -119,7 +119,9 @@ def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: 
         found = f"{np.median(idle):.2g} N where nothing touches, {touching:.2g} N in contact"
         raise TactileError(where, found, "no force without contact", "Take its reading without contact off each column")
     scale = _scale(translated[first], force[first])
-    check_scale(where, scale)
+    if not LEAST <= scale <= MOST:
+        found = f"{scale:.3g} times the translated force: not newtons, or not of this finger"
+        raise TactileError(where, found, f"{LEAST:g} to {MOST:g}", "Convert the force to newtons")
     parts = [_scale(translated[part], force[part]) for part in np.array_split(np.flatnonzero(known), PARTS)]
 
     def off(guess: np.ndarray | float) -> float:
@@ -129,13 +131,6 @@ def fit(translated: np.ndarray, measured: Callable[[float], np.ndarray], where: 
         scale, float(np.std(parts)) / scale, lag, correlations[lag],
         off(translated), off(scale * translated), off(float(np.median(force[first]))),
     )  # fmt: skip
-
-
-def check_scale(where: str, scale: float) -> None:
-    """Raise TactileError if a force is not ``scale`` times the translated one on any unit. where : its file"""
-    if not LEAST <= scale <= MOST:
-        found = f"{scale:.3g} times the translated force: not newtons, or not of this finger"
-        raise TactileError(where, found, f"{LEAST:g} to {MOST:g}", "Convert the force to newtons")
 
 
 def _translated(

@@ -138,7 +138,7 @@ def translate(
         if not isinstance(given, kind):
             advice = "tactile.read reads a file; numpy.savez writes arrays to one" * (kind is Recording)
             raise TactileError(f"translate, {name}", f"a {type(given).__name__}", f"a {kind.__name__}", advice)
-    recording.check()
+    recording.check()  # before its length is asked for
     try:
         chosen = np.arange(len(recording))[frames]
     except (IndexError, TypeError):  # no indices

@@ -53,7 +53,8 @@ class Translation(Summary):
     contact_center : (T, 2) m, (x, z) on the DIGIT after unrolling, NaN without contact
     confidence : (T,), share of simulated frames like this one whose largest node error is below ``error_bound_digit``;
         lower far from the training, and at most `UNTRAINED_CONFIDENCE` if a flag doubts the frame
-    expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one
+    expected_error_biotac, expected_error_digit : (T,) m, median of the largest node error in frames like this one;
+        at least the dent where a contact is held through time that the frame's own signals do not show
     error_bound_biotac, error_bound_digit : (T,) m, 95 % quantile of that error (measured on the validation presses)
     flags : (T,) uint16, bits of ``flags.Flag``: those of the signals, and those that translation finds
     second_center : (T, 2) m, second_force : (T, 3) N, of the weaker of two contacts, with `Answer.contacts` = 2; NaN
@@ -187,8 +188,9 @@ class Translator:
         flags[undecided] |= np.uint16(Flag.UNDECIDED_PLACE)
         # The error foretold is that of the frame alone: where that answers no contact, a tracked one may be all wrong.
         held = touched & ~touches(evidence.likely)
-        least = held[:, None] * np.stack([accuracy.lengths(each).max(axis=1) for each in (skin, gel)], -1)
-        expected = np.maximum(nets.expected_error(change, rectified), least)
+        expected = nets.expected_error(change, rectified)
+        for error, moved in zip(expected.T, (skin, gel), strict=True):
+            error[held] = np.maximum(error[held], accuracy.lengths(moved[held]).max(axis=1))
         return Translation(
             latent_signal, latent_source, latent_target, skin, gel, pressure=pressure, contact_center=center,
             force=np.where(silent[:, None], np.float32(0), signals.stiffness * nets.force_in(state, latent_source)),

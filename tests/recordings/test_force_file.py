@@ -71,7 +71,7 @@ def test_what_is_no_force_beside_the_recording_is_refused(columns, said, tmp_pat
         read_force(written(tmp_path, columns), recording())
 
 
-@pytest.mark.parametrize("unit", ["[lbf]", "(kg)", "_mN", "_gf"])
+@pytest.mark.parametrize("unit", ["[lbf]", "(kg)", "_ozf", "_gf"])
 def test_a_column_named_after_another_unit_is_refused(unit, tmp_path):
     with pytest.raises(TactileError, match=r"a column 'force.*'; expected newtons"):
         read_force(written(tmp_path, SIZE, f"force{unit}"), recording())

@@ -82,8 +82,6 @@ def test_metres_read_as_millimetres(arrays, tmp_path):
         (lambda a: changed(a, contact_loc=np.full_like(a["contact_loc"], np.nan)), "usable frames"),
         (lambda a: changed(a, force_vec=0 * a["force_vec"]), "usable frames"),
         (lambda a: changed(a, force_vec=102 * a["force_vec"]), "cannot be a finger's force in newtons"),  # gf
-        (lambda a: changed(a, force_vec=0 * a["force_vec"] + 1), "cannot be a finger's force in newtons"),
-        (lambda a: changed(a, force_vec=0.102 * a["force_vec"]), r"0\.1\d* times the translated force"),  # kgf
         (lambda a: {name: values[:300] for name, values in a.items()}, "usable frames"),
     ],
 )
@@ -98,10 +96,13 @@ def test_labels_that_no_network_could_mean_are_doubted(arrays, tmp_path, capsys,
     monkeypatch.setattr(fine_tuning, "EPOCHS", 1)
     mirrored = 1e-3 * arrays["contact_loc"] * [1, -1, 1]  # m
     mirrored[np.linalg.norm(arrays["force_vec"], axis=1).argmax()] = 0.9
-    path = write_labelled(tmp_path / "labelled.hdf5", changed(arrays, contact_loc=mirrored))
+    heavy = 9.81 * arrays["force_vec"]
+    heavy[np.linalg.norm(heavy, axis=1).argmin()] = 200.0  # N; one glitch is no other unit either
+    path = write_labelled(tmp_path / "labelled.hdf5", changed(arrays, contact_loc=mirrored, force_vec=heavy))
     assert main(["train", "s2mpn", "--real", str(path), "--out", str(tmp_path / "tuned")]) == 0
     said = capsys.readouterr().err
-    assert "warning: real_position_mm of kept presses, before is no better than one answer for all" in said
+    for what in ("position_mm", "force_percent"):
+        assert f"warning: real_{what} of kept presses, before is no better than one answer for all" in said
     assert "left out: 1 contacts that are not on the pad" in said
 
 

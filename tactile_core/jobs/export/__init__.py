@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
+from ...errors import TactileError
 from ...files import atomic, provenance
 from ...files.installed import modules_of
 from . import finished_job, formats
@@ -24,7 +25,9 @@ def export(
 ) -> finished_job.Finished:
     """Write the finished job in the folder `job` into the new folder `out`, whole or not at all; return the job.
     layout : a layout's name; progress : called with (frames done, in all)
-    Raises TactileError for a job that is not finished, a folder that exists, and a full disk."""
+    Raises TactileError for a job that is not finished, an unknown layout, a folder that exists, and a full disk."""
+    if layout not in layouts():
+        raise TactileError("--to", repr(layout), " or ".join(layouts()))
     source = finished_job.load(Path(job))
     write(source, layout, out, progress)
     return source
