@@ -237,23 +237,18 @@ def _rows(nets: Networks, data: LabelledRecording, when: str) -> list[Row]:
     training presses' median. when : word in the rows' set, "before" or "after" the fine-tuning"""
     test, train = data.split.test, data.split.train
     frame = nets.frames["MVD"]
-    state, load = (each[test] for each in _answer(nets, data))
+    latent = nets.encode_signal(data.change[test], data.rectified)
+    state = nets.contact(latent, data.rectified)
     true, middle = on_gel(frame, data.place[test]), np.median(data.place[train], 0, keepdims=True)
     miss, baseline = (accuracy.lengths(on_gel(frame, each) - true) for each in (state[:, :PLACE], middle))
-    usual = np.median(data.force[train])
+    estimated = nets.force_in(state, nets.given(latent, state, data.rectified))
+    load, usual = accuracy.lengths(estimated), np.median(data.force[train])
     share, nothing = (100 * np.abs(each - data.force[test]) / data.force[test] for each in (load, usual))
     of = f"kept presses, {when}"
     return [
         row("real_position_mm", 1e3 * float(np.median(miss)), "mm", baseline=1e3 * float(np.median(baseline)), of=of),
         row("real_force_percent", float(np.median(share)), "%", baseline=float(np.median(nothing)), of=of),
     ]
-
-
-def _answer(nets: Networks, data: LabelledRecording) -> tuple[np.ndarray, np.ndarray]:
-    """Return the states (F, STATE) and the sizes (F,) N of force that the networks find in the recording's frames."""
-    latent = nets.encode_signal(data.change, data.rectified)
-    state = nets.contact(latent, data.rectified)
-    return state, accuracy.lengths(nets.force_in(state, nets.given(latent, state, data.rectified)))
 
 
 def _write(folder: Path, source: Path, card: dict, tuned: str, state: dict[str, np.ndarray], note: dict) -> None:

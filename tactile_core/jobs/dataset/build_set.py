@@ -30,8 +30,9 @@ from ..engine.job import Translate
 from ..export import finished_job
 from ..export.finished_job import Finished, Recorded
 from . import dataset_card, survival
-from .collected import TEST, TRAIN, Collected, File, beside, calibrated, collect, file_name, readable
+from .collected import TEST, TRAIN, Collected, File, beside, collect
 from .recipe import FORCE, Recipe
+from .set_units import calibrated, file_name, readable
 
 CARD, PAGE, UNITS, JOBS, REPORT = "README.md", "index.html", "units", "jobs", "dataset.json"
 ALL = "all"  # name of the unit where a set has one
