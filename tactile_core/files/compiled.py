@@ -62,7 +62,10 @@ class Loop:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
-        return self._run(*arguments) if available() else self._function(*arguments)
+        try:
+            return self._run(*arguments) if available() else self._function(*arguments)
+        except SystemError as error:  # numba's, of what a signal's handler raised meanwhile, such as Ctrl-C's
+            raise error.__cause__ or error from None
 
     def _first_call(self, *arguments: Any) -> Any:
         import numba

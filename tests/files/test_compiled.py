@@ -1,6 +1,7 @@
 """Compiled loops are kept on disk for the next process, whatever its name of the package, and give numpy's numbers."""
 
 import ast
+import signal
 import subprocess
 import sys
 
@@ -71,6 +72,31 @@ def test_few_points_are_not_compiled_for_and_get_the_same_bits(tmp_path, monkeyp
             [sys.executable, "-c", FEW_AND_MANY], cwd=ROOT, capture_output=True, text=True, timeout=300
         )
         assert done.stdout == f"{counts} True\n", done.stderr
+
+
+def test_a_stop_during_a_compiled_loop_is_itself(tmp_path, monkeypatch, compiled_loops):
+    pytest.importorskip("numba")
+    if not hasattr(signal, "setitimer"):
+        pytest.skip("Windows has no timer that signals")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    compiled_loops(True)
+
+    @compiled.Loop
+    def counted(values):  # half a second in compiled code
+        total = 0.0
+        for _ in range(25_000_000):
+            for j in range(len(values)):
+                total += values[j]
+        return total, values.copy()  # a tuple: for it numba calls Python, which hears the signal
+
+    counted(np.ones(0))
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            signal.setitimer(signal.ITIMER_REAL, 0.05)
+            counted(np.ones(20))
+    finally:
+        signal.signal(signal.SIGALRM, before)
 
 
 SHAPES = {
