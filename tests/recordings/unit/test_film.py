@@ -15,7 +15,7 @@ from tactile_core.recordings.preparer import Preparer
 from tactile_core.recordings.rest_level import Baseline, Changes
 from tactile_core.recordings.signals import Rest
 from tactile_core.recordings.unit import film
-from tactile_core.sensors import REST_COUNTS, divider
+from tactile_core.sensors import REST_COUNTS, contact_pressures_of, divider
 from tactile_core.translation.translate import translate
 
 SAID = r"second half ([\d.]+) N with this scale, ([\d.]+) N without, ([\d.]+) N of a constant"
@@ -43,10 +43,10 @@ def counts(impedance):
     return 4095 / (1 + series + impedance)
 
 
-def found(change, rest, time, **options):
+def found(change, rest, time, pressure=None, **options):
     here = Changes(len(change), change.__getitem__)
     level = Changes(len(change), Baseline.constant(rest).at)
-    return film.find(here, level, time, None, "biotac", own_rest=True, **options)
+    return film.find(here, level, time, pressure, "biotac", own_rest=True, **options)
 
 
 @pytest.mark.parametrize(("thickness", "conductivity"), [(0.4, 1.0), (0.5, 0.9)])
@@ -59,6 +59,11 @@ def test_a_thin_film_is_found_by_rest_and_contacts(thickness, conductivity):
 @pytest.mark.parametrize("conductivity", [0.7, 1.0, 1.2])
 def test_another_fluid_alone_is_no_other_film(conductivity):
     assert found(*made_up(1.0, conductivity)).thickness == 1.0
+
+
+def test_a_body_softer_than_simulated_ones_shows_no_thick_film():
+    simulated = contact_pressures_of("biotac")[np.random.default_rng(0).permutation(len(contact_signals()))[:CONTACTS]]
+    assert found(*made_up(1.0, 1.2), pressure=2.5 * np.repeat(simulated, EACH)).thickness == 1.0
 
 
 def test_drift_of_the_fluid_is_followed_through_contacts_and_a_steady_fluid_stays():
