@@ -104,8 +104,8 @@ def _parsed(content: bytes, path: pathlib.Path) -> tuple[np.ndarray, np.ndarray]
     except Exception as error:  # a damaged file fails wherever its parser happens to be
         raise TactileError(path, f"cannot be read as a mesh ({error})", "a triangle mesh") from error
     check_triangles(path, vertices, faces)
-    vertices = vertices[np.unique(faces)]
-    return vertices, np.unique(faces, return_inverse=True)[1].reshape(-1, 3)
+    used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
+    return vertices[used], (np.cumsum(used) - 1)[faces]
 
 
 def _check_whole(content: bytes, path: pathlib.Path) -> None:
