@@ -100,9 +100,12 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
     return Plan(parts)
 
 
-def of_frames(frames: int, keep: Collection[str], preset: str = "fast", *, solved: bool = False) -> Plan:
+def of_frames(
+    frames: int, keep: Collection[str], preset: str = "fast", *, solved: bool = False, target: str = TARGET
+) -> Plan:
     """Return the cost of converting a number of frames.
-    keep : words of --keep; preset : name of the pictures' preset; solved : true if the gel is solved"""
+    keep : words of --keep; preset : name of the pictures' preset; solved : true if the gel is solved
+    target : name of the gel; that of one that was not measured counts 0"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
     parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
@@ -112,8 +115,10 @@ def of_frames(frames: int, keep: Collection[str], preset: str = "fast", *, solve
             beyond = {key: max(_part(f"convert_{word}")[key] - other[key], 0) for key in ("ms", "mb", "kb")}
             seconds, disk = (beyond["ms"] + ms) * frames / 1e3, beyond["kb"] * frames / 1e3
             parts.append(Part(what, f"{frames} frames", seconds, beyond["mb"], disk))
+    if target not in BUILD_S:
+        return Plan([*parts, Part(f"{title(target)} gel", f"{frames} frames, cost not measured")])
     if solved or "traction" in keep:
-        parts.append(_matrices(TARGET))
+        parts.append(_matrices(target))
     if solved:
         parts.append(Part("gel, solved", f"{frames} frames, if all are in contact", SOLVED_MS * frames / 1e3))
     if "traction" in keep:

@@ -60,8 +60,12 @@ def read(path: str | os.PathLike, identity: dict) -> State:
     except Exception as error:  # of zip files, arrays, JSON and its content: a dozen types on damaged bytes
         raise TactileError(path, f"cannot be read ({error})", "a checkpoint", ADVICE) from error
     for name, expected in identity.items():
-        if state.identity.get(name) != expected:
-            raise TactileError(path, f"{name} {state.identity.get(name)}", f"{name} {expected}", ADVICE)
+        found = state.identity.get(name)
+        if found != expected:
+            if isinstance(found, dict) and isinstance(expected, dict):  # of forty options those that differ
+                differ = [key for key in found | expected if found.get(key) != expected.get(key)]
+                found, expected = ({key: each.get(key) for key in differ} for each in (found, expected))
+            raise TactileError(path, f"{name} {found}", f"{name} {expected}", ADVICE)
     return state
 
 

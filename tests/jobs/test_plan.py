@@ -110,6 +110,11 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
     assert main(["convert", str(slide_csv()), *words]) == 0 and not (tmp_path / "out").exists()
     said = capsys.readouterr().out
     assert "100 frames" in said and f"in all about {1.0 + 0.01 * 100:g} s" in said
+    for verb, frames in (("convert", 100), ("batch", 1000)):  # another gel is solved, at a cost that is not known
+        words = [each for each in words if verb == "convert" or each not in ("--frames", ":100")]
+        assert main([verb, str(slide_csv()), *words, "--to", "gelsight_mini"]) == 0
+        said = capsys.readouterr()
+        assert f"{frames} frames, cost not measured" in said.out + said.err and "DIGIT matrices" not in said.out
 
 
 def test_pairs_are_contacts_on_both_sensors():

@@ -167,7 +167,7 @@ def test_a_foreign_or_damaged_checkpoint_is_refused(pairs, tmp_path):
     path = interrupted(pairs, tmp_path)
     with pytest.raises(TactileError, match=r"checkpoint\.npz: seed 3; expected seed 4"):
         train(pairs, tmp_path, 4, QUICK, **SURFACES)
-    with pytest.raises(TactileError, match="options"):
+    with pytest.raises(TactileError, match=r"options \{'beta': 0\.0001\}; expected options \{'beta': 0\.1\}"):
         train(pairs, tmp_path, 3, replace(QUICK, beta=0.1), **SURFACES)
     whole = path.read_bytes()
     said = [b"[" * 100_000, b"[]", b'{"identity": 1, "stage": 0, "epoch": 0, "log": []}']

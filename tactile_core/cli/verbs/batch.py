@@ -103,8 +103,8 @@ def _say_cost(job: Job) -> None:
     from ...jobs.results import TRANSLATED
 
     if isinstance(job.recipe, Translate):
-        solved = job.recipe.gel != TRANSLATED
-        for line in plan.of_frames(1000, job.recipe.keep, job.recipe.preset, solved=solved).lines():
+        asked, solved = job.recipe, job.recipe.gel != TRANSLATED
+        for line in plan.of_frames(1000, asked.keep, asked.preset, solved=solved, target=asked.target).lines():
             say(line)
 
 

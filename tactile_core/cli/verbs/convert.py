@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         counts = [len(readers.read(path, job.prepare.columns, asked.source or SOURCE, lean=True)) for path in paths]
         chosen = sum(len(results.select(job.frames, count)) for count in counts)
         solved = asked.gel != results.TRANSLATED
-        tell("\n".join(plan.of_frames(chosen, job.keep, asked.preset, solved=solved).lines()))
+        tell("\n".join(plan.of_frames(chosen, job.keep, asked.preset, solved=solved, target=asked.target).lines()))
         return 0
     folders = results.result_folders(paths, options.out, options.overwrite)
     tools = convert.load_tools(asked)
