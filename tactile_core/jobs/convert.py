@@ -128,6 +128,9 @@ def convert(
     with clock.stage("read"):
         recording = recordings.read(recording_path, options.prepare.columns, tools.translator.source, lean=True)
         check_order(recording, answer)
+        files = {"recording": recording.path, "calibration": tools.calibration}
+        # Now: before the last picture a file may have grown, or be gone.
+        sources = {name: provenance.entry(file) for name, file in files.items() if file is not None}
     frames = select(options.frames, len(recording))
     with clock.stage("prepare"):
         unit = None
@@ -142,7 +145,7 @@ def convert(
             _write_frames(unfinished, made, report, rows, frames, options, clock, progress)
             with clock.stage("sheet"):
                 report.draw_sheet(unfinished / results.SHEET)
-            origin = note(rows, frames, report, options, tools)
+            origin = note(sources, rows, frames, report, options, tools)
             atomic.write_json(unfinished / results.NOTE, origin)
             atomic.write_json(unfinished / results.TIMINGS, clock.timings(len(frames)))
     except OSError as error:
@@ -200,18 +203,21 @@ def check_order(recording: Recording, answer: Answer) -> None:
         raise TactileError(recording.path, found, "frames in order", "Translate each alone: --frames-apart")
 
 
-def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools) -> dict:
+def note(
+    sources: dict, rows: PreparedRows, frames: np.ndarray, report: ConversionReport, options: Options, tools: Tools
+) -> dict:
     """Return the content of a result's note.json: what the same input reproduces, so no paths and no time of day.
     Its weights have rms errors of the gel in um on contacts not trained on, and of no deformation, if their card does.
-    frames : (T,) int, indices of the converted frames in the recording"""
+    sources : names and hashes of the files read; frames : (T,) int, indices of the converted frames in the recording"""
     from ..translation.card import chain_error
 
     recording, error = rows.recording, chain_error(tools.translator.card)
     errors = {} if error is None else {"kept_apart_rms_um": error[0], "baseline_rms_um": error[1]}
     return {
+        **sources,
         "format": results.FORMAT,
         "recording": {
-            **provenance.entry(recording.path), "layout": recording.layout, "frames": rows.count,
+            **sources["recording"], "layout": recording.layout, "frames": rows.count,
             "simulated": recording.simulated, "labels": labels.summary(recording.labels),
             "about": {name: value for name, value in recording.about.items() if name != "scene"},  # the file holds it
         },
@@ -226,7 +232,6 @@ def note(rows: PreparedRows, frames: np.ndarray, report: ConversionReport, optio
         "flagged_frames": report.flagged,
         "explained": report.explained,
         "weights": {"sha256": tools.translator.sha256, **errors},
-        **({} if tools.calibration is None else {"calibration": provenance.entry(tools.calibration)}),
         "versions": provenance.versions("PIL", "matplotlib"),
     }  # fmt: skip
 

@@ -91,6 +91,7 @@ def render(
     rows = select(options.frames, len(frames.numbers))
     with clock.stage("prepare"):
         made = pictures(options, preset, shape, clock)
+    note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)  # the input may be gone at the end
     about = background_of(made.renderer)
     if isinstance(about, dict):
         by = about["corrects_lights_by"]
@@ -104,7 +105,6 @@ def render(
         for done, (row, values) in enumerate(zip(rows, frames.iterate_rows(rows), strict=True), 1):
             made.write_frame(folder, int(frames.numbers[row]), values)
             shown(done, len(rows))
-        note = note_of(path, frames.kind, len(rows), made.renderer, preset, options)
         atomic.write_json(folder / results.NOTE, note)
         atomic.write_json(folder / results.TIMINGS, clock.timings(len(rows)))
     return out

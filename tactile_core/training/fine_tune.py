@@ -159,7 +159,7 @@ def fine_tune(
     holds weights already, unless `overwrite`."""
     before = networks.load(weights_folder)
     source = Path(networks.WEIGHTS_FOLDER if weights_folder is None else weights_folder)
-    data = read_labelled(path, before.frames["MVD"], seed)
+    data, digest = read_labelled(path, before.frames["MVD"], seed), provenance.sha256(path)
     typical = reference_signals.read(source).typical.astype(np.float32)
     with prepared_folder(Path(out_folder), overwrite):
         net = "R2MPN" if data.rectified else "S2MPN"
@@ -170,7 +170,7 @@ def fine_tune(
         note = {
             "network": net,
             "recording": os.path.basename(path),
-            "recording_sha256": provenance.sha256(path),
+            "recording_sha256": digest,
             "weights_sha256": before.sha256,
             "contacts": {name: len(rows) for name, rows in vars(data.split).items()},
             "dropped": list(data.dropped),

@@ -170,6 +170,21 @@ def test_the_note_names_the_calibration_that_was_given(slide_csv, tmp_path, tool
     assert note["calibration"] == {"file": "unit.toml", "sha256": hashlib.sha256(b"# a unit's").hexdigest()}
 
 
+def test_a_recording_that_goes_while_it_is_converted_costs_nothing(slide_csv, tmp_path, tools, no_sheet):
+    """A stick that is pulled, or a file that grows: the note tells what was read."""
+    path, unit = slide_csv(frames=5), tmp_path / "unit.toml"
+    unit.write_bytes(b"# a unit's")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+
+    def go(done, total):
+        path.unlink()
+        unit.unlink()
+
+    given = dataclasses.replace(tools, calibration=str(unit))
+    folder = convert.convert(path, tmp_path / "out", convert.Options(), given, go).folder
+    assert json.loads((folder / "note.json").read_text())["recording"]["sha256"] == digest
+
+
 def test_the_note_of_the_shipped_recording_takes_4_kb(run):
     folder = run(SHIPPED, keep=())
     assert (folder / "note.json").stat().st_size <= 4096

@@ -15,6 +15,7 @@ from gel_pictures import NO_MITSUBA, Press
 
 from tactile_core.cli.main import main
 from tactile_core.jobs.frames_file import FramesFile
+from tactile_core.jobs.render import Pictures
 from tactile_core.pictures.camera_curve import bent
 from tactile_core.pictures.height_map import gel_mapper
 from tactile_core.pictures.renderer import Renderer
@@ -172,6 +173,17 @@ def test_the_note_says_how_and_equal_input_gives_equal_bytes(render, heights, tm
     note = json.loads((tmp_path / "one" / "note.json").read_text(encoding="utf-8"))
     assert note["preset"]["name"] == "fast" and note["preset"]["measured"]["error"] > 0
     assert note["input"]["kind"] == "height map" and len(note["calibration"]["sha256"]) == 64
+
+
+def test_an_input_that_goes_while_it_is_drawn_costs_nothing(render, heights, tmp_path, monkeypatch):
+    begin = Pictures.begin
+
+    def begin_and_remove(self, folder):
+        heights.unlink()
+        begin(self, folder)
+
+    monkeypatch.setattr(Pictures, "begin", begin_and_remove)
+    assert render(heights)[0] == 0 and (tmp_path / "out" / "note.json").exists()
 
 
 def test_mitsuba_draws_where_it_is(render, heights, tmp_path, any_variant):
