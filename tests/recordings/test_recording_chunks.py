@@ -36,6 +36,15 @@ def test_parts_join_to_the_whole(layout, make, in_layout, monkeypatch):
         np.testing.assert_allclose(values, getattr(whole, name), atol=1e-6, err_msg=name)  # stamps of 1.6e9 s: 2e-7
 
 
+def test_a_text_too_long_to_read_whole_is_read_in_parts(slide_lines, write, monkeypatch):
+    monkeypatch.setattr(table, "MAX_BYTES", 1000)
+    monkeypatch.setattr(chunks, "TEXT_BYTES", 1000)
+    path = write(slide_lines)
+    with pytest.raises(TactileError, match="read it in parts: `tactile batch`"):
+        recordings.read(path)
+    assert len(joined(path)[0]["electrodes"]) == len(slide_lines) - 1
+
+
 def test_short_recordings_and_npz_are_one_part(make, in_layout):
     for layout in ("csv_slide", "npz_electrodes", "hdf5_simulated"):
         (part,) = chunks.read_parts(in_layout(layout, make(frames=60)))

@@ -157,7 +157,7 @@ def test_stamps_that_go_back_or_leave_a_gap_are_flagged_and_kept(press, make, in
         (b"caf\xe9,b\n1,2\n", "byte 3: not UTF-8"),
         (b"hello world\n", "no known recording: columns 'hello, world'"),
         (b"1,2,3\n4,5,6\n", "line 1: numbers where the column names"),
-        (b"a,a\n1,2\n", "column 'a' is there twice"),
+        (b"a,a\n1,2\n", "column 'a' is there twice; expected each column once. Rename or remove"),
         (b"\x89HDF\r\n\x1a\n" + b"x" * 99, "damaged HDF5"),
         (b"PK\x03\x04" + b"x" * 99 + b".npy", "damaged NPZ"),
     ],

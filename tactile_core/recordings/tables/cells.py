@@ -223,5 +223,6 @@ def _names(path: str, cells: Sequence[str], line: int) -> tuple[str, ...]:
     names = tuple(cell.translate(OUTSIDE).lower() for cell in cells)
     for place, name in enumerate(names):
         if name and name in names[:place]:
-            raise TactileError(f"{path}, line {line + 1}", f"column {shown(name)} is there twice", "each column once")
+            where, found = f"{path}, line {line + 1}", f"column {shown(name)} is there twice"
+            raise TactileError(where, found, "each column once", "Rename or remove one")
     return names

@@ -142,7 +142,7 @@ def read_table(path: str, file: BinaryIO, left_out: Callable[[str], bool] | None
     left_out : function that is true for the name of a column that files of over `WHOLE` bytes need not keep"""
     size = os.fstat(file.fileno()).st_size
     if size > MAX_BYTES:
-        found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split the recording"
+        found, advice = f"more than {MAX_BYTES // 2**20} MB of text", "Split it, or read it in parts: `tactile batch`"
         raise TactileError(path, found, "a recording of some hours", advice)
     blocks = read_tables(path, file, WHOLE if size <= WHOLE else BLOCK, OVERLAP)
     first, _ = next(blocks)
