@@ -214,8 +214,8 @@ def note(
     recording, error = rows.recording, chain_error(tools.translator.card)
     errors = {} if error is None else {"kept_apart_rms_um": error[0], "baseline_rms_um": error[1]}
     return {
-        **sources,
         "format": results.FORMAT,
+        **sources,
         "recording": {
             **sources["recording"], "layout": recording.layout, "frames": rows.count,
             "simulated": recording.simulated, "labels": labels.summary(recording.labels),
