@@ -87,7 +87,7 @@ def of_scene(path: str | os.PathLike, keep: Collection[str], choices: Mapping[st
 
 
 def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
-    """Return the cost of `tactile pairs`, `count` in the fast tier; a sensor that was not measured counts 0."""
+    """Return the cost of `tactile pairs`, `count` in the fast tier; a sensor whose cost was not measured counts 0."""
     parts = []
     for sensor in pair:
         what = f"{title(sensor)} contacts"
@@ -105,10 +105,10 @@ def of_frames(
 ) -> Plan:
     """Return the cost of converting a number of frames.
     keep : words of --keep; preset : name of the pictures' preset; solved : true if the gel is solved
-    target : name of the gel; that of one that was not measured counts 0"""
+    target : name of the gel; one whose cost was not measured counts 0"""
     cost, other = _part("convert_displacement" if "displacement" in keep else "convert_latent"), _part("convert_latent")
     seconds, disk = cost["start"] + cost["ms"] * frames / 1e3, cost["kb"] * frames / 1e3
-    parts = [Part("networks", f"{frames} frames; contact sheet", seconds, cost["mb"], disk)]
+    parts = [Part("networks", f"{frames} frames", seconds, cost["mb"], disk)]
     extra = _preset_ms(preset) - _preset_ms("fast")
     for word, what, ms in (("height", "height maps", 0.0), ("image", f"pictures, {preset}", extra)):
         if word in keep:  # beyond the work that is done in any case

@@ -1,4 +1,4 @@
-"""Rest, gains and offsets of a unit: the TOML file of `tactile adapt`, and its application to signals."""
+"""Rest, film, gains and offsets of a unit: the TOML file of `tactile adapt`, and its application to signals."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 import h5py
 import numpy as np
+import pytest
 from conftest import SHIPPED
 
 from tactile_core import recordings
@@ -33,3 +34,12 @@ def test_what_is_no_gel_is_refused(slide_csv, tmp_path, capsys):
     for path, words in ((slide_csv(), "no HDF5 file"), (tmp_path / "heights.npz", "no HDF5 file")):
         assert main(["convert", str(path), "--reverse", "--out", str(tmp_path / "skin.h5")]) == 2
         assert words in capsys.readouterr().err and not (tmp_path / "skin.h5").exists()
+
+
+@pytest.mark.parametrize(
+    "words", [["--plan"], ["--no-drift"], ["--keep", "height"], ["--error", "1levels"], ["--tare", ":9"]]
+)
+def test_options_that_the_reverse_does_not_take_are_refused(words, tmp_path, capsys):
+    assert main(["convert", str(SHIPPED), "--reverse", "--out", str(tmp_path / "skin.h5"), *words]) == 2
+    expected = f"{words[0]}: given with --reverse; expected --frames, --weights, --to, --overwrite alone"
+    assert expected in capsys.readouterr().err and not (tmp_path / "skin.h5").exists()

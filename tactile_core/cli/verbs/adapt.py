@@ -9,7 +9,7 @@ from ...errors import TactileError
 from ..terminal import next_step, say, tell
 from .common import add, columns_of
 
-BRIEF = "fit rest, gains and offsets of a BioTac unit to its recordings"
+BRIEF = "fit rest, film, gains and offsets of a BioTac unit to its recordings"
 TEXT = """\
 Fit a gain and an offset to each electrode of a BioTac, so that its readings in contact look like the simulated ones
 that the networks were trained on. Recordings of one sensor are taken together; what touched it need not be known. The
@@ -17,11 +17,11 @@ more places were touched, softly and hard, the better. An electrode whose gain t
 keeps gain 1, and a warning says so. Rectified recordings give no offsets. The gains' uncertainty is printed; fewer than
 five different contacts give none.
 
-Three raw recordings or more also give the unit's rest, from those of the lowest fluid pressure (of the least squeezed
-electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor` takes it for
-recordings that begin and end in contact. Files of several fingers give a section a finger: these are units of their
-own. --rest takes it from a recording of the untouched finger. Recordings of a BioTac SP, which all begin in contact and
-have no PDC, give their rest alone: each electrode's median over the tenth of all frames in which it is least loaded.
+Three raw recordings or more also give the unit's fluid film, and its rest, from those of the lowest fluid pressure (of
+the least squeezed electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor`
+takes it for recordings that begin and end in contact. Files of several fingers give a section a finger: these are units
+of their own. --rest takes it from a recording of the untouched finger. Recordings of a BioTac SP, which all begin in
+contact and have no PDC, give film and rest alone, this from the tenth of all frames that load an electrode least.
 
 --force gives the unit a stiffness, by which its force and pressure are larger than those of the typical unit under the
 same signals: newtons in one column or three (x, y, z), in rows as the first recording's, or behind a column of time; or

@@ -54,9 +54,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
         " frames.h5; a single wide contact of a real finger is mostly taken for two (default: 1)"},
     "--gel": {"default": "translated", "metavar": "HOW", "help":
         "displacement of the gel: translated, by the networks; solved, by contact mechanics, a ball of the"
-        " dent's curvature at the estimated place and force, 25 ms a frame, needs scipy; ball:28, the same under a"
+        " dent's curvature at the estimated place and force, 24 ms a frame, needs scipy; ball:28, the same under a"
         " ball of 28 mm, where you know what touched (a plate: ball:2000) (default: translated)"},
-    "--sensor": {"metavar": "FILE", "help": "rest, gains and offsets of the unit, from `tactile adapt`"},
+    "--sensor": {"metavar": "FILE", "help": "rest, film, gains and offsets of the BioTac unit, from `tactile adapt`"},
     "--to": {"dest": "target", "default": TARGET, "metavar": "SENSOR", "help":
         "gel to translate to: any sensor with a gel (docs/extend.md); where the networks do not lead to it, its"
         " displacement is solved by contact mechanics (default: %(default)s)"},

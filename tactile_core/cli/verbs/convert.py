@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 from ...errors import TactileError
 from ...files.threads import one_thread
 from ..terminal import bar, complain, next_step, say, tell
-from .common import ANSWER, PREPARE, UNIT, add, prepare_words
+from .common import ANSWER, OPTIONS, PREPARE, UNIT, add, prepare_words
 
 if TYPE_CHECKING:
     from ...jobs.convert import Options, ToolOptions
 
+KEEP = "latent,displacement,image"  # unless told otherwise
+REVERSIBLE = "--frames", "--weights", "--to", "--overwrite"  # what --reverse takes
 BRIEF = "translate recordings to deformations, forces and DIGIT pictures"
 TEXT = """\
 Translate recordings and draw them. Each gets the folder DIR/<file name without extension> with
@@ -64,14 +66,14 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " recording, and the resting reading is still taken from all of it",
     )
     add(verb, "--keep")
-    verb.set_defaults(keep="latent,displacement,image")
+    verb.set_defaults(keep=KEEP)
     verb.add_argument(
         "--reverse",
         dest="run",
         action="store_const",
         const=reverse,
         help="the other way: from the DIGIT's gel in frames.h5, or in a simulated recording, to the BioTac's"
-        " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights and --overwrite",
+        " skin, force and electrodes, into the HDF5 file --out; takes --frames, --weights, --to and --overwrite alone",
     )
     verb.add_argument("--overwrite", action="store_true", help="replace older results of the same name")
     add(verb, *PREPARE)
@@ -159,6 +161,11 @@ def reverse(options: argparse.Namespace) -> int:
     from ...jobs.convert import reverse as translate_back
     from ...translation.translate import load_translator
 
+    for name in (*PREPARE, *UNIT, *ANSWER, "--object-reflectance", "--error", "--plan", "--keep"):
+        option = {"default": KEEP} if name == "--keep" else OPTIONS.get(name, {})
+        given = getattr(options, option.get("dest", name[2:].replace("-", "_")))
+        if name not in REVERSIBLE and given not in (None, False, option.get("default")):
+            raise TactileError(name, "given with --reverse", f"{', '.join(REVERSIBLE)} alone", "Leave it out")
     if len(options.recordings) > 1:
         raise TactileError("--reverse", f"{len(options.recordings)} inputs", "one", "Give each a file of its own")
     frames = results.parse_frames(options.frames)

@@ -2,7 +2,7 @@
 
 The film over an electrode has an impedance of 1 / (thickness * conductivity). The same movement of the skin raises
 impedances more where the film is thinner: the networks would read contacts of a unit with films half as thick as a
-typical one's three times too firm. The counts at rest give the product of thickness and conductivity. A prior splits
+typical one's about twice as firm. The counts at rest give the product of thickness and conductivity. A prior splits
 the product, until there are contacts: they resemble simulated ones only at the right thickness.
 
 The conductivity changes all electrodes alike, as no contact does: it moves by a quarter in minutes, probably with
