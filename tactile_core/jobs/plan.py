@@ -26,13 +26,15 @@ TIER_MB = {"fast": 0.0, "full": 650.0, "reference": 3100.0}
 
 
 class Part(NamedTuple):
-    """Cost of a part of a command's output: what it is, its extent in words, CPU s, and MB of memory and of disk."""
+    """Cost of a part of a command's output: what it is, its extent in words, CPU s, MB of memory and of disk, and
+    whether these were measured."""
 
     what: str
     extent: str
     seconds: float = 0.0
     memory: float = 0.0
     disk: float = 0.0
+    measured: bool = True
 
 
 class Plan(NamedTuple):
@@ -54,9 +56,11 @@ class Plan(NamedTuple):
     def lines(self) -> list[str]:
         """Return a table of the parts, and a line of totals, as lines of text."""
         found = [f"{'what':22}{'s':>9}{'MB':>7}{'disk MB':>9}  of"]
-        found += [f"{what:22}{s:9.2f}{mb:7.0f}{disk:9.1f}  {extent}" for what, extent, s, mb, disk in self.parts]
+        found += [f"{what:22}{s:9.2f}{mb:7.0f}{disk:9.1f}  {extent}" for what, extent, s, mb, disk, _ in self.parts]
         disk = sum(part.disk for part in self.parts)
-        return [*found, f"in all about {self.seconds:.3g} s, {self.memory:.0f} MB of memory, {disk:.3g} MB on disk"]
+        more = "" if all(part.measured for part in self.parts) else ", and what was not measured"
+        total = f"{self.seconds:.3g} s, {self.memory:.0f} MB of memory, {disk:.3g} MB on disk"
+        return [*found, f"in all about {total}{more}"]
 
 
 @functools.cache
@@ -92,7 +96,7 @@ def of_pairs(count: int, pair: Sequence[str] = PAIR) -> Plan:
     for sensor in pair:
         what = f"{title(sensor)} contacts"
         if sensor not in BUILD_S:
-            parts.append(Part(what, f"{count}, cost not measured"))
+            parts.append(Part(what, f"{count}, cost not measured", measured=False))
             continue
         cost = _part(f"simulate_{sensor}")
         contacts = Part(what, str(count), cost["ms"] * count / 1e3, cost["mb"], cost["kb"] * count / 1e3)
@@ -116,7 +120,7 @@ def of_frames(
             seconds, disk = (beyond["ms"] + ms) * frames / 1e3, beyond["kb"] * frames / 1e3
             parts.append(Part(what, f"{frames} frames", seconds, beyond["mb"], disk))
     if target not in BUILD_S:
-        return Plan([*parts, Part(f"{title(target)} gel", f"{frames} frames, cost not measured")])
+        return Plan([*parts, Part(f"{title(target)} gel", f"{frames} frames, cost not measured", measured=False)])
     if solved or "traction" in keep:
         parts.append(_matrices(target))
     if solved:

@@ -115,6 +115,7 @@ def test_a_recording_is_planned_as_it_is_converted(slide_csv, tmp_path, capsys):
         assert main([verb, str(slide_csv()), *words, "--to", "gelsight_mini"]) == 0
         said = capsys.readouterr()
         assert f"{frames} frames, cost not measured" in said.out + said.err and "DIGIT matrices" not in said.out
+        assert "MB on disk, and what was not measured" in said.out + said.err
 
 
 def test_pairs_are_contacts_on_both_sensors():
