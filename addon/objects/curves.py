@@ -79,7 +79,7 @@ def values_of(owner: bpy.types.ID, path: str, index: int = 0) -> np.ndarray:
 def write_properties(thing: bpy.types.Object, values: dict[str, np.ndarray], frames: np.ndarray) -> None:
     """Set and keyframe custom properties of an object, and remove those that an earlier animation left.
 
-    values : name in ``PROPERTIES`` -> (T,) or (T, k); frames : (T,) of the scene"""
+    values : name in ``PROPERTIES`` -> (T,) or (T, k), NaN is written as 0; frames : (T,) of the scene"""
     stale = {f'["{name}"]': name for name in PROPERTIES if name in thing and name not in values}
     for curve in [curve for curve in fcurves_of(thing) if curve.data_path in stale]:
         fcurves_of(thing).remove(curve)

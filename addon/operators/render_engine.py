@@ -101,7 +101,8 @@ def to_linear(picture: np.ndarray, raw: bool = False) -> np.ndarray:
     """Convert a picture (H, W, 3) uint8 to scene-linear RGBA, float32 (H, W, 4), so that Blender writes files with the
     same 8-bit values.
 
-    raw : true for the view transform Raw, which has no curve; false for Standard, whose sRGB curve is undone
+    raw : true for the view transform Raw, which has no curve; false for Standard, whose sRGB curve is undone, and for
+        EXR and HDR, which hold linear light
     """
     curve = np.arange(256) / 255
     if not raw:

@@ -136,8 +136,8 @@ def march_steps(reach: int) -> tuple[int, ...]:
 
 
 def bounding_box(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice] | None:
-    """Return rows and columns that enclose the true pixels of ``mask`` (h, w) and a ``margin``, cut at its edges; or
-    None."""
+    """Return slices of rows and columns that enclose the true pixels of ``mask`` (h, w), cut at its edges; None if no
+    pixel is true. margin : px, added on each side"""
     box = []
     for axis in (1, 0):
         found = np.flatnonzero(mask.any(axis))

@@ -59,7 +59,7 @@ class ElectrodeGains(msgspec.Struct, forbid_unknown_fields=True, frozen=True, om
 
 
 class SensorFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, omit_defaults=True):
-    """Calibration of one unit, or of the units on a hand's fingers 0 to 4, each in its own section.
+    """File of `tactile adapt`: one unit, or the units on a hand's fingers 0 to 4, each in its own section.
     format : `FORMAT`; topics : units of bags with several topics, by topic and finger, as ``left/biotac/finger2``
     sensor : name of the units' sensor: "biotac", or another, whose units have a rest and no gains"""
 

@@ -57,7 +57,8 @@ def electrodes(sensor: str = "biotac") -> np.ndarray:
 
 
 def excitation_electrodes(sensor: str = "biotac") -> np.ndarray:
-    """Return places (4, 3) m of the excitation electrodes X1..X4; the BioTac's are from a drawing (docs/sources.md)."""
+    """Return places (4, 3) m, shared frame, of the excitation electrodes X1..X4; the BioTac's are from a drawing
+    (docs/sources.md). TactileError: no fluid sensor, no or bad table."""
     return from_maker(1e-3 * places_of(sensor).excitation, sensor)
 
 

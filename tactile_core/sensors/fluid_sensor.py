@@ -109,8 +109,9 @@ class Electrodes:
 
 @dataclasses.dataclass(frozen=True)
 class Readout:
-    """Voltage dividers and a converter. bits : of a count; rate : Hz, of frames; load : ohm, of a divider
-    polarity : "falls" or "rises", what raw counts do as a film thins; pressure : Pa per count"""
+    """Voltage dividers and a converter. bits : of a count; rate : Hz, of frames
+    load : ohm, a divider's fixed resistor
+    polarity : "falls" or "rises", what raw counts do as a film thins; pressure : Pa per count of PDC"""
 
     bits: int = number(above=0, below=32)
     rate: float = number("hz", above=0)

@@ -82,7 +82,8 @@ def direct_columns(model: Model, measure: Measure) -> Columns:
 
 
 def signal_rows(measure: Measure) -> list[Row]:
-    """Return the row of SVB's error against the noisy signal, rms over electrodes, mean over contacts."""
+    """Return the row of SVB's error against the noisy signal, rms over electrodes, mean over contacts, counts.
+    Baseline: the signal's own rms."""
     nets = measure.networks
     error = nets.decode_signal(nets.encode_signal(measure.change)) - measure.change
     value, baseline = (accuracy.mean(np.sqrt(np.square(array).mean(-1))) for array in (error, measure.change))

@@ -105,7 +105,7 @@ class Stage:
 
 
 def svb_loss(model: Model, contacts: Contacts, batch: Batch, options: Options, generator: torch.Generator) -> Tensor:
-    """Return the mean square error of the noisy signal's reconstruction, over its mean square, plus beta times KL."""
+    """Return the mean square error of the noisy signal's reconstruction over that signal's, plus beta times KL."""
     signal = compress(batch.signal)
     latent, divergence = model.SVB.sample(signal, generator)
     change = signal[:, :-1]

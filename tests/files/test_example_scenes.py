@@ -15,6 +15,7 @@ def test_scenes_are_listed_and_copied(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert command.main(["scenes"]) == 0
     assert "press " in capsys.readouterr().out
+    assert command.main(["scenes", "list", "press"]) == 2
     assert command.main(["scenes", "copy", "press", "user_mesh"]) == 0
     assert f"next: tactile simulate {Path('scenes', 'press')} --out scene.h5 --plan" in capsys.readouterr().err
     assert {file.name for file in (tmp_path / "scenes" / "user_mesh").iterdir()} >= {"scene.toml", "star.stl"}

@@ -18,7 +18,7 @@ recordings, how their units are found, what is held out for testing, and whose t
   README.md     card: what it was made from, how far to trust it, what of its labels survives (with scikit-learn)
   index.html    every recording as a strip of pictures, filtered by label and flag; needs no network
   imagefolder/  pictures and metadata.csv, as Hugging Face's library `datasets` loads them; and other layouts asked for
-  units/ jobs/  calibration of each unit, and the jobs of `tactile batch`
+  units/ jobs/  the file of `tactile adapt` of each unit, and the jobs of `tactile batch`
 The same command continues after any interruption. For a set of your own, --new writes a recipe to fill in."""
 EPILOG = """\
 examples:
@@ -40,8 +40,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         "--to", dest="layouts", default="imagefolder", metavar="LAYOUTS",
         help=f"layouts, out of {','.join(LAYOUTS)} (default: imagefolder)",
     )  # fmt: skip
-    verb.add_argument("--target", default="digit", metavar="SENSOR", help="gel to translate to (default: digit)")
-    verb.add_argument("--pictures", choices=PRESETS, help="preset of the pictures (default: fast)")
+    verb.add_argument("--target", default="digit", metavar="SENSOR", help="as --to of convert (default: digit)")
+    verb.add_argument("--pictures", choices=PRESETS, help="as --preset of batch (default: fast)")
     add(verb, "--weights", "--calibration")
     engine.place_arguments(verb)
     add(verb, "--progress")

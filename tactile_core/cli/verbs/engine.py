@@ -32,15 +32,15 @@ def place_arguments(verb: argparse.ArgumentParser) -> None:
     )
 
 
-def parts_arguments(verb: argparse.ArgumentParser) -> None:
-    """Add ``--plan`` and those of `place_arguments`, for a verb whose job is in a folder beside its result."""
+def parts_arguments(verb: argparse.ArgumentParser, plan: str) -> None:
+    """Add ``--plan`` and those of `place_arguments`, for a verb whose job is in a folder beside its result.
+    plan : what --plan does"""
     place_arguments(verb)
     verb.add_argument(
         "--plan",
         action="store_true",
-        help="print the cost where it is known and stop; a job is first written into OUT.parts, for `tactile batch"
-        " --out OUT.parts` with --array I/N, --status or --verify, and the same command without --plan then finishes it"
-        " and makes OUT",
+        help=f"{plan}. That job is for `tactile batch --out OUT.parts` with --array I/N, --status or --verify; the same"
+        " command without --plan then finishes it and makes OUT",
     )
 
 

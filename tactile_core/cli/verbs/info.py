@@ -22,7 +22,7 @@ and values of the first file, where there is none yet. Check it, then give it to
 Without a recording, --sensor NAME describes a sensor: one that ships, or one in the folder $TACTILE_SENSORS."""
 EPILOG = """\
 examples:
-  tactile info results/*.csv
+  tactile info day1/*.csv
   tactile info own.csv --columns map.toml
   tactile info slip.csv --sensor rest.toml
   tactile info --sensor gelsight_mini"""

@@ -70,7 +70,7 @@ def arguments(verb: argparse.ArgumentParser) -> None:
     about = "Mitsuba's variant (default: the faster that works)"
     verb.add_argument("--variant", choices=("llvm", "scalar"), help=about)
     verb.add_argument("--overwrite", action="store_true", help="replace an older result")
-    engine.parts_arguments(verb)
+    engine.parts_arguments(verb, "write the job into OUT.parts and stop; no cost is printed")
     add(verb, "--progress")
 
 

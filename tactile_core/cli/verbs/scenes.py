@@ -6,15 +6,16 @@ import argparse
 from shlex import quote
 from typing import TYPE_CHECKING
 
+from ...errors import TactileError
 from ..terminal import next_step, tell
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-BRIEF = "list or copy the example scenes"
+BRIEF = "list or copy the example scenes and other example files"
 TEXT = """\
-List the example scenes that ship, or copy them (all, or those named) into the folder scenes, where the examples of
-every page look for them. One that is there already is refused, not written over."""
+List the example scenes and other example files that ship, or copy them (all, or those named) into the folder scenes,
+where the examples of every page look for them. One that is there already is refused, not written over."""
 EPILOG = """\
 examples:
   tactile scenes
@@ -25,7 +26,7 @@ examples:
 def arguments(verb: argparse.ArgumentParser) -> None:
     """Add the arguments of this verb."""
     verb.add_argument("action", nargs="?", choices=("list", "copy"), default="list", help="default: list")
-    verb.add_argument("names", nargs="*", metavar="NAME", help="scenes to copy (default: all)")
+    verb.add_argument("names", nargs="*", metavar="NAME", help="what to copy (default: all)")
     verb.add_argument("--out", default="scenes", metavar="FOLDER", help="where they are copied to (default: scenes)")
 
 
@@ -34,6 +35,8 @@ def run(options: argparse.Namespace) -> int:
     from ...files import example_scenes
 
     if options.action == "list":
+        if options.names:
+            raise TactileError("scenes list", f"given {options.names[0]!r}", "no NAME", "NAME is for `copy`")
         for line in example_scenes.described():
             tell(line)
         return 0

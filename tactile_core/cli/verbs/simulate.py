@@ -62,7 +62,8 @@ def arguments(verb: argparse.ArgumentParser) -> None:
         " recording.tilt_deg or indenters.0.radius_mm. --out is then a folder; the first recording has --seed, each"
         " one more than that before it",
     )
-    engine.parts_arguments(verb)
+    about = "print what is built and its cost, and stop; with --grid print no cost, write the job into OUT.parts"
+    engine.parts_arguments(verb, about)
     add(verb, "--progress")
 
 

@@ -14,7 +14,7 @@ from .indenter import SceneForm, Size, check_length
 class LyingCylinder(Cylinder):
     """A cylinder along its own x that touches with its side. Lengths in m; ``edge`` is the radius of its rounded rims.
 
-    An edge as large as the cylinder's radius makes the ends half balls."""
+    length : whole, rims included; more than twice `edge`. An edge as large as the radius makes the ends half balls"""
 
     length: float = 20e-3
     axis: ClassVar[int] = 0

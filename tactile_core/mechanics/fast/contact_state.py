@@ -125,7 +125,7 @@ class Candidates:
     nodes : (k,) positions in ``Compliance.touchable``; displacement : (k, 3) m, first guess
     probe : (k, 3) m, offset from a node in a crease to where the distance of its face is measured, else 0
     active : (k,) bool, first guess of which touch; inner : (c,) sensing points that may press on the core
-    looks : (k,) number of times that ``split`` searched for a node's second face; once found, the most (``faced``)"""
+    looks : (k,) int, how often ``split`` sought a node's second face; once it is found, `_MOST_LOOKS` (``faced``)"""
 
     nodes: np.ndarray
     displacement: np.ndarray

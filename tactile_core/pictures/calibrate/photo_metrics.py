@@ -45,7 +45,8 @@ def lobe_overlap(change: np.ndarray, true_change: np.ndarray, region: np.ndarray
 
 
 def similarity(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the structural similarity (H, W, 3) of pictures one, other (H, W, 3) over 7 x 7 px; edges are mirrored."""
+    """Return the structural similarity (H, W, 3) over 7 x 7 px of pictures one, other (H, W, 3), levels up
+    to 255; edges are mirrored."""
     mean_one, mean_other = windowed(one), windowed(other)
     unbiased = WINDOW**2 / (WINDOW**2 - 1)
     var_one = unbiased * (windowed(one * one) - mean_one**2)

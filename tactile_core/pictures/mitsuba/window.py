@@ -61,8 +61,8 @@ def through_window(picture: np.ndarray, height: np.ndarray, unit: Calibration) -
 
 
 def cubic(picture: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Interpolate a picture (h, w, k) at fractional ``row``, ``column`` (...), pixels, by Catmull-Rom splines, exact at
-    whole ones, with edges repeated beyond it. Returns (..., k) float32."""
+    """Interpolate a picture (h, w, k) at fractional ``row``, ``column`` (...), pixels, by Catmull-Rom splines: exact at
+    whole pixels; places beyond the edge take the edge's value. Returns (..., k) float32."""
     nodes, weights = stencil(picture.shape[:2], np.stack([row.ravel(), column.ravel()]), closed=False)
     found = np.einsum("abn,abnk->nk", weights, picture.reshape(-1, picture.shape[2])[nodes])
     return found.reshape(*row.shape, -1).astype(np.float32)
