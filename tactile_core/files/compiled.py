@@ -64,8 +64,11 @@ class Loop:
         """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
         try:
             return self._run(*arguments) if available() else self._function(*arguments)
-        except SystemError as error:  # numba's, of what a signal's handler raised meanwhile, such as Ctrl-C's
-            raise error.__cause__ or error from None
+        except SystemError as error:  # numba's, perhaps of another, of what a signal's handler raised, such as Ctrl-C's
+            first: BaseException = error
+            while first.__cause__ is not None:
+                first = first.__cause__
+            raise first from None
 
     def _first_call(self, *arguments: Any) -> Any:
         import numba

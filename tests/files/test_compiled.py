@@ -99,6 +99,23 @@ def test_a_stop_during_a_compiled_loop_is_itself(tmp_path, monkeypatch, compiled
         signal.signal(signal.SIGALRM, before)
 
 
+def test_a_stop_is_itself_however_often_numba_wraps_it(compiled_loops):
+    compiled_loops(False)
+
+    @compiled.Loop
+    def stopped():
+        try:
+            try:
+                raise KeyboardInterrupt
+            except KeyboardInterrupt as stop:
+                raise SystemError("_numba_unpickle returned a result with an exception set") from stop
+        except SystemError as error:
+            raise SystemError("counted returned a result with an exception set") from error
+
+    with pytest.raises(KeyboardInterrupt):
+        stopped()
+
+
 SHAPES = {
     "ball": Sphere(1.5e-3),
     "box": Box((2e-3, 2e-3, 2e-3), 0.3e-3),
