@@ -64,7 +64,7 @@ class Loop:
         """Run the function, not compiled if numba is missing or switched off, or as long as compiling does not pay."""
         try:
             return self._run(*arguments) if available() else self._function(*arguments)
-        except SystemError as error:  # numba's, perhaps of another, of what a signal's handler raised, such as Ctrl-C's
+        except SystemError as error:  # in which numba wraps, once or twice, what a signal's handler raised
             first: BaseException = error
             while first.__cause__ is not None:
                 first = first.__cause__

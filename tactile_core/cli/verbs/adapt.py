@@ -21,7 +21,7 @@ Three raw recordings or more also give the unit's fluid film, and its rest, from
 the least squeezed electrodes where there is no PDC), with how far each electrode may be off: `tactile convert --sensor`
 takes it for recordings that begin and end in contact. Files of several fingers give a section a finger: these are units
 of their own. --rest takes it from a recording of the untouched finger. Recordings of a BioTac SP, which all begin in
-contact and have no PDC, give film and rest alone, this from the tenth of all frames that load an electrode least.
+contact and have no PDC, give only film and rest: those with which simulated contacts explain them best.
 
 --force gives the unit a stiffness, by which its force and pressure are larger than those of the typical unit under the
 same signals: newtons in one column or three (x, y, z), in rows as the first recording's, or behind a column of time; or

@@ -46,7 +46,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
         "translate each frame alone, instead of following the contact through the frames before and after"},
     "--mount-shift": {"metavar": "X,Z", "help":
         "mount the BioTac elsewhere on the DIGIT: shift all contacts by X mm along the finger (+x is from the tip"
-        " to the base) and Z mm across it, so that those at the tip come into the picture; =-4,0 where X is negative"},
+        " to the base; a negative X: --mount-shift=-4,0) and Z mm across it, so that those at the tip come into the"
+        " picture"},
     "--samples": {"type": int, "default": 0, "metavar": "N", "help":
         "also draw N contacts a frame from the posterior, as sample_center and sample_force in frames.h5"},
     "--contacts": {"type": int, "choices": (1, 2), "default": 1, "help":
