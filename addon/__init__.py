@@ -8,6 +8,7 @@ from typing import Any
 
 import bpy
 
+from .objects import digit_body
 from .operators import (
     check_llvm,
     import_recording,
@@ -30,6 +31,7 @@ PARTS = (
     properties,
     preferences,
     kept_files,
+    digit_body,
     asset_library,
     check_llvm,
     import_recording,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ...tactile_core import sensors
 from ...tactile_core.sensors.calibration import LARGEST_LEVEL, Calibration
@@ -13,6 +14,7 @@ from ..settings import properties
 from . import axes, digit_materials, held_light, sensor_bodies
 
 _INSIDE = 9e-3  # m below the gel's lowest point, under its window: there the camera's view in Cycles begins
+_LINKS = "receiver_collection", "blocker_collection"
 _COLOURS = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 
 
@@ -89,20 +91,24 @@ def _link_light(gel: bpy.types.Object) -> None:
     """
     leds = leds_of(gel).values()
     new = [led for led in leds if led.light_linking.receiver_collection is None]
-    if not new:
-        return
-    known = next(filter(None, (led.light_linking.receiver_collection for led in leds)), None)
-    lit = known or bpy.data.collections.new("DIGIT lit by its LEDs")
-    if gel.name not in lit.objects:
-        lit.objects.link(gel)
-    through = bpy.data.collections.new("DIGIT shone through by its LEDs")
-    for part in parts_of(gel):
-        if part.tactile.role == "BODY":
-            through.objects.link(part)
-    for entry in through.collection_objects:
-        entry.light_linking.link_state = "EXCLUDE"
+    if new:
+        known = next(filter(None, (led.light_linking.receiver_collection for led in leds)), None)
+        lit = known or bpy.data.collections.new("DIGIT lit by its LEDs")
+        if gel.name not in lit.objects:
+            lit.objects.link(gel)
+        through = bpy.data.collections.new("DIGIT shone through by its LEDs")
+        for part in parts_of(gel):
+            if part.tactile.role == "BODY":
+                through.objects.link(part)
+        for entry in through.collection_objects:
+            entry.light_linking.link_state = "EXCLUDE"
     for led in new:
         led.light_linking.receiver_collection, led.light_linking.blocker_collection = lit, through
+    for led in leds:
+        # Blender does not see that a library override's LEDs need these: it would make a second, unlit gel with them.
+        for name in (name for name in _LINKS if getattr(led.light_linking, name) is not None):
+            led[name] = getattr(led.light_linking, name)
+            led.property_overridable_library_set(f'["{name}"]', True)
 
 
 def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:
@@ -128,6 +134,21 @@ def watts_per_brightness(per_metre: float) -> float:
     sphere of radiance L and radius r to a L r^2 / d^2 levels.
     """
     return 4 * math.pi**2 / LARGEST_LEVEL * per_metre**2
+
+
+@persistent
+def _keep_links_out_of_scenes(context: bpy.types.BlendImportContext) -> None:
+    """Put what an appended or pasted LED lights beside it: Blender shows the collections that link light instead."""
+    things = {item.id for item in context.import_items if item.id_type == "OBJECT" and item.id is not None}
+    for led in [thing for thing in things if thing.tactile.role == "LED" and thing.library is None]:
+        for group in filter(None, (getattr(led.light_linking, name) for name in _LINKS)):
+            for parent in (*bpy.data.collections, *(scene.collection for scene in bpy.data.scenes)):
+                if group in parent.children.values():
+                    parent.children.unlink(group)
+            home = properties.home_of(led)
+            for thing in group.objects:
+                if thing not in home.objects.values():
+                    home.objects.link(thing)
 
 
 def place_camera(lens: bpy.types.Object, gel: bpy.types.Object, camera: Camera) -> None:
@@ -166,3 +187,9 @@ def _place_led(thing: bpy.types.Object, gel: bpy.types.Object, led: Led, unit: C
     lamp.color = _COLOURS[led.colour]
     lamp.shadow_soft_size, lamp.use_soft_falloff = led.radius * per_metre, False
     lamp.energy = _power(led, gel)
+    for name, value in (("exposure", 0.0), ("use_temperature", False), ("normalize", True)):  # since Blender 4.5
+        if hasattr(lamp, name):
+            setattr(lamp, name, value)
+
+
+HANDLERS = ((bpy.app.handlers.blend_import_post, _keep_links_out_of_scenes),) if bpy.app.version >= (4, 3, 0) else ()

@@ -12,10 +12,11 @@ from ...tactile_core.errors import TactileError
 from ...tactile_core.pictures.mitsuba.gel_scene import Lamp, Occluder, Surroundings
 from ...tactile_core.sensors.calibration import DIFFUSE, ROUGH_PLASTIC, Calibration, Coating
 from ...tactile_core.sensors.camera import Camera
+from ..settings import properties
 from . import axes, digit_body, digit_materials, motion, surfaces
 
 _ROUNDING = 1e-5  # relative: float32's, of objects that nobody has moved
-LINEAR = "OPEN_EXR", "HDR"  # how the names of file formats of linear light begin
+LINEAR = "OPEN_EXR", "HDR", "DPX", "CINEON"  # how the names of file formats of linear light begin
 _VIEWS = "Raw", "Standard"  # by which a rendered file has the picture's own levels
 _STEP = 1e-7  # m, largest movement taken for rounding
 _STRAIGHT = 1e-3  # largest component of a turn of the camera's axes taken for none
@@ -39,10 +40,11 @@ def shown_unit(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, unit: Cali
     if not digit_body.has_body(gel):
         return ShownUnit(unit, Surroundings())
     camera = _camera(gel, depsgraph, unit.camera)
-    leds, others = _leds(gel, depsgraph, unit, camera)
+    rendered = properties.rendered(depsgraph.view_layer, depsgraph)
+    leds, others = _leds(gel, depsgraph, unit, camera, rendered)
     coating = _coating(gel, depsgraph, unit.coating)
-    lamps = (*others, *_lamps(gel, depsgraph, camera))
-    around = Surroundings(lamps, tuple(_occluders(gel, depsgraph, camera, unit)))
+    lamps = (*others, *_lamps(gel, depsgraph, camera, rendered))
+    around = Surroundings(lamps, tuple(_occluders(gel, depsgraph, camera, unit, rendered)))
     changed = (leds, coating, camera) != (unit.leds, unit.coating, unit.camera) or around
     # A photograph shows the unit's own parts: with others the picture at rest is the model's.
     photograph = "" if changed else unit.photograph
@@ -57,13 +59,13 @@ def _places(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: np.nd
     return axes.from_gel(own, camera, gel.tactile.per_metre)
 
 
-def _leds(gel, depsgraph, unit: Calibration, camera: Camera):  # noqa: ANN001, ANN202
+def _leds(gel, depsgraph, unit: Calibration, camera: Camera, rendered: set[bpy.types.Object]):  # noqa: ANN001, ANN202
     """Return the unit's LEDs as the scene has them, and lamps for their light of other colours than their own."""
     found, others = [], []
     things = digit_body.leds_of(gel)
     for k, led in enumerate(unit.leds):
         thing = things.get(led.colour)
-        if thing is None or thing.hide_render or thing.data.type != "POINT":  # deleted, switched off, or a sun
+        if thing not in rendered or thing.data.type != "POINT":  # deleted, switched off, or a sun
             found.append(dataclasses.replace(led, radiance=0.0))
             continue
         lamp = _lamp(thing, gel, depsgraph, camera)
@@ -93,15 +95,20 @@ def _lamp(thing: bpy.types.Object, gel: bpy.types.Object, depsgraph: bpy.types.D
     now = thing.evaluated_get(depsgraph)
     place = _places(gel, depsgraph, [now.matrix_world.translation[:]], camera)[0]
     per_metre = gel.tactile.per_metre
-    brightness = max(now.data.energy, 0.0) / digit_body.watts_per_brightness(per_metre)
-    colour = np.array(now.data.color[:3])
-    return Lamp(tuple(place.tolist()), now.data.shadow_soft_size / per_metre, tuple((brightness * colour).tolist()))
+    lamp = now.data
+    energy = max(lamp.energy, 0.0) * 2 ** getattr(lamp, "exposure", 0.0)  # it and temperature: since Blender 4.5
+    brightness = energy / digit_body.watts_per_brightness(per_metre)
+    colour = np.array(lamp.color[:3])
+    if getattr(lamp, "use_temperature", False):
+        colour *= lamp.temperature_color[:3]
+    return Lamp(tuple(place.tolist()), lamp.shadow_soft_size / per_metre, tuple((brightness * colour).tolist()))
 
 
-def _lamps(gel: bpy.types.Object, depsgraph: bpy.types.Depsgraph, camera: Camera) -> list[Lamp]:
+def _lamps(gel, depsgraph, camera: Camera, rendered: set[bpy.types.Object]) -> list[Lamp]:  # noqa: ANN001
     """List the scene's point lamps that are no LEDs."""
-    things = [t for t in depsgraph.scene.objects if t.type == "LIGHT" and t.tactile.role != "LED" and not t.hide_render]
-    return [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT" and t.data.energy > 0]
+    things = [t for t in depsgraph.scene.objects if t.type == "LIGHT" and t.tactile.role != "LED" and t in rendered]
+    lamps = [_lamp(t, gel, depsgraph, camera) for t in things if t.data.type == "POINT"]
+    return [lamp for lamp in lamps if any(lamp.brightness)]
 
 
 def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormatSettings:
@@ -113,12 +120,13 @@ def output_of(scene: bpy.types.Scene) -> bpy.types.Scene | bpy.types.ImageFormat
 def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") -> list[str]:
     """List in words what pictures of a gel leave out of the scene, and which settings change their levels in files.
     preset : by which they are drawn; "" lists what all presets leave out"""
-    lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role in ("NONE", "LED") and not t.hide_render]
+    rendered = {thing for layer in scene.view_layers for thing in properties.rendered(layer)}
+    lamps = [t for t in scene.objects if t.type == "LIGHT" and t.tactile.role in ("NONE", "LED") and t in rendered]
     found = [f"{lamp.name}: no point lamp, left out" for lamp in lamps if lamp.data.type != "POINT"]
     if preset == "fast":
         found += [f"{lamp.name}: left out by the preset fast" for lamp in lamps
                   if lamp.data.type == "POINT" and lamp.tactile.role == "NONE"]  # fmt: skip
-    if digit_body.has_body(gel) and all(led.hide_render for led in digit_body.leds_of(gel).values()):
+    if digit_body.has_body(gel) and rendered.isdisjoint(digit_body.leds_of(gel).values()):
         found.append(f"{gel.name}: its LEDs are hidden or deleted, so that only other lamps light it")
     played = motion.played(gel)
     if played and not played[0] <= scene.frame_current_final <= played[1]:
@@ -131,7 +139,7 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     output = output_of(scene)
     view, device = output.view_settings, output.display_settings.display_device
     if scene.render.image_settings.file_format.startswith(LINEAR):
-        words = "EXR and HDR hold linear light: the view transform Standard shows it as the picture is"
+        words = "EXR, HDR, DPX and Cineon hold linear light: the view transform Standard shows it as the picture is"
         return found + [words] * (view.view_transform == "Raw")
     changes = {
         f"View transform {view.view_transform}": view.view_transform not in _VIEWS,
@@ -145,11 +153,11 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     return found + [f"{', '.join(names)} {verb} the levels; Set Up Render sets Raw alone"] * bool(names)
 
 
-def _occluders(gel, depsgraph, camera: Camera, unit: Calibration):  # noqa: ANN001, ANN202
+def _occluders(gel, depsgraph, camera: Camera, unit: Calibration, rendered):  # noqa: ANN001, ANN202
     """Yield the user's own meshes that reach into the housing, on the camera's side of the gel."""
     reach = max(float(np.abs(np.array(led.position[:2])).max()) + led.radius for led in unit.leds)
     for thing in depsgraph.scene.objects:
-        if thing.type != "MESH" or thing.tactile.role != "NONE" or thing.hide_render:
+        if thing.type != "MESH" or thing.tactile.role != "NONE" or thing not in rendered:
             continue
         now = thing.evaluated_get(depsgraph)
         nodes, faces = surfaces.triangles_of(now.data)

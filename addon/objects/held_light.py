@@ -116,9 +116,15 @@ def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full:
             continue
         driver = socket.driver_add("default_value").driver
         driver.type, lamp = "SCRIPTED", leds[name].data
-        for label, kind, thing, path in (("power", "LIGHT", lamp, "energy"), ("shade", "LIGHT", lamp, f"color[{k}]"),
-                                         ("off", "OBJECT", leds[name], "hide_render")):  # fmt: skip
+        follows = [("power", "LIGHT", lamp, "energy"), ("shade", "LIGHT", lamp, f"color[{k}]"),
+                   ("off", "OBJECT", leds[name], "hide_render")]  # fmt: skip
+        expression = f"power * shade * (1 - off) / {full[name]!r}"
+        if hasattr(lamp, "exposure"):  # since Blender 4.5
+            follows += [("stops", "LIGHT", lamp, "exposure"), ("warm", "LIGHT", lamp, "use_temperature"),
+                        ("tint", "LIGHT", lamp, f"temperature_color[{k}]")]  # fmt: skip
+            expression += " * pow(2, stops) * (1 - warm + warm * tint)"
+        for label, kind, thing, path in follows:
             variable = driver.variables.new()
             variable.name, target = label, variable.targets[0]
             target.id_type, target.id, target.data_path = kind, thing, path
-        driver.expression = f"power * shade * (1 - off) / {full[name]!r}"
+        driver.expression = expression

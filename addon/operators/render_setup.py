@@ -82,7 +82,7 @@ class TACTILE_OT_reset_to_calibration(OnGel, TactileOperator):
 
     def _work(self, context: bpy.types.Context) -> None:
         gel = properties.gel_of(context.scene, context.object)
-        properties.check_own(gel)
+        properties.check_own(gel, *(led.data for led in digit_body.leds_of(gel).values()))  # an override's are linked
         gel.tactile.object_reflectance = 0.0
         digit_body.reset(gel, render_settings.calibration_of(context.scene, properties.sensor_name(gel)))
 

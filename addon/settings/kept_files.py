@@ -134,10 +134,14 @@ def _name_from_there(context: "bpy.types.BlendImportContext") -> None:  # quoted
     """Make appended objects' paths absolute: relative to this .blend, they could mean another file."""
     for item in context.import_items:
         if item.id_type == "OBJECT" and item.id is not None and item.id.library is None and item.source_library:
+            about, folder = item.id.tactile, item.id.tactile.folder or None
             for name in _PATHS:
-                path = bpy.path.abspath(getattr(item.id.tactile, name), library=item.source_library)
-                if path and os.path.exists(path):  # else pasted: where it was copied is not known
-                    setattr(item.id.tactile, name, os.path.normpath(path))
+                held = getattr(about, name)
+                # Pasted, it came by way of a file of Blender's own: only the folder says where from.
+                places = bpy.path.abspath(held, library=item.source_library), bpy.path.abspath(held, start=folder)
+                path = next((os.path.normpath(place) for place in places if place and os.path.exists(place)), None)
+                if path and path != os.path.normpath(bpy.path.abspath(held)):
+                    setattr(about, name, path)
 
 
 HANDLERS = (

@@ -95,8 +95,10 @@ class TactileObject(RecordingOptions, bpy.types.PropertyGroup):
     format: bpy.props.IntProperty(name="Format", description="Of these properties, to tell older files", default=0)
     per_metre: bpy.props.FloatProperty(name="Units a Metre", description="Blender units a metre", default=1000.0)
     recording: bpy.props.StringProperty(
-        name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=RELATIVE
-    )
+        name="Recording", description="The file this was imported from", subtype="FILE_PATH", options=RELATIVE,
+        update=lambda about, _context: setattr(about, "folder", bpy.path.abspath("//")),
+    )  # fmt: skip
+    folder: bpy.props.StringProperty(name="Folder", description="Of the .blend, from which relative paths start")
     known: bpy.props.StringProperty(name="Known", description="What the recording was read with of its unit, in words")
     sensor: bpy.props.StringProperty(name="Sensor", description="Whose skin or gel it is, as its descriptor is named")
     motion: bpy.props.EnumProperty(name="Motion", description="How the mesh is animated", items=MOTIONS)
@@ -149,7 +151,9 @@ def set_up(thing: bpy.types.Object, role: str, per_metre: float, sensor: str = "
 def set_up_part(thing: bpy.types.Object, parent: bpy.types.Object, role: str) -> None:
     """Give an object a role, and make it a child of ``parent``, shown in the same collection."""
     set_up(thing, role, parent.tactile.per_metre)
-    home_of(parent).objects.link(thing)
+    home = home_of(parent)
+    free = home.library is None and home.override_library is None
+    (home if free else parent.users_scene[0].collection).objects.link(thing)
     thing.parent = parent
 
 
@@ -187,13 +191,14 @@ def _items(names: tuple[str, ...], gels_only: bool) -> list[tuple[str, str, str]
 
 
 def of_role(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None = None) -> bpy.types.Object | None:
-    """Return an object of a role: ``near`` itself, else one in its collections, else the scene's first, else None."""
+    """Return an object of a role: ``near`` itself, the nearest in its collections, the scene's first, or None."""
     return _beside(scene, role, near) or next((thing for thing in scene.objects if thing.tactile.role == role), None)
 
 
 def _beside(scene: bpy.types.Scene, role: str, near: bpy.types.Object | None) -> bpy.types.Object | None:
     beside = [near, *(thing for group in near.users_collection for thing in group.objects)] if near is not None else ()
-    found = next((thing for thing in beside if thing.tactile.role == role), None)
+    found = min((thing for thing in beside if thing.tactile.role == role), default=None,
+                key=lambda thing: (thing.matrix_world.translation - near.matrix_world.translation).length)  # fmt: skip
     return found if found is not None and scene.objects.get(found.name) is not None else None
 
 
@@ -242,6 +247,18 @@ def home_of(thing: bpy.types.Object) -> bpy.types.Collection:
     return next((group for group in thing.users_collection if group in shown), thing.users_collection[0])
 
 
+def rendered(layer: bpy.types.ViewLayer, depsgraph: bpy.types.Depsgraph | None = None) -> set[bpy.types.Object]:
+    """Return a view layer's objects that renders show: neither they nor all of their collections are hidden in renders.
+    depsgraph : says which are hidden on the frame that it is of; None for the frame in the window"""
+    found, groups = set(), [layer.layer_collection]
+    for group in groups:
+        if not group.collection.hide_render:
+            groups += group.children
+            held = () if group.exclude else group.collection.objects
+            found.update(t for t in held if not (t.evaluated_get(depsgraph) if depsgraph else t).hide_render)
+    return found
+
+
 def check_format(thing: bpy.types.Object) -> None:
     """Raise TactileError for an object that a newer version of the add-on made."""
     if thing.tactile.format > FORMAT:
@@ -251,13 +268,13 @@ def check_format(thing: bpy.types.Object) -> None:
         )  # fmt: skip
 
 
-def check_own(*things: bpy.types.Object | bpy.types.Mesh | None) -> None:
-    """Raise TactileError for an object or a mesh linked from another .blend, which Blender does not let change here."""
+def check_own(*things: bpy.types.ID | None) -> None:
+    """Raise TactileError for an object or its data linked from another .blend: Blender lets no one change it here."""
     for thing in things:
         if thing is not None and thing.library is not None:
             raise TactileError(
                 thing.name, f"linked from {thing.library.name}", "one of this file, which can be changed",
-                "Append it in place of linking; for lights and coating, Object > Library Override > Make will do",
+                "Append it in place of linking; a library override can be moved and styled, its lights not dimmed",
             )  # fmt: skip
 
 

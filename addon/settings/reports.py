@@ -28,6 +28,7 @@ MODULES = {
 WORDS = (
     (re.escape(tempfile.gettempdir()) + r"[/\\]tactile-\w+[/\\]?", ""),
     (r"tactile info \S+ --columns \S+( writes one( to fill in)?)?", "Columns writes the file that it names"),
+    (r"; to try with a recording that ships: tactile scenes copy \S+", ""),
     (r"See `tactile doctor`", "Check LLVM in the add-on's preferences"),
     (r"--(tare|polarity|columns|weights|preset|frames)\b(?!-)", lambda found: found[1].title()),
     (r"--sensor\b", "Unit"),

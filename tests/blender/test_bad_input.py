@@ -177,6 +177,8 @@ def test_a_file_of_the_former_version_gets_what_it_lacks(translated):
          "a.csv: odd; expected counts. Give the unit's own (Unit), or frames (Tare)"),
         ("Name it in a map: tactile info FILE --columns map.toml writes one to fill in",
          "Name it in a map: Columns writes the file that it names"),
+        ("a.csv: missing. Check the path; to try with a recording that ships: tactile scenes copy press_roll_slide",
+         "a.csv: missing. Check the path"),
         ("--frames: 'x'", "Frames: 'x'"), ("two (--frames-apart)", "two (Each Frame Alone)"),
         ("LLVM missing. See `tactile doctor`", "LLVM missing. Check LLVM in the add-on's preferences"),
     ],

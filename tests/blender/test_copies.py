@@ -115,6 +115,49 @@ def test_an_appended_recording_is_that_of_its_own_blend(imported, tmp_path):
     assert wanted.objects[0].tactile.recording == str(tmp_path / "one" / "touch.h5")
 
 
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="Blender tells of what is pasted from 4.3 on")
+def test_a_pasted_pair_is_translated_again_by_its_own_recording(imported, tmp_path):
+    """The folder that it is pasted to has another touch.h5."""
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "touch.h5").write_bytes(RECORDING.read_bytes())
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "one" / "a.blend"))
+    imported(filepath=str(tmp_path / "one" / "touch.h5"), frames="70:90")
+    bpy.ops.tactile.translate()
+    bpy.ops.object.select_all(action="DESELECT")
+    for thing in bpy.context.scene.objects:
+        thing.select_set(thing.tactile.role in ("BIOTAC", "DIGIT"))
+    bpy.ops.view3d.copybuffer()
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "two" / "b.blend"))
+    bpy.ops.view3d.pastebuffer()
+    scene = bpy.context.scene
+    bpy.context.view_layer.objects.active = skin = scene.objects["BioTac skin"]
+    assert skin.tactile.recording == str(tmp_path / "one" / "touch.h5")
+    bpy.ops.tactile.translate()
+    assert [thing.name for thing in scene.objects if thing.tactile.role == "DIGIT"] == ["DIGIT gel"]
+    assert not scene.collection.children
+
+
+def test_a_library_override_is_lit_when_it_is_opened_again(gel, draw, tmp_path):
+    """Its LEDs' collections are no part of it to Blender, which then made a gel of their own for them."""
+    before, name = draw(gel), gel.users_scene[0].collection.children[0].name
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "user.blend"))
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.collections = [name]
+    wanted.collections[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    bpy.ops.tactile.set_style(style="DISPLACEMENT")
+    with pytest.raises(RuntimeError, match=r"linked from library\.blend"):
+        bpy.ops.tactile.reset_to_calibration()  # Blender would not keep it
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "user.blend"))
+    bpy.context.scene.frame_set(80)
+    gel = next(thing for thing in bpy.context.scene.objects if thing.tactile.role == "DIGIT")
+    assert "Tactile style" in gel.modifiers and np.abs(draw(gel) - before).max() <= 1
+
+
 def test_an_instance_is_told_from_a_gel(gel, draw, tmp_path):
     before, group = draw(gel), bpy.context.scene.collection.children[0]
     bpy.context.scene.collection.children.unlink(group)

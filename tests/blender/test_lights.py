@@ -267,3 +267,45 @@ def test_a_white_object_shows_through_where_it_touches(gel, drawn, shown, part):
     white = drawn()
     bpy.ops.tactile.reset_to_calibration()
     assert (white - drawn()).max() > 20
+
+
+@pytest.mark.skipif(bpy.app.version < (4, 5), reason="lamps have an exposure and a temperature from 4.5 on")
+def test_exposure_and_temperature_count(shown, part, gel):
+    red, lamp = shown().unit.leds[0], bpy.data.lights["LED red"]
+    coating, name = part("addon.objects.digit_body").coating_of(gel), part("addon.objects.held_light").attribute("red")
+    lamp.exposure, lamp.use_temperature, lamp.temperature = -1, True, 3000
+    wanted = lamp.temperature_color[0] / 2
+    assert shown().unit.leds[0].radiance == pytest.approx(wanted * red.radiance, rel=1e-5)
+    held = coating.evaluated_get(bpy.context.evaluated_depsgraph_get()).node_tree.nodes[name].outputs[0]
+    assert held.default_value == pytest.approx(wanted, rel=1e-5)
+    bpy.ops.tactile.reset_to_calibration()
+    assert shown().unit.leds[0] == red
+
+
+@pytest.mark.parametrize("by", ["hide_render", "exclude"])
+def test_what_a_hidden_collection_holds_is_off(shown, gel, by):
+    group = bpy.data.collections.new("off")
+    bpy.context.scene.collection.children.link(group)
+    bpy.ops.mesh.primitive_cube_add(size=2, location=gel.matrix_world @ Vector((-3, 0, 2)))
+    bulb = bpy.data.objects.new("bulb", bpy.data.lights.new("bulb", "POINT"))
+    bulb.data.energy = 10.0
+    for thing in (bpy.context.object, bulb, bpy.data.objects["LED red"]):
+        for home in thing.users_collection:
+            home.objects.unlink(thing)
+        group.objects.link(thing)
+    assert len(shown().around.lamps) == len(shown().around.occluders) == 1
+    setattr(group if by == "hide_render" else bpy.context.view_layer.layer_collection.children["off"], by, True)
+    assert not shown().around and shown().unit.leds[0].radiance == 0 < shown().unit.leds[1].radiance
+
+
+def test_an_animation_follows_an_led_that_is_keyed_off(gel, tmp_path):
+    scene, led = bpy.context.scene, bpy.data.objects["LED red"]
+    for frame, off in ((1, True), (2, False)):
+        led.hide_render = off
+        led.keyframe_insert("hide_render", frame=frame)
+    scene.frame_set(2)
+    scene.frame_start, scene.frame_end, scene.render.filepath = 1, 2, str(tmp_path) + "/"
+    bpy.ops.render.render(animation=True)
+    pictures = [bpy.data.images.load(str(tmp_path / name)) for name in ("0001.png", "0002.png")]
+    dark, lit = (np.mean(picture.pixels[:][::4]) for picture in pictures)
+    assert dark < lit / 4

@@ -57,6 +57,14 @@ def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part, translati
     assert words.startswith("guess: shape unsure, expected error")
 
 
+def test_the_panel_s_trust_is_never_another_recording_s(gel, imported, part):
+    """A second skin is not translated yet: the scene's only gel is the first's."""
+    other, panels, scene = imported(frames="120:140"), part("addon.ui.panels"), bpy.context.scene
+    scene.frame_set(125)
+    assert part("addon.settings.properties").gel_of(scene, other) == gel
+    assert panels.trust_of(other, gel) == panels.trust_of(other, None) != panels.trust_of(gel, gel)
+
+
 def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part, translation):
     silent = int(np.flatnonzero(~translation.force.any(axis=1))[0])
     bpy.context.scene.frame_set(40 + silent)
