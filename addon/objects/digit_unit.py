@@ -136,6 +136,9 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
     if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
         found.append(f"{camera.name}: depth of field is left out")
     found += ["Motion blur is left out: a picture is of one instant"] * scene.render.use_motion_blur
+    found += ["The compositor's nodes change the picture: join Render Layers' Image to their output"] * _composited(
+        scene
+    )
     output = output_of(scene)
     view, device = output.view_settings, output.display_settings.display_device
     if scene.render.image_settings.file_format.startswith(LINEAR):
@@ -146,11 +149,27 @@ def left_out(scene: bpy.types.Scene, gel: bpy.types.Object, preset: str = "") ->
         f"Look {view.look}": view.look != "None",
         "Exposure": view.exposure != 0, "Gamma": view.gamma != 1, "Curves": view.use_curve_mapping,
         "White balance": getattr(view, "use_white_balance", False),  # since Blender 4.3
+        "Dither": scene.render.dither_intensity > 0, "Burn Into Image": scene.render.use_stamp,
         f"Display {device}": device != "sRGB" and view.view_transform != "Raw",
     }  # fmt: skip
     names = [name for name, there in changes.items() if there]
     verb = "changes" if len(names) == 1 else "change"
     return found + [f"{', '.join(names)} {verb} the levels; Set Up Render sets Raw alone"] * bool(names)
+
+
+def _composited(scene: bpy.types.Scene) -> bool:
+    """Return true if a compositor's nodes stand between what is rendered and what is written."""
+    since = bpy.app.version >= (5, 0, 0)
+    tree = scene.compositing_node_group if since else scene.node_tree if scene.use_nodes else None
+    if tree is None or not scene.render.use_compositing:
+        return False
+    ends = [node.inputs[0] for node in tree.nodes if node.type in ("COMPOSITE", "GROUP_OUTPUT") and node.inputs]
+    for end in ends:
+        for link in end.links:
+            ends += [link.from_node.inputs[0]] if link.from_node.type == "REROUTE" else []
+            if link.from_node.type == "R_LAYERS" and link.from_socket.name == "Image":
+                return False
+    return True
 
 
 def _occluders(gel, depsgraph, camera: Camera, unit: Calibration, rendered):  # noqa: ANN001, ANN202

@@ -132,6 +132,9 @@ class TACTILE_OT_set_up_render(OnGel, TactileOperator):
         right, down = camera.pixel_size
         render.pixel_aspect_x, render.pixel_aspect_y = max(1.0, right / down), max(1.0, down / right)
         render.dither_intensity = 0.0  # noise of a grey level that the camera does not have
+        # What would cut the picture, write on it or stand in its place: a region, metadata, the sequencer's strips.
+        render.use_border = render.use_stamp = render.use_sequencer = False
+        context.view_layer.use = True
         view, image = scene.view_settings, render.image_settings
         view.view_transform, view.look, view.exposure, view.gamma = "Raw", "None", 0.0, 1.0
         view.use_curve_mapping = False

@@ -207,6 +207,39 @@ def test_colours_of_the_output_alone_are_seen_and_set_back(ready, part, tmp_path
     assert left_out(ready, gel) == [] and image.color_management == "FOLLOW_SCENE"
 
 
+def test_set_up_render_leaves_nothing_in_the_picture_s_place(ready, rendered, part):
+    whole, render = rendered(), ready.render
+    render.use_border, render.border_max_x, ready.view_layers[0].use = True, 0.5, False
+    render.use_stamp = render.use_sequencer = True
+    assert part("addon.objects.digit_unit").left_out(ready, ready.objects["DIGIT gel"]) == [
+        "Burn Into Image changes the levels; Set Up Render sets Raw alone"
+    ]
+    bpy.ops.tactile.set_up_render()
+    assert not render.use_sequencer
+    np.testing.assert_array_equal(rendered(), whole)
+
+
+def test_a_compositor_that_changes_the_picture_is_said(ready, part):
+    left_out, gel = part("addon.objects.digit_unit").left_out, ready.objects["DIGIT gel"]
+    if bpy.app.version >= (5, 0, 0):
+        tree = ready.compositing_node_group = bpy.data.node_groups.new("nodes", "CompositorNodeTree")
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        kind = "NodeGroupOutput"
+    else:
+        ready.use_nodes, kind = True, "CompositorNodeComposite"
+        tree = ready.node_tree
+        assert left_out(ready, gel) == []  # as Blender begins
+        tree.nodes.clear()
+    layers, between, end = (tree.nodes.new(name) for name in ("CompositorNodeRLayers", "NodeReroute", kind))
+    tree.links.new(layers.outputs["Image"], between.inputs[0])
+    assert "compositor" in left_out(ready, gel)[0]
+    tree.links.new(between.outputs[0], end.inputs[0])
+    assert left_out(ready, gel) == []
+    ready.render.use_compositing = False
+    tree.links.clear()
+    assert left_out(ready, gel) == []
+
+
 def test_a_gel_that_is_moved_as_an_object_does_not_stand_still(ready, part):
     left_out, gel = part("addon.objects.digit_unit").left_out, ready.objects["DIGIT gel"]
     ready.frame_set(80)
