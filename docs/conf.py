@@ -21,13 +21,14 @@ autodoc_typehints_format = "short"
 python_use_unqualified_type_names = True
 
 _ARGUMENT = re.compile(r"^(\w+(?:, \w+)*) : (?=\S)")
+_NEXT = re.compile(r"(?:;|  ) +(?=\w+(?:, \w+)* : \S)")  # before another argument in the same line
 
 
 def list_arguments(app: Any, what: str, name: str, thing: object, options: Any, lines: list[str]) -> None:
     """Turn lines ``name : meaning`` of a docstring into a list, which reST would run together."""
     out: list[str] = []
     listed = False
-    for line in lines:
+    for line in (part for whole in lines for part in _NEXT.split(whole)):
         starts, goes_on = bool(_ARGUMENT.match(line)), listed and line.startswith("    ")
         if starts != listed and not goes_on:
             out.append("")

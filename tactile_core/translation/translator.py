@@ -46,7 +46,7 @@ SAMPLES = "sample_center", "sample_force"  # of contacts drawn from the posterio
 class Translation(Summary):
     """Result of a translation; T frames first, float32, SI units.
 
-    latent_signal (T, K), latent_biotac, latent_digit : means of the networks' latents, before a mount's shift
+    latent_signal, latent_biotac, latent_digit : (T, K) each, means of the networks' latents, before a mount's shift
     displacement_biotac : (T, N, 3) m, outer skin; displacement_digit : (T, M, 3) m, gel surface; zero without contact
     force : (T, 3) N, exerted by the object on the BioTac, sensor frame; zero without contact
     pressure : (T,) Pa, rise of the fluid's pressure, estimated from the electrodes alone; zero without contact

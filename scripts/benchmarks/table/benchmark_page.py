@@ -50,7 +50,7 @@ def short(value: float | None) -> str:
 
 def plot(methods: Sequence[Method]) -> bytes:
     """Return a PNG with a panel for each stage of the translation: error over time, both axes logarithmic, a line for
-    the Pareto front and one for the error of doing nothing."""
+    the Pareto front and one for the error of doing nothing. Conditions, of other contacts each, are bars of error."""
     from matplotlib.figure import Figure
 
     panels = [(stage, title, part) for stage, title in TITLES.items() for part in split(stage, methods) if part]
@@ -59,7 +59,7 @@ def plot(methods: Sequence[Method]) -> bytes:
     for number, (stage, title, part) in enumerate(panels, 1):
         axes = figure.add_subplot(-(-len(panels) // columns), columns, number)
         sensor = f", {part[0].name.split('_')[0]}" if stage == "mechanics" else ""
-        draw(axes, part, title + sensor)
+        (draw_bars if stage == "conditions" else draw)(axes, part, title + sensor)
     return png_of(figure)
 
 
@@ -90,6 +90,17 @@ def draw(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
     if max(baselines) < 10 * min(each.error for each in methods):  # fewer than two powers of ten to read
         axes.yaxis.set_minor_formatter("{x:g}")
     axes.margins(x=0.3, y=0.45)
+    axes.legend(fontsize=8)
+
+
+def draw_bars(axes, methods: Sequence[Method], title: str) -> None:  # noqa: ANN001
+    """Draw one panel of methods that are not compared by their time: a bar for each one's error."""
+    bars = axes.barh([label(each) for each in methods], [each.error for each in methods], color="tab:blue")
+    axes.bar_label(bars, fmt="%.2f", padding=3, fontsize=8)
+    axes.axvline(methods[0].baseline, color="grey", linestyle="--", linewidth=1, label="doing nothing")
+    axes.invert_yaxis()
+    axes.set(title=title, xlabel="error over that of no dent")
+    axes.margins(x=0.15)
     axes.legend(fontsize=8)
 
 
