@@ -13,6 +13,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc"]
 html_theme = "furo"
 html_title = f"tactile {release}"
 html_show_copyright = False
+html_static_path, html_css_files = ["static"], ["wide.css"]
 myst_heading_anchors = 3
 # Pages also link to files of the repository beside docs/; tests/test_documentation.py checks that these exist.
 suppress_warnings = ["myst.xref_missing"]

@@ -67,7 +67,7 @@ def draw(figure: Figure, recording: tactile.Recording, touch: tactile.Translatio
 
 def title(figure: Figure, x: float, text: str) -> None:
     """Write ``text`` as the heading of a panel; x : its middle, 0..1 of the figure's width"""
-    figure.text(x, 0.93, text, ha="center", size=13, weight="bold")
+    figure.text(x, 0.93, text, ha="center", size=12, weight="bold")
 
 
 def surface(figure: Figure, box: tuple, lattice: sensors.Lattice, displacement: np.ndarray, largest: float) -> None:
@@ -87,7 +87,7 @@ def surface(figure: Figure, box: tuple, lattice: sensors.Lattice, displacement: 
     low, high = nodes.min(axis=0), nodes.max(axis=0)
     for name, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{name}lim")(a, b)
-    axes.set_box_aspect(high - low, zoom=1.05)
+    axes.set_box_aspect(high - low, zoom=0.95)
     axes.view_init(**VIEW)
     axes.set_axis_off()
 
