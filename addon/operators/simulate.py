@@ -76,11 +76,14 @@ def _stand(context, thing, result: Result, sample: np.ndarray, frames: np.ndarra
     frames : (F,) of the scene; sample : (F,) int, index of the result's moment that each frame shows"""
     sensor = sensor_of(context, thing)
     name = STANDING.format(thing.name)
-    twin = context.scene.objects.get(name)
+    there = context.scene.objects
+    known = {STANDING.format(each.name) for each in there if each.tactile.role == "INDENTER"}
+    left = (each for each in there if each.tactile.role == "TWIN" and each.data == thing.data)  # of a former name
+    twin = there.get(name) or next((each for each in left if each.name not in known), None)
     if twin is None:
         twin = bpy.data.objects.new(name, thing.data)
         properties.home_of(thing).objects.link(twin)
-    twin.tactile.role = "TWIN"
+    twin.name, twin.tactile.role = name, "TWIN"
     twin.parent, twin.rotation_mode, thing.hide_render = sensor, "QUATERNION", True
     # A few thin lines and a body that is seen through: twin and dent stay in view.
     kind = json.loads(thing.tactile.spec or "{}").get("kind")

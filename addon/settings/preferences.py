@@ -7,11 +7,13 @@ from pathlib import Path
 import bpy
 
 from ...tactile_core.files import array_cache
+from ...tactile_core.sensors import descriptor
 from ...tactile_core.sensors.descriptor import OWN
 from .reports import ADVICE, MODULES, TactileOperator, missing
 
 ID = __package__.rsplit(".", 2)[0]  # the extension, not this package in it
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"  # by which Mitsuba finds the library
+_BEFORE = {variable: os.environ.get(variable) for variable in (LLVM_VARIABLE, OWN)}
 
 
 def addon_preferences(context: bpy.types.Context) -> bpy.types.AddonPreferences | None:
@@ -56,10 +58,21 @@ def _llvm_changed(preferences: bpy.types.AddonPreferences, _context: bpy.types.C
 
 
 def _tell(preferences: bpy.types.AddonPreferences) -> None:
-    """Tell this process and its workers the paths of LLVM's library and the user's sensors, unless they are empty."""
+    """Tell this process and its workers the paths of LLVM's library and the user's sensors; an empty one is the one
+    that Blender was started with."""
     for variable, path in ((LLVM_VARIABLE, preferences.llvm), (OWN, preferences.sensors)):
-        if path:
-            os.environ[variable] = bpy.path.abspath(path)
+        told = bpy.path.abspath(path) or _BEFORE[variable]
+        if told:
+            os.environ[variable] = told
+        else:
+            os.environ.pop(variable, None)
+
+
+def sensors_in(folder: str) -> list[str]:
+    """List the sensors whose folders a folder of the user's holds, with a descriptor or with tables of a known one."""
+    known, place = descriptor.names(), Path(bpy.path.abspath(folder))
+    held = sorted(place.iterdir()) if place.is_dir() else []
+    return [each.name for each in held if each.is_dir() and each.name in known]
 
 
 class TactilePreferences(bpy.types.AddonPreferences):
@@ -96,6 +109,10 @@ class TactilePreferences(bpy.types.AddonPreferences):
         column.use_property_split = True
         column.prop(self, "calibration")
         column.prop(self, "sensors")
+        if self.sensors:
+            held = sensors_in(self.sensors)
+            text = f"Found there: {', '.join(held)}" if held else "No sensor there: name the folder that holds theirs"
+            column.label(text=text, icon="CHECKMARK" if held else "ERROR")
         column.prop(self, "llvm")
         row = column.row()
         row.label(text=self.verdict or "LLVM: not checked yet", icon="INFO")

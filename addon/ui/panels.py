@@ -91,8 +91,10 @@ def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.t
 def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str, bool]:
     """Return words on how far to trust the current frame, the same as on a contact sheet, and true if it is a guess;
     ("", False) for simulated sensors. gel : the one whose values are used; None for the skin's"""
-    same = gel is not None and "expected_error_um" in gel and [*gel.get("force", ())] == [*skin["force"]]
-    shown = gel if same else skin  # a gel with another force was translated from another recording
+    told = gel is not None and "expected_error_um" in gel
+    # An imported skin's gel has its force: one with another was translated from another recording.
+    other = told and "expected_error_um" in skin and [*gel.get("force", ())] != [*skin["force"]]
+    shown = gel if told and not other else skin
     if "expected_error_um" not in shown:
         return "", False
     error, dent = (1e-6 * shown.get(name, math.nan) for name in ("expected_error_um", "dent_um"))

@@ -366,6 +366,9 @@ def test_an_imported_recording_is_not_pressed_over(imported, scene):
 
 def test_a_simulation_keeps_the_frames_it_began_with(gel_alone, part, monkeypatch):
     _press(gel_alone)
+    before = bpy.data.objects.new("sphere simulated", gel_alone.objects["sphere"].data)  # of a simulation before
+    gel_alone.collection.objects.link(before)
+    before.tactile.role = "TWIN"
     job = part("addon.process.jobs").Job
     wait = job.wait
 
@@ -377,7 +380,7 @@ def test_a_simulation_keeps_the_frames_it_began_with(gel_alone, part, monkeypatc
     monkeypatch.setattr(job, "wait", change_meanwhile)
     assert bpy.ops.tactile.simulate() == {"FINISHED"}
     gel = gel_alone.objects["DIGIT gel"]
-    assert part("addon.objects.motion").played(gel) == (1, 3) and "mine simulated" in gel_alone.objects
+    assert part("addon.objects.motion").played(gel) == (1, 3) and before.name == "mine simulated"
     gel_alone.frame_set(2)
     assert gel["force"][2] == pytest.approx(-0.05, rel=0.05)
 
@@ -409,7 +412,7 @@ def test_a_digit_alone_is_simulated_without_a_biotac(scene, part, nodes_of):
     assert 0.02 < np.abs(nodes_of(gel) - rest).max() < 0.5 and gel["force"][2] == pytest.approx(-0.1, rel=0.05)
 
 
-def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_path):
+def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, part, tmp_path):
     (tmp_path / "copies").mkdir()
     bpy.ops.tactile.add_sensor(sensor="BIOTAC")
     bpy.ops.tactile.add_indenter(shape="sphere")
@@ -420,6 +423,7 @@ def test_a_file_that_was_never_saved_keeps_its_recording_until_it_is(scene, tmp_
     bpy.ops.tactile.simulate()
     assert Path(skin.tactile.recording).is_file()
     bpy.ops.tactile.translate()
+    assert part("addon.ui.panels").trust_of(skin, scene.objects["DIGIT gel"])[0]  # whose force is not the simulated one
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "copies" / "press.blend"), copy=True)
     assert Path(skin.tactile.recording).is_file() and (tmp_path / "copies/tactile_simulations/sphere.h5").is_file()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "press.blend"))

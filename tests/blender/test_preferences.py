@@ -1,5 +1,7 @@
 """Preferences: the cache's size and its clearing, LLVM's verdict, the default calibration."""
 
+import os
+
 import bpy
 import pytest
 
@@ -10,7 +12,7 @@ PACKAGE = "bl_ext.user_default.tactile"
 def preferences(extension):
     found = bpy.context.preferences.addons[PACKAGE].preferences
     yield found
-    found.calibration = found.llvm = ""
+    found.calibration = found.llvm = found.sensors = ""
 
 
 def test_the_cache_lies_in_the_extension_s_folder_unless_it_is_named(monkeypatch, part, extension):
@@ -46,6 +48,18 @@ def test_a_scene_without_calibration_takes_the_preferences(preferences, scene, p
     preferences.calibration = str(own)
     found = settings.calibration_of(scene, "digit").leds[0].radiance
     assert found == pytest.approx(2 * shipped.leds[0].radiance, rel=1e-5)
+
+
+def test_own_sensors_are_told_until_the_folder_is_cleared(preferences, part, tmp_path):
+    (tmp_path / "biotac_sp").mkdir()
+    (tmp_path / "biotac_sp" / "locations.csv").write_text("")
+    descriptor, held = part("tactile_core.sensors.descriptor"), part("addon.settings.preferences").sensors_in
+    before = os.environ.get(descriptor.OWN)
+    preferences.sensors = str(tmp_path)
+    assert os.environ[descriptor.OWN] == str(tmp_path) and held(preferences.sensors) == ["biotac_sp"]
+    assert held(str(tmp_path / "biotac_sp")) == []  # a sensor's own folder
+    preferences.sensors = ""
+    assert os.environ.get(descriptor.OWN) == before
 
 
 def test_the_verdict_on_llvm_names_a_library_that_is_not_there(preferences, monkeypatch):
