@@ -62,7 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
     # No abbreviations: `-t` and the like belong to pytest.
     test = commands.add_parser("test", help="run ruff and pytest; other arguments go to pytest", allow_abbrev=False)
     test.add_argument("--train", action="store_true", help="also install torch and run the training tests")
-    test.add_argument("--numpy", metavar="VERSION", help="install this numpy, and nothing that is compiled")
+    test.add_argument("--numpy", metavar="VERSION", help="install this numpy, and no extra that needs a newer one")
     check = commands.add_parser("check", help="check style and types", allow_abbrev=False)
     docs = commands.add_parser("docs", help="build the site of the documentation", allow_abbrev=False)
     blender = commands.add_parser("test-blender", help="test the extension inside Blender", allow_abbrev=False)

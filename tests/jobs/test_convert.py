@@ -124,7 +124,7 @@ def test_a_kept_traction_is_zero_without_contact_and_adds_up(run, slide_csv):
     np.testing.assert_allclose(np.einsum("tnk,n->tk", traction, node_areas("digit")), total, rtol=0, atol=1e-6)
 
 
-def test_marker_motion_needs_a_unit_with_dots_and_has_their_rest(slide_csv, tmp_path, tools):
+def test_marker_motion_needs_a_unit_with_dots_and_has_their_rest(slide_csv, tmp_path, tools, no_sheet):
     unit = dataclasses.replace(plain_unit(), markers=Markers(3, 2, 2e-3, 0.6e-3, 0.1))
     drawer = dataclasses.replace(tools.drawer, dots=MarkerField(unit), shade=lambda height, _: fake_tools.shade(height))
     dotted = dataclasses.replace(tools, drawer=drawer)

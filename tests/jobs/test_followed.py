@@ -21,7 +21,9 @@ def apart(tmp_path_factory):
 
 
 def converted(folder, *words):
-    assert main(["convert", str(SHIPPED), "--out", str(folder), "--keep", "latent,displacement", *words]) == 0
+    with pytest.MonkeyPatch.context() as patch:  # without the sheet: see no_sheet
+        patch.setattr("tactile_core.jobs.conversion_report.ConversionReport.draw_sheet", lambda _, path: path.touch())
+        assert main(["convert", str(SHIPPED), "--out", str(folder), "--keep", "latent,displacement", *words]) == 0
     return arrays(folder / "press_roll_slide" / "frames.h5")
 
 

@@ -22,6 +22,8 @@ from tactile_core.recordings.flags import Flag
 from tactile_core.sensors.calibration_file import load_calibration
 from tactile_core.translation.networks import WEIGHTS_FOLDER
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 RECORDING = "scenes/press_roll_slide/press_roll_slide.h5"
 needs_scipy = pytest.mark.skipif(importlib.util.find_spec("scipy") is None, reason="needs scipy, of the extra [fem]")
 

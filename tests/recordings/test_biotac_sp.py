@@ -26,6 +26,8 @@ from tactile_core.translation.translate import translate
 from tactile_core.translation.unit_rest import Simulated, find_rest_sp
 from tactile_core.translation.weights import read_card
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 SLIP = [f"ff_e{number}" for number in range(1, 25)]
 GRASP = [
     "object",

@@ -12,6 +12,8 @@ from tactile_core.recordings import chunks
 from tactile_core.recordings.tables import column_map
 from tactile_core.recordings.tables.map_guess import guess
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 FRAMES = 120
 
 

@@ -13,6 +13,8 @@ from tactile_core.recordings import array_store, assemble
 from tactile_core.recordings.readers import each_finger
 from tactile_core.recordings.recording import name_of
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 savemat = pytest.importorskip("scipy.io", reason="scipy is absent: pip install tactile-core[matlab]").savemat
 
 

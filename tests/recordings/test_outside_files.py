@@ -297,7 +297,7 @@ def test_a_time_of_another_form_and_a_packed_file_are_refused_in_words(press, tm
     assert len(recordings.read(tmp_path / "b.npz")) == len(press.time)
 
 
-def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines):
+def test_texts_are_kept_as_labels_through_a_conversion(press, tmp_path, write, slide_lines, no_sheet):
     objects = ["foam" if i < 300 else "steel, polished" for i in range(len(press.time))]
     lines = [slide_lines[0] + ",object,trial,note"]
     lines += [f'{line}"{each}",7,' for line, each in zip(slide_lines[1:], objects, strict=True)]

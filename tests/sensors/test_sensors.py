@@ -44,7 +44,7 @@ def rms_distance(points, lattice):
 
 def test_skin_lies_on_the_public_mesh(outside_data):
     vertices, cells = read_tet(outside_data("biotac_mesh") / "skin.tet")
-    nodes = np.unique(boundary_nodes(cells))[::3]  # a third of 3,272 is enough for an rms, and three times faster
+    nodes = np.unique(boundary_nodes(cells))[::12]  # 273 of 3,272 are enough for an rms
     outer, inner = map(sensors.skin_of("biotac").skin_surface, ("outer", "inner"))
     to_outer, to_inner = (
         np.linalg.norm(unrolling.closest_on_triangles(s, vertices[nodes])[2] - vertices[nodes], axis=1)
@@ -54,7 +54,7 @@ def test_skin_lies_on_the_public_mesh(outside_data):
     assert np.sqrt((np.minimum(to_outer, to_inner) ** 2).mean()) < RMS_LIMIT
     for side in (to_outer < to_inner, to_outer >= to_inner):
         assert np.sqrt((np.minimum(to_outer, to_inner)[side] ** 2).mean()) < RMS_LIMIT
-        assert side.sum() > 300
+        assert side.sum() > 75
 
 
 def test_gel_lies_on_the_public_mesh(outside_data):
@@ -89,8 +89,8 @@ def test_skin_is_closed_and_as_thick_as_published():
         assert (count == 2).all()
     pad = np.abs(unrolling.unrolled_nodes()[:, 1]) < 8e-3
     middle = pad & (np.abs(outer.rest[:, 0] + 8e-3) < 6e-3)
-    nearest = unrolling.closest_on_triangles(inner, outer.rest[middle])[2]
-    thickness = np.linalg.norm(nearest - outer.rest[middle], axis=1)
+    some = outer.rest[middle][::3]
+    thickness = np.linalg.norm(unrolling.closest_on_triangles(inner, some)[2] - some, axis=1)
     assert thickness.min() > 1.50e-3 and thickness.max() < 1.63e-3  # the published range (docs/sources.md, BioTac skin)
 
 

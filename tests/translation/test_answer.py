@@ -13,6 +13,8 @@ from tactile_core.translation.answer import Answer, parse_shift
 from tactile_core.translation.contact_frame import PLACE_UNIT
 from tactile_core.translation.translate import load_translator
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 CELL = 0.6e-3  # m, the largest of the gel's lattice
 
 

@@ -16,6 +16,8 @@ from tactile_core.translation import force_scale
 from tactile_core.translation.answer import Answer
 from tactile_core.translation.translate import load_translator
 
+pytestmark = pytest.mark.usefixtures("no_sheet")
+
 UNIT = ElectrodeGains("made up", [1.0] * 19, [0.0] * 19, stiffness=2.0, stiffness_error=0.1)
 TIME = np.arange(1500) / 100
 FORCE = 2 + np.sin(TIME) + 0.5 * np.sin(7 * TIME)

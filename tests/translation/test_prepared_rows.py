@@ -49,19 +49,20 @@ def test_signals_of_some_frames_are_those_of_the_whole(kind, shipped):
     assert some.report == whole.report and some.warnings == whole.warnings
 
 
+@pytest.mark.usefixtures("no_sheet")
 def test_a_part_of_a_long_recording_is_as_in_the_whole(shipped, tmp_path):
     np.savez(tmp_path / "long.npz", electrodes=np.tile(shipped.electrodes, (5, 1)), pdc=np.tile(shipped.pdc, 5))
     tools, held = convert.load_tools(convert.ToolOptions()), {}
-    for name, frames in (("whole", slice(None)), ("part", slice(700, 900, 60))):
+    for name, frames in (("whole", slice(0, None, 20)), ("part", slice(700, 900, 60))):
         options = convert.Options(frames, keep=("displacement", "latent"))
         convert.convert(tmp_path / "long.npz", tmp_path / name, options, tools)
         with h5py.File(tmp_path / name / "frames.h5") as file:
             held[name] = {key: data[:] for key, data in file.items()}
     assert held["part"]["frame"].tolist() == [700, 760, 820, 880]
     for name in ("electrodes", "time", "flags", "pressure_measured"):
-        np.testing.assert_array_equal(held["part"][name], held["whole"][name][700:900:60], err_msg=name)
+        np.testing.assert_array_equal(held["part"][name], held["whole"][name][35:45:3], err_msg=name)
     for name, values in held["part"].items():  # other frames in a chunk: matrix products sum in another order
-        whole = held["whole"][name][700:900:60]
+        whole = held["whole"][name][35:45:3]
         np.testing.assert_allclose(values, whole, atol=1e-5 * np.nanmax(np.abs(whole), initial=1e-9), err_msg=name)
 
 

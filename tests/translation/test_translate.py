@@ -19,7 +19,7 @@ def whole(shipped):
     return translate(shipped)
 
 
-def test_the_arrays_are_those_of_the_command(shipped, whole, tmp_path):
+def test_the_arrays_are_those_of_the_command(shipped, whole, tmp_path, no_sheet):
     convert(shipped.path, tmp_path / "out", Options(keep=("displacement",)), load_tools(ToolOptions()))
     with h5py.File(tmp_path / "out" / "frames.h5") as file:
         for name in NAMES:

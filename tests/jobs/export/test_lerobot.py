@@ -40,7 +40,7 @@ def labelled(job, tmp_path):
                 file["electrodes"][:3, 4] = np.nan
             checksummed.write_checksum(path)
     with h5py.File(jobs.prepared_file(tmp_path / "job", "00000_a"), "r+") as file:
-        about = json.loads(file["about"][()].tobytes()) | {"labels": {"object": [["ball", 40], ["box", 30]]}}
+        about = json.loads(file["about"][()].tobytes()) | {"labels": {"object": [["ball", 20], ["box", 20]]}}
         del file["about"]
         file["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     return tmp_path / "job"
@@ -58,10 +58,10 @@ def test_lerobot_reads_back_with_plain_pyarrow(job, tmp_path):
     source = export.export(job, "lerobot", tmp_path / "out", silent)
     out = tmp_path / "out"
     info = json.loads((out / "meta" / "info.json").read_text())
-    assert (info["codebase_version"], info["total_episodes"], info["total_frames"]) == ("v3.0", 2, 115)
+    assert (info["codebase_version"], info["total_episodes"], info["total_frames"]) == ("v3.0", 2, 65)
     assert info["fps"] == 100
     episodes = pq.read_table(out / "meta/episodes/chunk-000/file-000.parquet").to_pylist()
-    assert [one["length"] for one in episodes] == [70, 45]
+    assert [one["length"] for one in episodes] == [40, 25]
     assert pq.read_table(out / "meta" / "tasks.parquet").to_pylist()[0]["task_index"] == 0
     for one, episode in zip(source.recordings, episodes, strict=True):
         path = info["data_path"].format(chunk_index=episode["data/chunk_index"], file_index=episode["data/file_index"])
@@ -96,7 +96,7 @@ def test_no_number_is_missing_and_labels_are_features(layout, labelled, tmp_path
     place = np.concatenate([block["contact_center"] for one in source.recordings for block in one.blocks()])
     np.testing.assert_array_equal(rows["observation.contact"], np.isfinite(place[:, 0]))
     assert {tuple(row) for row in rows["observation.contact_center"][rows["observation.contact"] == 0]} == {(0, 0)}
-    assert rows["labels.object"].tolist() == ["ball"] * 40 + ["box"] * 30 + [""] * 45
+    assert rows["labels.object"].tolist() == ["ball"] * 20 + ["box"] * 20 + [""] * 25
     assert info["features"]["labels.object"]["dtype"] == "string" and "labels.object" not in stats
     np.testing.assert_allclose(rows["timestamp"], rows["frame_index"] / info["fps"], rtol=1e-6)  # float32
     for episode in (0, 1):
@@ -144,8 +144,8 @@ def test_version_2_1_has_a_file_and_a_video_an_episode_and_what_gr00t_asks_for(j
     info = json.loads((out / "meta/info.json").read_text())
     assert (info["codebase_version"], info["total_videos"], info["features"][PICTURE]["dtype"]) == ("v2.1", 2, "video")
     lines = {name: (out / f"meta/{name}.jsonl").read_text().splitlines() for name in ("episodes", "episodes_stats")}
-    assert [json.loads(line)["length"] for line in lines["episodes"]] == [70, 45]
-    assert [json.loads(line)["stats"]["action"]["count"] for line in lines["episodes_stats"]] == [[70], [45]]
+    assert [json.loads(line)["length"] for line in lines["episodes"]] == [40, 25]
+    assert [json.loads(line)["stats"]["action"]["count"] for line in lines["episodes_stats"]] == [[40], [25]]
     assert json.loads((out / "meta/tasks.jsonl").read_text())["task_index"] == 0
     for index, one in enumerate(source.recordings):
         place = {"episode_chunk": 0, "episode_index": index, "video_key": PICTURE}
@@ -173,8 +173,8 @@ def test_lerobot_loads_it_as_its_training_does(labelled, tmp_path):
 
     export.export(labelled, "lerobot", tmp_path / "out", silent)
     data = LeRobotDataset("tactile/touch", root=tmp_path / "out", delta_timestamps={"action": [0, 0.01]})
-    assert len(data) == 115 and data.meta.stats[PICTURE]["mean"].shape == (3, 1, 1)
-    row = data[69]
+    assert len(data) == 65 and data.meta.stats[PICTURE]["mean"].shape == (3, 1, 1)
+    row = data[39]
     assert row["labels.object"] == "box" and row["action_is_pad"].tolist() == [False, True]
     assert tuple(row[PICTURE].shape) == (3, *fake_tools.SHAPE) and row["task"]
 
@@ -182,7 +182,7 @@ def test_lerobot_loads_it_as_its_training_does(labelled, tmp_path):
 def test_labels_go_into_npz(labelled, tmp_path):
     export.export(labelled, "npz", tmp_path / "out", silent)
     with np.load(tmp_path / "out/00000_a.npz", allow_pickle=False) as arrays:
-        assert arrays["labels/object"].tolist() == ["ball"] * 40 + ["box"] * 30
+        assert arrays["labels/object"].tolist() == ["ball"] * 20 + ["box"] * 20
     with np.load(tmp_path / "out/00001_b.npz", allow_pickle=False) as arrays:
         assert not [name for name in arrays if name.startswith("labels")]
 
