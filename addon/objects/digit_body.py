@@ -60,10 +60,12 @@ def add_body(gel: bpy.types.Object, unit: Calibration) -> None:
         name = f"{sensors.title(unit.camera.sensor)} camera"
         lens = _child(gel, name, bpy.data.cameras.new(name), "NONE")
         place_camera(lens, gel, unit.camera)
-    if first and coating_of(gel).users > 1:  # of a copied gel: its light is that of its own LEDs
+    lamps = held_light.driven_by(coating_of(gel))
+    copied = bool(lamps) and lamps.isdisjoint(leds_of(gel).values())
+    if (first or copied) and coating_of(gel).users > 1:  # of a copied gel: its light is that of its own LEDs
         slot = next(slot for slot in gel.material_slots if slot.material == coating_of(gel))
         slot.link, slot.material = "OBJECT", slot.material.copy()
-    if first or held_light.NODE not in coating_of(gel).node_tree.nodes:
+    if first or copied or held_light.NODE not in coating_of(gel).node_tree.nodes:
         _hold_light(gel, unit)
     _link_light(gel)
 
@@ -90,9 +92,9 @@ def _link_light(gel: bpy.types.Object) -> None:
     fall on what stands around, as gel and housing throw no shadow. LEDs that the user has linked stay as they are.
     """
     leds = leds_of(gel).values()
-    new = [led for led in leds if led.light_linking.receiver_collection is None]
+    new = [led for led in leds if _lights_another(led, gel)]
     if new:
-        known = next(filter(None, (led.light_linking.receiver_collection for led in leds)), None)
+        known = next((led.light_linking.receiver_collection for led in leds if led not in new), None)
         lit = known or bpy.data.collections.new("DIGIT lit by its LEDs")
         if gel.name not in lit.objects:
             lit.objects.link(gel)
@@ -109,6 +111,13 @@ def _link_light(gel: bpy.types.Object) -> None:
         for name in (name for name in _LINKS if getattr(led.light_linking, name) is not None):
             led[name] = getattr(led.light_linking, name)
             led.property_overridable_library_set(f'["{name}"]', True)
+
+
+def _lights_another(led: bpy.types.Object, gel: bpy.types.Object) -> bool:
+    """Return true if an LED is not linked yet, or was copied, linked to another gel."""
+    group = led.light_linking.receiver_collection
+    gels = [] if group is None else [thing for thing in group.objects if thing.tactile.role == "DIGIT"]
+    return group is None or (bool(gels) and gel not in gels)
 
 
 def _hold_light(gel: bpy.types.Object, unit: Calibration) -> None:

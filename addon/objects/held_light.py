@@ -103,6 +103,13 @@ def add_nodes(material: bpy.types.Material) -> None:
         nodes.tree.links.new(lit, link.to_socket)
 
 
+def driven_by(material: bpy.types.Material) -> set[bpy.types.ID]:
+    """Return the LED objects, and their lamps, that drive the held light in a coating."""
+    moves = material.node_tree.animation_data
+    variables = [each for curve in (moves.drivers if moves else ()) for each in curve.driver.variables]
+    return {target.id for variable in variables for target in variable.targets if target.id is not None}
+
+
 def drive(material: bpy.types.Material, leds: dict[str, bpy.types.Object], full: dict[str, float]) -> None:
     """Let each LED's held light in a coating follow that LED's power, by drivers, which work without the add-on.
 

@@ -111,7 +111,7 @@ class TactilePreferences(bpy.types.AddonPreferences):
         column.prop(self, "sensors")
         if self.sensors:
             held = sensors_in(self.sensors)
-            text = f"Found there: {', '.join(held)}" if held else "No sensor there: name the folder that holds theirs"
+            text = f"Found there: {', '.join(held)}" if held else "No sensor there: choose the folder of their folders"
             column.label(text=text, icon="CHECKMARK" if held else "ERROR")
         column.prop(self, "llvm")
         row = column.row()

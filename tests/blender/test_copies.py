@@ -46,13 +46,20 @@ def duplicate(gel, *parts):
     return bpy.context.object
 
 
-def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw):
+def test_a_copy_with_its_parts_has_lights_of_its_own(gel, draw, part):
     before = draw(gel)
     copy = duplicate(gel, *gel.children_recursive)
     assert np.abs(draw(copy) - before).max() <= 1
     lamp = next(thing for thing in copy.children if thing.tactile.colour == "red")
     lamp.data.energy *= 2
     assert np.abs(draw(copy) - before)[..., 0].mean() > 10 and np.abs(draw(gel) - before).max() <= 1
+    bpy.ops.tactile.set_up_render()  # for Cycles and EEVEE: what they light, and the coating that they drive
+    body, driven_by = part("addon.objects.digit_body"), part("addon.objects.held_light").driven_by
+    for thing in (gel, copy):
+        leds = set(body.leds_of(thing).values())
+        assert leds == driven_by(body.coating_of(thing)) & set(bpy.data.objects)
+        assert all(led.light_linking.receiver_collection.objects.values() == [thing] for led in leds)
+        assert all(each in thing.children for led in leds for each in led.light_linking.blocker_collection.objects)
 
 
 def test_a_copied_pair_is_translated_by_itself(imported):
