@@ -66,12 +66,14 @@ class TACTILE_OT_import_recording(RecordingOptions, TactileOperator, ImportHelpe
     )  # fmt: skip
     millimetres: bpy.props.BoolProperty(
         name="Scene in Millimetres",
-        description="Set the scene's unit to 1 mm, so that a fingertip is workable; else the scene's own unit is kept",
-        default=True,
-    )
+        description="Set the scene's unit to 1 mm, so that a fingertip is workable. A scene that holds anything else"
+        " keeps its own unit, unless you choose this anew",
+        default=True, options={"SKIP_SAVE"},  # what is set was chosen for this import
+    )  # fmt: skip
     set_timeline: bpy.props.BoolProperty(
-        name="Set Frame Rate and Range", description="Let the scene play the recording in its own time", default=True
-    )
+        name="Set Frame Rate and Range", description="Let the scene play the recording in its own time; one that holds"
+        " anything else keeps its own, unless you choose this anew", default=True, options={"SKIP_SAVE"},
+    )  # fmt: skip
 
     def _work(self, context: bpy.types.Context) -> None:
         """Import the files. A bad one is reported and the others are imported; raise Refused if all are bad."""

@@ -134,8 +134,11 @@ class TACTILE_PT_picture(_Panel, bpy.types.Panel):
         layout = self.layout
         layout.operator(TACTILE_OT_live_picture.bl_idname, icon="HIDE_OFF" if preview.is_on() else "HIDE_ON",
                         depress=preview.is_on())  # fmt: skip
-        if preview.failure():
-            _text(layout, context, preview.failure(), "ERROR")
+        words = preview.failure()
+        if preview.is_on() and properties.gel_of(context.scene) is None:
+            words = "No gel in this scene: its picture is from before"
+        if words:
+            _text(layout, context, words, "ERROR")
         draw_settings(layout, context)
 
 

@@ -28,6 +28,9 @@ def test_a_moved_cube_stays_and_with_it_the_scene_s_units_and_rate(new_file, imp
     scene = bpy.context.scene
     assert not scene.objects["Cube"].hide_viewport
     assert scene.unit_settings.scale_length == 1 and scene.render.fps == 24
+    # What was kept here is no choice for the next import, which a window would begin with it.
+    choices = bpy.ops.tactile.import_recording.get_rna_type().properties
+    assert choices["set_timeline"].is_skip_save and choices["millimetres"].is_skip_save
 
 
 def test_the_firmest_frame_is_shown(imported):
