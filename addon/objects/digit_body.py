@@ -151,6 +151,8 @@ def _keep_links_out_of_scenes(context: bpy.types.BlendImportContext) -> None:
     things = {item.id for item in context.import_items if item.id_type == "OBJECT" and item.id is not None}
     for led in [thing for thing in things if thing.tactile.role == "LED" and thing.library is None]:
         for group in filter(None, (getattr(led.light_linking, name) for name in _LINKS)):
+            if not all(thing.tactile.role in ("DIGIT", "BODY") for thing in group.objects):
+                continue  # the user's own
             for parent in (*bpy.data.collections, *(scene.collection for scene in bpy.data.scenes)):
                 if group in parent.children.values():
                     parent.children.unlink(group)

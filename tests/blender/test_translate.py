@@ -59,8 +59,9 @@ def test_the_panel_s_words_on_trust_are_the_contact_sheet_s(gel, part, translati
 
 def test_the_panel_s_trust_is_never_another_recording_s(gel, imported, part):
     """A second skin is not translated yet: the scene's only gel is the first's."""
-    other, panels, scene = imported(frames="120:140"), part("addon.ui.panels"), bpy.context.scene
-    scene.frame_set(125)
+    panels, scene = part("addon.ui.panels"), bpy.context.scene
+    other = imported(frames="90:110", first_frame=-20)
+    scene.frame_set(80)
     assert part("addon.settings.properties").gel_of(scene, other) == gel
     assert panels.trust_of(other, gel) == panels.trust_of(other, None) != panels.trust_of(gel, gel)
 
