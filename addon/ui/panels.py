@@ -75,12 +75,15 @@ def _exaggeration(layout: bpy.types.UILayout, sensor: bpy.types.Object | None) -
 
 def _numbers(layout: bpy.types.UILayout, context: bpy.types.Context, skin: bpy.types.Object | None) -> None:
     """Draw the current frame's force, and how far to trust its translation to the gel, else to the skin."""
+    gel = properties.gel_of(context.scene, context.object or skin)
+    if skin is None or (gel is not None and gel == context.object and _of_another(skin, gel)):
+        skin = gel  # copied or pasted without its skin
     if skin is None or "force" not in skin:
         return
     size = sum(part * part for part in skin["force"]) ** 0.5
     column = layout.column(align=True)
     column.label(text=f"Force {size:.3f} N", icon="FORCE_FORCE")
-    words, guess = trust_of(skin, properties.gel_of(context.scene, context.object or skin))
+    words, guess = trust_of(skin, gel)
     _text(column, context, words, "ERROR" if guess else "CHECKMARK")
     for line in numbers_of(skin) if words else ():
         _text(column, context, line)
@@ -92,15 +95,19 @@ def trust_of(skin: bpy.types.Object, gel: bpy.types.Object | None) -> tuple[str,
     """Return words on how far to trust the current frame, the same as on a contact sheet, and true if it is a guess;
     ("", False) for simulated sensors. gel : the one whose values are used; None for the skin's"""
     told = gel is not None and "expected_error_um" in gel
-    # An imported skin's gel has its force: one with another was translated from another recording.
-    other = told and "expected_error_um" in skin and [*gel.get("force", ())] != [*skin["force"]]
-    shown = gel if told and not other else skin
+    shown = gel if told and not _of_another(skin, gel) else skin
     if "expected_error_um" not in shown:
         return "", False
     error, dent = (1e-6 * shown.get(name, math.nan) for name in ("expected_error_um", "dent_um"))
     trust = shown["confidence"], int(shown.get("flags", 0)), error, dent
     words = trust_words.in_words(*trust, skin["force"])
     return words, trust_words.is_guess(*trust)
+
+
+def _of_another(skin: bpy.types.Object, gel: bpy.types.Object) -> bool:
+    """Return true if a gel was translated from another recording than an imported skin's: it has another force."""
+    told = "expected_error_um" in skin and "expected_error_um" in gel
+    return told and [*gel.get("force", ())] != [*skin["force"]]
 
 
 def numbers_of(skin: bpy.types.Object) -> list[str]:

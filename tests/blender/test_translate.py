@@ -4,6 +4,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -64,6 +65,16 @@ def test_the_panel_s_trust_is_never_another_recording_s(gel, imported, part):
     scene.frame_set(80)
     assert part("addon.settings.properties").gel_of(scene, other) == gel
     assert panels.trust_of(other, gel) == panels.trust_of(other, None) != panels.trust_of(gel, gel)
+    bpy.data.objects.remove(scene.objects["BioTac skin"])
+    said, font = [], SimpleNamespace(label=lambda text, icon: said.append(text))
+    layout = SimpleNamespace(column=lambda align: font)
+    system, region = SimpleNamespace(ui_scale=1.0), SimpleNamespace(width=9999)
+    preferences = SimpleNamespace(system=system)
+    for active in (other, gel):
+        said.clear()
+        context = SimpleNamespace(scene=scene, object=active, preferences=preferences, region=region)
+        panels._numbers(layout, context, other)
+        assert panels.trust_of(active, active)[0] in said
 
 
 def test_the_panel_says_that_a_silent_frame_has_no_contact(gel, part, translation):
