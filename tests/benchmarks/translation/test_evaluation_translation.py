@@ -156,6 +156,7 @@ def test_the_script_measures_the_shipped_networks_on_the_shipped_contacts(reques
     shutil.copy("docs/translation.md", tmp_path / "card.md")
     # prime as well; targets are met on the whole set alone
     monkeypatch.setattr(evaluate_translation, "QUICK_PRESSES", 29)
+    monkeypatch.setattr(evaluate_translation, "QUICK_CONTACTS", 6)
     written = ["--json", str(tmp_path / "rows.json"), "--card", str(tmp_path / "card.md")]
     status = evaluate_translation.main(["--quick", "--weights", str(WEIGHTS_FOLDER), *written])
     rows = json.loads((tmp_path / "rows.json").read_text())
